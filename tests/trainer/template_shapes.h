@@ -93,6 +93,20 @@ static const sdm_shape mechanism = {.abi = SDM_SHAPE_ABI,
                                     .n_params = LINK_PARAMS,
                                     .mesh = mechanism_mesh};
 
+/* The same, whose arm turns by more than half a turn to either side. */
+static const sdm_param wide_params[LINK_PARAMS] = {
+    {"arm", "rad", -4, 4, 0.1, "angle of the arm"},
+    {"hand", "rad", -0.5, 0.5, 0, "angle of the hand"},
+    {"block", "", 0.8, 1.25, 1, "stretch of the block"}};
+
+static const sdm_shape wide_mechanism = {.abi = SDM_SHAPE_ABI,
+                                         .size = sizeof(sdm_shape),
+                                         .name = "mechanism",
+                                         .summary = "boxes on joints",
+                                         .params = wide_params,
+                                         .n_params = LINK_PARAMS,
+                                         .mesh = mechanism_mesh};
+
 /* A thin ring in smooth random displacement fields: sums of Gaussian bumps 3 mm wide. */
 static int ring_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                      const double *p, sdm_mesh_out *out)

@@ -1,7 +1,7 @@
 /* Training of the template network: accuracy without a training step, accuracy with a correction,
  * the same bits for any number of threads and after a resume, the choice of
  * the kind.
- * Tests: design.c race.c set_up.c template_kind.c template_maps.c warp_modes.c */
+ * Tests: design.c race.c rotations.c set_up.c template_kind.c template_maps.c warp_modes.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -57,6 +57,19 @@ static void mechanism_needs_no_training(void **state)
     assert_int_equal(sdm_model_open(r.model_path, &m, NULL), SDM_OK);
     assert_string_equal(sdm_model_get_info(m)->kind, "template");
     sdm_model_free(m);
+    sdm_instance_free(shape);
+}
+
+// Rotations of more than half a turn are as exact as small ones.
+static void turns_are_unwrapped(void **state)
+{
+    (void)state;
+    mistaken = NONE;
+    sdm_instance *shape = instance_of(&wide_mechanism);
+    sdm_config c;
+    read_config(&c, mechanism_text, NULL, 0);
+    const sdm_train_report r = train(&c, shape);
+    if (!(r.accuracy.rmse_near_mm < 0.4 / 20)) fail_msg("%g mm", r.accuracy.rmse_near_mm);
     sdm_instance_free(shape);
 }
 
@@ -198,11 +211,10 @@ static void other_meshes_are_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(mechanism_needs_no_training),
-                                       cmocka_unit_test(ring_reaches_its_accuracy),
-                                       cmocka_unit_test(same_bits_for_threads),
-                                       cmocka_unit_test(resume_is_bit_exact),
-                                       cmocka_unit_test(kind_is_chosen),
-                                       cmocka_unit_test(other_meshes_are_refused)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(mechanism_needs_no_training), cmocka_unit_test(turns_are_unwrapped),
+        cmocka_unit_test(ring_reaches_its_accuracy),   cmocka_unit_test(same_bits_for_threads),
+        cmocka_unit_test(resume_is_bit_exact),         cmocka_unit_test(kind_is_chosen),
+        cmocka_unit_test(other_meshes_are_refused)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

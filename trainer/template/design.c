@@ -8,6 +8,7 @@
 
 #include "motion.h"
 #include "regression.h"
+#include "rotations.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/memory.h"
 #include "template_maps.h"
@@ -175,6 +176,7 @@ static sdm_status design_motion(template_design *d, double tolerance, sdm_error 
                 y[i * d->n_numbers + p->amplitudes + m] = amplitude[c][i * p->n_modes + m];
         }
     }
+    if (!s) s = trainer_template_unwrap(d, n, y, err);
     if (!s) s = fit_functions(d, n, y, weight, tolerance, err);
     for (size_t c = 0; c < d->n_parts; c++) sdm_free(amplitude[c]);
     sdm_free(weight);

@@ -24,16 +24,16 @@ enum { FREE = UINT32_MAX, FLEXIBLE = UINT32_MAX - 1 };
 typedef struct search {
     const family *f;
     double tolerance;
-    double *x;           /* [SAMPLES][n_vert][3] */
-    size_t n;            /* vertices of the component */
-    uint32_t *vertices;  /* [n] */
-    size_t *first;       /* [n_vert + 1] neighbours of v: next[first[v] .. first[v + 1] - 1] */
-    uint32_t *next;      /* also joins the vertices at the same place */
-    uint32_t *piece;     /* [n_vert] rigid piece of each vertex, FREE or FLEXIBLE */
-    uint32_t *list;      /* [n_vert] the region */
-    uint32_t *seen;      /* [n_vert] number of the last visit */
+    double *x;          /* [SAMPLES][n_vert][3] */
+    size_t n;           /* vertices of the component */
+    uint32_t *vertices; /* [n] */
+    size_t *first;      /* [n_vert + 1] neighbours of v: next[first[v] .. first[v + 1] - 1] */
+    uint32_t *next;     /* also joins the vertices at the same place */
+    uint32_t *piece;    /* [n_vert] rigid piece of each vertex, FREE or FLEXIBLE */
+    uint32_t *list;     /* [n_vert] the region */
+    uint32_t *seen;     /* [n_vert] number of the last visit */
     uint32_t visit;
-    motion m[SAMPLES];   /* of the region */
+    motion m[SAMPLES]; /* of the region */
 } search;
 
 static sdm_status sample_positions(search *s, sdm_error *err)
@@ -170,8 +170,7 @@ static size_t grow_pieces(search *s)
         size_t n = grow(s, seed);
         const bool rigid = n >= START && (double)n >= SMALLEST * (double)s->n;
         if (n == 0) s->list[n++] = seed;
-        for (size_t k = 0; k < n; k++)
-            s->piece[s->list[k]] = rigid ? (uint32_t)n_pieces : FLEXIBLE;
+        for (size_t k = 0; k < n; k++) s->piece[s->list[k]] = rigid ? (uint32_t)n_pieces : FLEXIBLE;
         n_free -= n;
         if (rigid) n_pieces++, n_rigid += n;
         failed += !rigid;
@@ -193,9 +192,9 @@ static void mark_joints(const search *s, bool *flexes)
     }
 }
 
-// list = the connected flexible vertices around v, then those within `overlap` of them, and at least
-// their neighbours. origin[b] = the flexible vertex from which b was reached. Takes the flexible
-// ones out of `flexes`. Returns their number.
+// list = the connected flexible vertices around v, then those within `overlap` of them, and at
+// least their neighbours. origin[b] = the flexible vertex from which b was reached. Takes the
+// flexible ones out of `flexes`. Returns their number.
 static size_t spread_joint(search *s, uint32_t v, bool *flexes, double overlap, uint32_t *origin)
 {
     const double *x = s->f->base.vert;

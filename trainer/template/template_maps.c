@@ -270,23 +270,9 @@ static void measure_sag(sdm_template_part *p)
     }
 }
 
-/* Lets the distance to a joint grow faster from a few voxels on. There its rigid neighbours are
-   almost as near, and exact; the warp of the joint folds on the inner side of a bend, where
-   distances to first order are far too small. */
-static void leave_far(const sdm_lattice *l, const float *nodes, double h)
+sdm_status trainer_template_maps(template_design *d, sdm_error *err)
 {
-    const float from = (float)(4 * h), factor = 9;
-    float *v = (float *)nodes;
-    for (size_t i = 0; i < sdm_lattice_count(l); i++, v += 4) {
-        if (!(v[0] > from)) continue;
-        v[0] = from + factor * (v[0] - from);
-        for (int a = 1; a < 4; a++) v[a] *= factor;
-    }
-}
-
-sdm_status trainer_template_maps(template_design *d, double margin, sdm_error *err)
-{
-    enum { FAR_NODES = 1 << 20 };
+    enum { FAR_NODES = 1 << 20, NEAR = 6, NEAR_WARPED = 3 }; // NEAR: voxels around the part
     const double h = fmin(fmin(d->grid->spacing[0], d->grid->spacing[1]), d->grid->spacing[2]);
     box reach[SDM_TEMPLATE_MAX_PARTS];
     sdm_status s = grid_boxes(d, reach, err);
@@ -295,22 +281,19 @@ sdm_status trainer_template_maps(template_design *d, double margin, sdm_error *e
         box b = EMPTY;
         for (size_t k = d->first[c]; k < d->first[c + 1]; k++)
             box_add(&b, d->family.base.vert + 3 * d->vertices[k]);
-        if (!lattice_of(&b, margin * h, h, SDM_TEMPLATE_MAX_NODES, &p->near))
+        const double margin = (p->n_modes ? NEAR_WARPED : NEAR) * h;
+        if (!lattice_of(&b, margin, h, SDM_TEMPLATE_MAX_NODES, &p->near))
             return sdm_fail(err, SDM_E_UNSUPPORTED,
                             "shape '%s': too large for a template with the spacing of the grid",
                             sdm_instance_shape(d->family.shape)->name);
         // a warp moves the grid's voxels by as much as the vertices: the margin of the warp's box
-        const double extra = p->n_modes ? 2 * p->warp.spacing : h;
-        double spacing = 4 * h;
+        const double extra = p->n_modes ? 2 * p->warp.spacing : 4 * h;
+        double spacing = 3 * h;
         while (!lattice_of(&reach[c], extra, spacing, FAR_NODES, &p->far)) spacing *= 1.2;
         part_solid solid = {0};
         s = make_solid(d, c, &solid, err);
         if (!s) s = fill_nodes(&solid, &p->near, &p->near_nodes, err);
         if (!s) s = fill_nodes(&solid, &p->far, &p->far_nodes, err);
-        if (!s && p->n_modes && d->n_parts > 1) {
-            leave_far(&p->near, p->near_nodes, h);
-            leave_far(&p->far, p->far_nodes, h);
-        }
         if (!s) measure_sag(p);
         solid_free(&solid);
     }

@@ -60,7 +60,30 @@ static inline void halves(vec a, vec b, vec out[2])
     out[0] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11);
     out[1] = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
 }
+// Four floats at p, and four on the next line.
+static inline vec load_lines(const float *p, size_t stride)
+{
+    typedef float four __attribute__((vector_size(16), aligned(4)));
+    const four a = *(const four *)p, b = *(const four *)(p + stride);
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+/* The elements i and i + 1 of the first four floats, four times each. */
+#define SHUFFLE_PLANES(v, i)                                                                       \
+    __builtin_shufflevector(v, v, i, i, i, i, (i) + 1, (i) + 1, (i) + 1, (i) + 1)
+
+// Stores the first four floats at p, the last four a plane of a block further.
+static inline void store_planes(float *p, vec v)
+{
+    memcpy(p, &v, 16);
+    memcpy(p + 16, (const char *)&v + 16, 16);
+}
 #else
+static inline vec load_lines(const float *p, size_t stride)
+{
+    (void)stride;
+    return load(p);
+}
+static inline void store_planes(float *p, vec v) { store(p, v); }
 static inline vec repeat_two(const float *p)
 {
     const double pair = load_pair(p);
@@ -72,55 +95,29 @@ static inline vec repeat_four(const float *p) { return load(p); }
 static inline vec mix(vec a, vec b, vec t) { return a + t * (b - a); }
 static inline veci splat_int(int32_t v) { return v - (veci){0}; }
 
-static void expand_cell(const template_expansion *e, const float *points, const float *metric,
-                        size_t n_c, float *const *c, size_t at)
+// VW / 4 lines of four voxels.
+static void expand(const template_expansion *e, const float *points, const float *metric,
+                   size_t stride, size_t n_c, float *const *c)
 {
-    for (int i = 0; i < e->step; i += VW) {
-        for (int a = 0; a < 3; a++)
-            store(c[a] + at + i, load(e->cubic[0] + i) * splat(points[a]) +
-                                     load(e->cubic[1] + i) * splat(points[4 + a]) +
-                                     load(e->cubic[2] + i) * splat(points[8 + a]) +
-                                     load(e->cubic[3] + i) * splat(points[12 + a]));
-        for (size_t a = 3; a < n_c; a++)
-            store(c[a] + at + i,
-                  mix(splat(metric[5 + a]), splat(metric[13 + a]), load(e->linear + i)));
+    vec w[4];
+    EACH(k, 4) w[k] = repeat_four(e->cubic[k]);
+    const vec t = repeat_four(e->linear);
+    for (size_t at = 0; at < 64; at += VW, points += VW / 4 * stride, metric += VW / 4 * stride) {
+        vec p[4];
+        EACH(k, 4) p[k] = load_lines(points + 4 * k, stride);
+        EACH(a, 3)
+        store(c[a] + at, w[0] * spread(p[0], a) + w[1] * spread(p[1], a) + w[2] * spread(p[2], a) +
+                             w[3] * spread(p[3], a));
+        if (n_c == 3) continue;
+        vec low[2], change[2];
+        EACH(k, 2)
+        {
+            low[k] = load_lines(metric + 4 * k, stride);
+            change[k] = load_lines(metric + 8 + 4 * k, stride) - low[k];
+        }
+        EACH(a, 6)
+        store(c[3 + a] + at, spread(low[a / 4], a % 4) + t * spread(change[a / 4], a % 4));
     }
-}
-
-// VW / 4 cells of step 4, the usual one: four voxels of a vector belong to a cell.
-static inline void expand_four(const vec *w, vec t, const float *points, const float *metric,
-                               size_t n_c, float *const *c, size_t at)
-{
-    vec p[4];
-    EACH(k, 4) p[k] = load(points + 4 * k);
-    EACH(a, 3)
-    store(c[a] + at, w[0] * spread(p[0], a) + w[1] * spread(p[1], a) + w[2] * spread(p[2], a) +
-                         w[3] * spread(p[3], a));
-    if (n_c == 3) return;
-    vec low[2], high[2];
-#if VW == 8
-    halves(load(metric + 8), load(metric + 16), low);
-    halves(load(metric + 16), load(metric + 24), high);
-#else
-    EACH(k, 2) low[k] = load(metric + 8 + 4 * k), high[k] = load(metric + 16 + 4 * k);
-#endif
-    const vec change[2] = {high[0] - low[0], high[1] - low[1]};
-    EACH(a, 6) store(c[3 + a] + at, spread(low[a / 4], a % 4) + t * spread(change[a / 4], a % 4));
-}
-
-static void expand(const template_expansion *e, size_t cells, const float *points,
-                   const float *metric, size_t n_c, float *const *c)
-{
-    size_t i = 0;
-    if (e->step == 4) {
-        vec w[4];
-        EACH(k, 4) w[k] = repeat_four(e->cubic[k]);
-        const vec t = repeat_four(e->linear);
-        for (; i + VW / 4 <= cells; i += VW / 4)
-            expand_four(w, t, points + 4 * i, metric + 8 * i, n_c, c, 4 * i);
-    }
-    for (; i < cells; i++)
-        expand_cell(e, points + 4 * i, metric + 8 * i, n_c, c, (size_t)e->step * i);
 }
 
 // The cells of a lattice.
@@ -328,5 +325,63 @@ static void correct(const template_correction *c, size_t n, const float *const *
     }
 }
 
+/* Cubic interpolation in a block: linear interpolation along the three axes, plus for each axis the
+   cubic correction along the four edges parallel to it, interpolated linearly between them. The
+   four floats of a quad are edges along z, then voxels along y, then voxels along x; a vector of
+   eight floats holds two planes of voxels. Letters: l linear, c correction, s slope; p and q are
+   the slopes at both ends less the slope of the straight line. */
+
+// Weights of the voxels of a block along an axis: t, t (1 - t)^2, t^2 (1 - t).
+static const float WEIGHTS[3][4] = {
+    {0, 0.25f, 0.5f, 0.75f}, {0, 0.140625f, 0.125f, 0.046875f}, {0, 0.046875f, 0.125f, 0.140625f}};
+
+// The four edges along z of a block at one end: distance, and slopes by x, y, z.
+static inline void load_corners(const float *corner, size_t line, vec out[4])
+{
+    const vec a = repeat_four(corner), b = repeat_four(corner + 4), c = repeat_four(corner + line),
+              d = repeat_four(corner + line + 4);
+    const vec ab[2] = {interleave_low(a, b), interleave_high(a, b)},
+              cd[2] = {interleave_low(c, d), interleave_high(c, d)};
+    EACH(i, 2) out[2 * i] = low_pairs(ab[i], cd[i]), out[2 * i + 1] = high_pairs(ab[i], cd[i]);
+}
+
+static void block(const float *corner, size_t line, size_t plane, float *value)
+{
+    vec low[4], high[4], change[3], w[3];
+    load_corners(corner, line, low);
+    load_corners(corner + plane, line, high);
+    EACH(i, 3) change[i] = high[i] - low[i], w[i] = repeat_four(WEIGHTS[i]);
+    const vec p = low[3] - change[0], q = high[3] - change[0];
+    for (int z = 0; z < 4; z += VW / 4) {
+        vec t[3]; // weights of the planes
+#if VW == 8
+        EACH(i, 3)
+        t[i] = z ? SHUFFLE_PLANES(w[i], 2) : SHUFFLE_PLANES(w[i], 0);
+#else
+        EACH(i, 3) t[i] = splat(WEIGHTS[i][z]);
+#endif
+        const vec lz = low[0] + t[0] * change[0], cz = t[1] * p - t[2] * q,
+                  sx = low[1] + t[0] * change[1], sy = low[2] + t[0] * change[2];
+        vec l[2], c[2], s[2]; // at both ends along x, for the four voxels along y
+        EACH(i, 2)
+        {
+            const vec l0 = spread(lz, i), dl = spread(lz, i + 2) - l0, c0 = spread(cz, i),
+                      s0 = spread(sx, i);
+            l[i] = l0 + w[0] * dl;
+            c[i] = c0 + w[0] * (spread(cz, i + 2) - c0) + w[1] * (spread(sy, i) - dl) -
+                   w[2] * (spread(sy, i + 2) - dl);
+            s[i] = s0 + w[0] * (spread(sx, i + 2) - s0);
+        }
+        const vec dl = l[1] - l[0], first = l[0] + c[0], slope = dl + (c[1] - c[0]), px = s[0] - dl,
+                  qx = s[1] - dl;
+        EACH(y, 4)
+        {
+            const vec v = spread(first, y) + w[0] * spread(slope, y) + w[1] * spread(px, y) -
+                          w[2] * spread(qx, y);
+            store_planes(value + 16 * z + 4 * y, v);
+        }
+    }
+}
+
 const template_table TABLE = {
-    .expand = expand, .lookup = lookup, .normalise = normalise, .correct = correct};
+    .expand = expand, .lookup = lookup, .normalise = normalise, .correct = correct, .block = block};

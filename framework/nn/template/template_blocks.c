@@ -1,0 +1,205 @@
+/* The values of a block: which parts can be the nearest in it, and how each of them is evaluated.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "template_work.h"
+
+enum { BLOCK = SDM_TEMPLATE_STEP, VOXELS = SDM_TEMPLATE_BLOCK_VOXELS };
+
+// Half of the diagonal of a block, mm.
+static double block_radius(const sdm_grid *grid)
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++) {
+        const double half = 0.5 * (BLOCK - 1) * grid->spacing[a];
+        sum += half * half;
+    }
+    return sqrt(sum);
+}
+
+// The interpolation may change a distance by this much, mm.
+static double cull_slack(const template_work *w) { return 0.1 * w->grid->spacing[0]; }
+
+/* Corners. */
+
+static size_t corner_at(const template_work *w, size_t c, const template_block *b)
+{
+    const size_t *n = w->blocks;
+    return ((c * (n[2] + 1) + b->at[2]) * (n[1] + 1) + b->at[1]) * (n[0] + 1) + b->at[0];
+}
+
+// Corner i of a block, i = 0 .. 7, relative to the first one.
+static size_t corner_step(const template_work *w, size_t i)
+{
+    const size_t line = w->blocks[0] + 1;
+    return (i & 1) + (i >> 1 & 1) * line + (i >> 2) * line * (w->blocks[1] + 1);
+}
+
+// True if part c is to be interpolated in a block: rigid parts unless the block lies within the
+// lattice `near`, parts with a warp if all corners lie beyond one of its sides.
+static bool is_far(const template_work *w, size_t c, const template_block *b)
+{
+    if (w->part[c].rigid) return sdm_template_place(w, c, b) != TEMPLATE_WITHIN;
+    if (!w->part[c].warped) return false;
+    unsigned side = UINT8_MAX;
+    for (size_t i = 0; i < 8; i++) side &= w->side[corner_at(w, c, b) + corner_step(w, i)];
+    return side != 0;
+}
+
+// value[64] = the distance to part c in a block, from the corners. false: one of them is not known.
+static bool interpolate(const template_work *w, size_t c, const template_block *b, float *value)
+{
+    const size_t line = 4 * (w->blocks[0] + 1), plane = line * (w->blocks[1] + 1);
+    sdm_template_kernels()->block(w->corner + 4 * corner_at(w, c, b), line, plane, value);
+    return !isnan(value[0]); // every value is a sum with terms of all corners
+}
+
+// value[64] = the distance to part c in a block; value may be row.value.
+static void part_values(template_work *w, size_t c, const template_block *b, float *value)
+{
+    if (is_far(w, c, b) && interpolate(w, c, b, value)) return;
+    sdm_template_run(w, c, b);
+    if (value != w->row.value) memcpy(value, w->row.value, VOXELS * sizeof *value);
+}
+
+/* Centres. */
+
+// Bound on how fast the distance to part c changes, mm per mm: 1 for rigid parts. For affine ones
+// the product of the largest singular values of m and m^-1, bounded by Frobenius norms.
+static double slope_bound(const template_work *w, size_t c)
+{
+    double forward = 0, back = 0;
+    if (w->part[c].rigid) return 1;
+    for (int i = 0; i < 9; i++) {
+        forward += w->pose[c].m[i] * w->pose[c].m[i];
+        back += w->pose[c].inverse[i] * w->pose[c].inverse[i];
+    }
+    return sqrt(forward * back);
+}
+
+// w->centre of part c, which has no warp, in the row (y, z) of blocks.
+static void affine_centres(template_work *w, size_t c, size_t y, size_t z)
+{
+    const part_state *part = &w->part[c];
+    const template_row *r = &w->row;
+    const size_t n_parts = w->k->n_parts, n = w->blocks[0];
+    const double half = 0.5 * (BLOCK - 1),
+                 first[3] = {half, half + (double)(BLOCK * y), half + (double)(BLOCK * z)};
+    float by[3][3]; // change of the point (mm) by a voxel along each axis
+    for (int i = 0; i < 3; i++) {
+        double u = part->from[i];
+        for (int a = 0; a < 3; a++) {
+            u += part->by[a][i] * first[a];
+            by[a][i] = (float)(w->k->parts[c].near.spacing * part->by[a][i]);
+        }
+        for (size_t x = 0; x < n; x++)
+            r->u[i][x] = (float)(u + part->by[0][i] * (double)(BLOCK * x));
+    }
+    sdm_template_lookup(w, c, n);
+    if (!part->rigid) {
+        float metric[6];
+        sdm_template_metric(w->pose[c].inverse, metric);
+        for (int a = 0; a < 6; a++)
+            for (size_t x = 0; x < n; x++) r->metric[a][x] = metric[a];
+        sdm_template_kernels()->normalise(n, r->f, (const float *const *)r->g,
+                                          (const float *const *)r->metric, r->f);
+    }
+    float *out = w->centre + 4 * ((z * w->blocks[1] + y) * n * n_parts + c);
+    for (size_t x = 0; x < n; x++, out += 4 * n_parts) {
+        out[0] = r->f[x];
+        for (int a = 0; a < 3; a++)
+            out[1 + a] = by[a][0] * r->g[0][x] + by[a][1] * r->g[1][x] + by[a][2] * r->g[2][x];
+    }
+}
+
+// The same for a part with a warp: the mean of the corners.
+static void warped_centres(template_work *w, size_t c)
+{
+    for (size_t i = 0; i < w->n_blocks; i++) {
+        const template_block b = sdm_template_block(w, i);
+        const float *corner = w->corner + 4 * corner_at(w, c, &b);
+        float sum = 0;
+        for (size_t k = 0; k < 8; k++) sum += corner[4 * corner_step(w, k)];
+        w->centre[4 * (i * w->k->n_parts + c)] = sum / 8;
+    }
+}
+
+void sdm_template_centres(template_work *w)
+{
+    for (size_t c = 0; c < w->k->n_parts; c++) {
+        if (w->part[c].warped) {
+            warped_centres(w, c);
+            continue;
+        }
+        w->part[c].slope = slope_bound(w, c);
+        for (size_t z = 0; z < w->blocks[2]; z++)
+            for (size_t y = 0; y < w->blocks[1]; y++) affine_centres(w, c, y, z);
+    }
+}
+
+// True if the distance to part c is at least value[] in all voxels of a block, by a lower bound. It
+// lies above its tangent at the centre minus the sag; the interpolation may add the slack. There is
+// no bound for parts with a warp.
+static bool is_behind(const template_work *w, size_t c, const template_block *b, double radius,
+                      const float *value)
+{
+    const sdm_template_part *part = &w->k->parts[c];
+    const float *centre = w->centre + 4 * (b->number * w->k->n_parts + c);
+    const double slack = cull_slack(w);
+    float base = centre[0], slope[3] = {centre[1], centre[2], centre[3]};
+    if (w->part[c].warped || !(base > 0)) return false;
+    if (w->part[c].rigid && radius <= part->sag_reach) {
+        base -=
+            (float)(1.05 * ((double)base >= part->far_from ? part->far_sag : part->sag) + slack);
+    } else {
+        base -= (float)(1.05 * w->part[c].slope * radius + slack);
+        memset(slope, 0, sizeof slope);
+    }
+    for (int a = 0; a < 3; a++) base -= slope[a] * 0.5f * (float)(BLOCK - 1);
+    int32_t count = 0; // of the type of the comparisons, so that the loop is vectorised
+    for (size_t v = 0; v < VOXELS; v++)
+        count += base + (slope[0] * w->offset[0][v] +
+                         (slope[1] * w->offset[1][v] + slope[2] * w->offset[2][v])) >
+                 value[v];
+    return count == VOXELS;
+}
+
+// The part that is the nearest at the centre of a block.
+static size_t nearest_part(const template_work *w, const template_block *b)
+{
+    const float *centre = w->centre + 4 * b->number * w->k->n_parts;
+    size_t n = 0;
+    for (size_t c = 1; c < w->k->n_parts; c++)
+        if (centre[4 * c] < centre[4 * n]) n = c;
+    return n;
+}
+
+void sdm_template_values(template_work *w, const template_block *b, float *value, uint8_t *nearest)
+{
+    const size_t n_parts = w->k->n_parts;
+    w->loaded = SIZE_MAX;
+    if (n_parts == 1) {
+        part_values(w, 0, b, value);
+        if (nearest) memset(nearest, 0, VOXELS);
+        return;
+    }
+    const size_t first = nearest_part(w, b);
+    const float *centre = w->centre + 4 * b->number * n_parts;
+    // no voxel is nearer to a rigid part that is at least this far from the centre
+    const double radius = block_radius(w->grid);
+    const float far =
+        w->part[first].rigid ? centre[4 * first] + (float)(2 * radius + cull_slack(w)) : INFINITY;
+    part_values(w, first, b, value);
+    if (nearest) memset(nearest, (int)first, VOXELS);
+    for (size_t c = 0; c < n_parts; c++) {
+        if (c == first || (centre[4 * c] > far && w->part[c].rigid) ||
+            is_behind(w, c, b, radius, value))
+            continue;
+        const float *other = w->row.value;
+        part_values(w, c, b, w->row.value);
+        for (size_t v = 0; v < VOXELS && nearest; v++)
+            if (other[v] < value[v]) nearest[v] = (uint8_t)c;
+        for (size_t v = 0; v < VOXELS; v++) value[v] = other[v] < value[v] ? other[v] : value[v];
+    }
+}

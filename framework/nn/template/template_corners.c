@@ -37,8 +37,7 @@ static void rigid_row(const template_work *w, size_t c, size_t y, size_t z, floa
     for (int i = 0; i < 3; i++) {
         const double u = part->from[i] + part->by[1][i] * (double)(BLOCK * y) +
                          part->by[2][i] * (double)(BLOCK * z);
-        for (size_t x = 0; x < n; x++)
-            r->u[i][x] = (float)(u + part->by[0][i] * (double)(BLOCK * x));
+        for (size_t x = 0; x < n; x++) r->u[i][x] = (float)(u + part->by[0][i] * (double)(BLOCK * x));
         for (int a = 0; a < 3; a++)
             by[a][i] = (float)(BLOCK * w->k->parts[c].near.spacing * part->by[a][i]);
     }
@@ -92,8 +91,8 @@ static uint8_t side_of(const template_level *near, const float u[3])
 {
     unsigned side = 0;
     for (int a = 0; a < 3; a++)
-        side |= (unsigned)(u[a] < 0) << 2 * a | (unsigned)(u[a] > (float)(near->n[a] - 1))
-                                                    << (2 * a + 1);
+        side |= (unsigned)(u[a] < 0) << 2 * a |
+                (unsigned)(u[a] > (float)(near->n[a] - 1)) << (2 * a + 1);
     return (uint8_t)side;
 }
 
@@ -109,7 +108,8 @@ static void warped_corner(const template_work *w, size_t c, size_t at, const siz
         const float *up = w->sample + SAMPLE * above, *down = w->sample + SAMPLE * below;
         float change = 0;
         for (size_t i = 0; i < 3; i++) change += s[G + i] * (p[4 * above + i] - p[4 * below + i]);
-        corner[1 + a] = half * (h * s[S] * change + (s[F] * (up[S] - down[S]) + (up[R] - down[R])));
+        corner[1 + a] =
+            half * (h * s[S] * change + (s[F] * (up[S] - down[S]) + (up[R] - down[R])));
     }
 }
 

@@ -43,7 +43,8 @@ void sdm_template_expand(const template_network *k, const template_block *b, war
 {
     const size_t nx = k->stations[0], ny = k->stations[1], plane = 12 * nx * ny, line = 12 * nx;
     if (l->plane_of != b->at[2]) {
-        for (size_t z = 0; z < BLOCK; z++) combine_planes(k, l, b->at[2], z, l->plane + z * plane);
+        for (size_t z = 0; z < BLOCK; z++)
+            combine_planes(k, l, b->at[2], z, l->plane + z * plane);
         l->plane_of = b->at[2];
         l->line_of = SIZE_MAX;
     }

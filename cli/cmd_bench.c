@@ -1,4 +1,5 @@
-/* sdmgen bench: measures the speed of all methods on one map, or of one model. */
+/* sdmgen bench: measures the speed of all methods on one map, of distances at points, or of one
+ * model. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -61,10 +62,11 @@ sdm_status cmd_bench(const cli_args *args, sdm_error *err)
 {
     const char *topic = args->files.items[0];
     if (!strcmp(topic, "network")) return cli_bench_network(args, err);
-    if (strcmp(topic, "exact"))
-        return sdm_fail(err, SDM_E_ARG, "bench: '%s': need exact or network MODEL", topic);
+    const bool points = !strcmp(topic, "points");
+    if (!points && strcmp(topic, "exact"))
+        return sdm_fail(err, SDM_E_ARG, "bench: '%s': need exact, points or network MODEL", topic);
     if (args->files.n > 1)
-        return sdm_fail(err, SDM_E_ARG, "bench exact: unexpected argument '%s'",
+        return sdm_fail(err, SDM_E_ARG, "bench %s: unexpected argument '%s'", topic,
                         args->files.items[1]);
-    return measure_exact(args, err);
+    return points ? cli_bench_points(args, err) : measure_exact(args, err);
 }

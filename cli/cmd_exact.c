@@ -3,14 +3,17 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "report/exact_layers.h"
 #include "report/json_values.h"
 #include "report/output.h"
+#include "report/points_table.h"
 #include "report/progress_bar.h"
 #include "report/report_audit.h"
 #include "report/terminal.h"
 #include "sdm/exact.h"
+#include "sdm/internal/block_border.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/methods.h"
@@ -24,9 +27,11 @@ typedef struct job {
     double ms_mesh;
     sdm_grid grid;
     sdm_exact_report report;
-    float *values;
+    float *values;     /* the map; NULL: it is in blocks */
+    sdm_blocks blocks; /* the map near the surface, if the outputs are level sets only */
     sdm_exact *engine; /* NULL: another method */
     cli_layers layers;
+    cli_points_table points; /* of --points */
     double ms_build, ms_query;
     sdm_sign_certificate certificate; /* checked == 0 without --certify */
     double bound_mm;                  /* bound on the error of the distances; 0: exact */
@@ -56,7 +61,7 @@ static sdm_status open_mesh(job *j, sdm_error *err)
     if (args->mesh && (args->params.n > 0 || args->options.n > 0))
         return sdm_fail(err, SDM_E_ARG,
                         "exact: -p and -O belong to --shape; a mesh file has no parameters");
-    if (args->outputs.n == 0 && !args->json && !cli_layers_wanted(args))
+    if (args->outputs.n == 0 && !args->points && !args->json && !cli_layers_wanted(args))
         return sdm_fail(err, SDM_E_ARG, "exact: an output is needed: -o FILE, or --json");
     if (args->certify && strcmp(args->method, "exact"))
         return sdm_fail(err, SDM_E_ARG, "exact: --certify belongs to --method exact, not %s",
@@ -64,7 +69,10 @@ static sdm_status open_mesh(job *j, sdm_error *err)
     if (args->tolerance > 0 && strcmp(args->method, "octree"))
         return sdm_fail(err, SDM_E_ARG, "exact: --tolerance belongs to --method octree, not %s",
                         args->method);
-    sdm_status s = cli_layers_check(args, err);
+    if (args->columns && !args->points)
+        return sdm_fail(err, SDM_E_ARG, "exact: --columns belongs to --points FILE");
+    sdm_status s =
+        args->points ? cli_points_check(args, &j->points, err) : cli_layers_check(args, err);
     if (s) return s;
     s = args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : make_shape_mesh(j, err);
     return s || !args->turn_parts ? s : cli_turn_parts(&j->mesh, err);
@@ -75,6 +83,25 @@ static sdm_sign_method find_sign_method(const char *name)
     for (int m = SDM_SIGN_AUTO; m <= SDM_SIGN_WINDING; m++)
         if (!strcmp(name, sdm_sign_method_name((sdm_sign_method)m))) return (sdm_sign_method)m;
     return SDM_SIGN_AUTO;
+}
+
+/* Are only level sets of a closed mesh wanted, which need the map near the surface only? */
+static bool blocks_suffice(const job *j)
+{
+    const cli_args *args = j->args;
+    return cli_blocks_suffice(args) && !args->json && !args->certify && !(args->narrow > 0) &&
+           !cli_layers_wanted(args) && j->report.sign == SDM_SIGN_CROSSINGS;
+}
+
+/* Computes j->blocks; leaves them empty if the band reaches the border of the grid, where only the
+ * whole map can be closed. */
+static sdm_status make_blocks(job *j, const sdm_exact *engine, sdm_error *err)
+{
+    double band;
+    sdm_status s = cli_blocks_band(&j->grid, j->args, &band, err);
+    if (!s) s = sdm_exact_map_blocks(engine, &j->grid, band, &j->blocks, err);
+    if (!s && sdm_blocks_reach_border(&j->blocks)) sdm_blocks_dispose(&j->blocks);
+    return s;
 }
 
 static sdm_status run_engine(job *j, sdm_error *err)
@@ -89,14 +116,37 @@ static sdm_status run_engine(job *j, sdm_error *err)
     if (s) return s;
     j->report = *sdm_exact_get_report(j->engine);
     s = cli_grid_for_box(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
-    if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
     const double query = sdm_clock();
-    if (!s) s = cli_layers_map(&j->layers, j->args, j->engine, &j->grid, j->values, err);
+    if (!s && blocks_suffice(j)) s = make_blocks(j, j->engine, err);
+    if (!s && !j->blocks.tile) {
+        s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
+        if (!s) s = cli_layers_map(&j->layers, j->args, j->engine, &j->grid, j->values, err);
+    }
     j->ms_build = 1e3 * (built - start);
     j->ms_query = 1e3 * (sdm_clock() - query);
     if (!s && j->args->certify)
         s = sdm_exact_certify(j->engine, &j->grid, j->values, &j->certificate, err);
     return s;
+}
+
+/* Does the work of --points. */
+static sdm_status run_points(job *j, sdm_error *err)
+{
+    const sdm_exact_opts opts = {.sign = find_sign_method(j->args->sign),
+                                 .keep_overlap = j->args->keep_overlap,
+                                 .n_threads = (int)j->args->threads,
+                                 .cancelled = cli_interrupted};
+    sdm_exact *engine = NULL;
+    double *x = NULL;
+    size_t n = 0;
+    sdm_status s = cli_read_points(j->args->points, &x, &n, err);
+    if (!s) s = cli_points_allocate(&j->points, n, err);
+    if (!s) s = sdm_exact_create(&j->mesh, &opts, &engine, err);
+    if (!s) j->report = *sdm_exact_get_report(engine);
+    if (!s) s = sdm_exact_points(engine, x, n, &j->points.at, err);
+    sdm_exact_free(engine);
+    sdm_free(x);
+    return s ? s : cli_points_write(&j->points, j->args, err);
 }
 
 typedef struct progress_state {
@@ -147,7 +197,8 @@ static sdm_status run_method(job *j, sdm_error *err)
     return SDM_OK;
 }
 
-/* Finds the smallest and the largest distance, and counts the voxels inside. */
+/* Finds the smallest and the largest distance of the map in j->values, and counts the voxels
+ * inside. */
 static void find_range(const job *j, float *min, float *max, int64_t *inside)
 {
     const size_t n = sdm_grid_count(&j->grid);
@@ -163,9 +214,9 @@ static void find_range(const job *j, float *min, float *max, int64_t *inside)
 static void notice_mesh(const job *j)
 {
     const sdm_audit *a = &j->report.audit;
-    int64_t inside;
+    int64_t inside = 1; // a level set without voxels inside is refused when it is written
     float min, max;
-    find_range(j, &min, &max, &inside);
+    if (j->values) find_range(j, &min, &max, &inside);
     if (!inside)
         cli_notice("no voxel of the grid is inside the surface: does the grid cover the shape?");
     if (j->report.turned) cli_notice("the mesh was inside out; its orientation has been reversed");
@@ -206,6 +257,7 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
 {
     const cli_map map = {.grid = &j->grid,
                          .values = j->values,
+                         .blocks = j->blocks.tile ? &j->blocks : NULL,
                          .shape = j->args->mesh ? j->args->mesh : j->args->shape,
                          .params = j->params.data ? j->params.data : "",
                          .source = SDM_SOURCE_EXACT,
@@ -273,15 +325,22 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
 {
     job j = {.args = args};
     sdm_status s = open_mesh(&j, err);
-    if (!s) s = strcmp(args->method, "exact") ? run_method(&j, err) : run_engine(&j, err);
-    if (!s) notice_mesh(&j);
-    if (!s) notice_signs(&j);
-    if (!s) s = write_outputs(&j, err);
-    if (!s) s = cli_layers_write(&j.layers, args, &j.grid, err);
-    if (!s && args->json) s = print_json(&j, err);
+    if (!s && args->points) {
+        s = run_points(&j, err);
+        if (!s) notice_mesh(&j);
+    } else if (!s) {
+        s = strcmp(args->method, "exact") ? run_method(&j, err) : run_engine(&j, err);
+        if (!s) notice_mesh(&j);
+        if (!s) notice_signs(&j);
+        if (!s) s = write_outputs(&j, err);
+        if (!s) s = cli_layers_write(&j.layers, args, &j.grid, err);
+        if (!s && args->json) s = print_json(&j, err);
+    }
     cli_layers_dispose(&j.layers);
     sdm_exact_free(j.engine);
     sdm_free(j.values);
+    sdm_blocks_dispose(&j.blocks);
+    cli_points_dispose(&j.points);
     sdm_mesh_dispose(&j.mesh);
     sdm_text_dispose(&j.params);
     return s;

@@ -41,7 +41,7 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      ".obj .off, mm). A surface that overlaps itself stands for the union of the volumes it\n"
      "encloses. Without grid options the grid is fitted to the bounding box of the mesh, with\n"
      "a margin of a tenth of its longest edge on every side: 64 voxels along that edge,\n"
-     "margins included.",
+     "margins included. With --points FILE, distances at points in any order.",
      "sdmgen exact --shape cochlea -p a=4.2 --size 60,50,50 --spacing 0.2 -o cochlea.nrrd", 0, 0},
     {"mesh", "--shape NAME [-p name=value ...] | --mesh FILE [-o FILE]",
      "write the surface mesh of a shape, or audit and mend a mesh",
@@ -80,12 +80,13 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "configuration with every key resolved; --keys lists every key with type, range,\n"
      "default and meaning.",
      "sdmgen config configs/cochlea.yaml network.depth=4 --dump", 0, SIZE_MAX},
-    {"bench", "exact | network MODEL", "measure speed, as times and ratios",
+    {"bench", "exact | points | network MODEL", "measure speed, as times and ratios",
      "exact: time, memory and error of the exact engine, of the other methods (see exact\n"
      "--method) and of other programs for the same map, by default the cochlea on 60 x 50 x\n"
      "50 voxels of 0.2 mm. All rows but one use a single thread. The other programs are\n"
      "files sdmgen-peer-NAME in the folder of sdmgen or in libexec/sdmgen; missing ones are\n"
      "listed.\n"
+     "points: time per point of exact distances in batches, one by one and by brute force.\n"
      "network: one map, a batch and derivatives of a model on one core, compared with the\n"
      "exact engine if the shape is known and its data files exist.\n"
      "A time is the fastest of several runs.",
@@ -180,6 +181,11 @@ const cli_option cli_options[] = {
      "exact: the engine (default); naive: every triangle for every voxel, also triangles inside "
      "the union; cells: uniform cells of triangles (exact); octree: adaptive samples, error at "
      "most --tolerance; edt: distance transform, prints the bound on its error"},
+    {"points", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT), AT(points),
+     "distances at the points of a file instead of a map: .csv (x,y,z), .npy ([n][3]) or the "
+     "vertices of .ply .stl .obj .off, LPS mm; -o FILE.csv or FILE.npy (float64), one row a point"},
+    {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_EXACT), AT(columns),
+     "columns for --points: distance,gradient,closest,triangle (default distance)"},
     {"narrow", 0, CLI_REAL, "N", NULL, 0.5, 1e6, ON(CLI_EXACT), AT(narrow),
      "narrow band: clamp distances to N voxels (of the smallest edge), which is faster"},
     {"tolerance", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT), AT(tolerance),

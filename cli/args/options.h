@@ -116,6 +116,7 @@ struct cli_args {
     bool keep_overlap, certify;      /* exact */
     bool audit;                      /* mesh */
     bool turn_parts;                 /* mesh, exact */
+    const char *points, *columns;    /* exact: file of points; columns of the answers */
     double narrow;                   /* exact: voxels; 0: option missing */
     double tolerance;                /* exact: mm; 0: option missing */
     bool dump;                       /* config */

@@ -62,6 +62,27 @@ sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
     return kind == KIND_PICTURE ? sdm_picture_check(path, err) : SDM_OK;
 }
 
+bool cli_blocks_suffice(const cli_args *args)
+{
+    for (size_t i = 0; i < args->outputs.n; i++)
+        if (kind_of(args->outputs.items[i], NULL) != KIND_VDB) return false;
+    return args->outputs.n > 0 && !args->dense;
+}
+
+sdm_status cli_blocks_band(const sdm_grid *grid, const cli_args *args, double *band_mm,
+                           sdm_error *err)
+{
+#ifdef SDM_HAVE_VDB
+    const sdm_vdb_opts opts = {.band_voxels = args->band, .half = args->half};
+    return sdm_vdb_band(grid, &opts, band_mm, err);
+#else
+    (void)grid;
+    (void)args;
+    (void)band_mm;
+    return sdm_fail(err, SDM_E_UNSUPPORTED, "built without OpenVDB");
+#endif
+}
+
 bool cli_is_picture(const char *path) { return kind_of(path, NULL) == KIND_PICTURE; }
 
 /* One word that names the method that made the map: "network", "exact", "edt" ... */
@@ -119,7 +140,9 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                                .map = map->engine ? map_beyond : NULL,
                                .user = map->engine};
     sdm_vdb_report report = {0};
-    const sdm_status s = sdm_vdb_write(path, map->grid, map->values, &opts, &report, err);
+    const sdm_status s = map->blocks
+                             ? sdm_vdb_write_blocks(path, map->blocks, &opts, &report, err)
+                             : sdm_vdb_write(path, map->grid, map->values, &opts, &report, err);
     if (!s && report.adjusted_voxels > 0)
         cli_notice("%s: %lld voxels at creases were adjusted by at most %.2g mm to make a valid "
                    "level set; no sign changed",

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "args/options.h"
+#include "sdm/blocks.h"
 #include "sdm/exact.h"
 #include "sdm/grid.h"
 #include "sdm/runtime.h"
@@ -9,14 +10,16 @@
 /* A map with the facts that go into the metadata of its file. */
 typedef struct cli_map {
     const sdm_grid *grid;
-    const float *values; /* [nz][ny][nx], mm */
-    const char *shape;   /* name of the shape or of the mesh file */
-    const char *params;  /* "a=4.4 alpha=0.5", "" for a mesh file */
-    sdm_source source;   /* network or exact engine */
-    bool clamped;        /* parameters were clamped to the trained range */
-    double error_mm;     /* of a network: its RMSE; else the bound on the error */
-    const char *origin;  /* "model CHECKSUM", or the method without a network: "exact", "edt" ... */
-    sdm_reason reason;   /* why the exact engine replaced the network */
+    const float *values; /* [nz][ny][nx], mm; NULL: the map is in `blocks` */
+    /* narrow-band map with the band of cli_blocks_band(), for level sets only; NULL: in values */
+    const sdm_blocks *blocks;
+    const char *shape;  /* name of the shape or of the mesh file */
+    const char *params; /* "a=4.4 alpha=0.5", "" for a mesh file */
+    sdm_source source;  /* network or exact engine */
+    bool clamped;       /* parameters were clamped to the trained range */
+    double error_mm;    /* of a network: its RMSE; else the bound on the error */
+    const char *origin; /* "model CHECKSUM", or the method without a network: "exact", "edt" ... */
+    sdm_reason reason;  /* why the exact engine replaced the network */
     const sdm_check *check; /* errors of the network's map; NULL: not checked */
     sdm_exact *engine;      /* makes the same map on other grids; NULL: none */
 } cli_map;
@@ -24,6 +27,13 @@ typedef struct cli_map {
 /* Checks, before any work, that the ending of the name is a known type; meshes_only: a known type
  * of mesh files. SDM_E_ARG; SDM_E_UNSUPPORTED: .vdb in a build without OpenVDB. */
 sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err);
+
+/* Whether all outputs of the command line are level sets, for which blocks suffice. */
+bool cli_blocks_suffice(const cli_args *args);
+
+/* *band_mm = half width of the band of a level set on this grid. Errors as sdm_vdb_band(). */
+sdm_status cli_blocks_band(const sdm_grid *grid, const cli_args *args, double *band_mm,
+                           sdm_error *err);
 
 /* Whether the name is that of a picture: .png .svg .pdf. */
 bool cli_is_picture(const char *path);

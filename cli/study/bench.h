@@ -90,6 +90,10 @@ double cli_bench_peak_mb(long start);
  * with the arithmetic and memory speed of the machine, and prints the result. */
 sdm_status cli_bench_network(const cli_args *args, sdm_error *err);
 
+/* `sdmgen bench points`: measures exact distances at points, in batches, one by one and by brute
+ * force, and prints the result. */
+sdm_status cli_bench_points(const cli_args *args, sdm_error *err);
+
 /* Print the table of one case as text, or add it to the JSON. */
 void cli_bench_print(const cli_bench_case *c, const cli_bench_rows *rows);
 void cli_bench_json(sdm_json *j, const cli_bench_case *c, const cli_bench_rows *rows);

@@ -6,7 +6,10 @@
 #include <string.h>
 
 #include "layers/layers.h"
+#include "map/grid_blocks.h"
 #include "map/grid_distance.h"
+#include "points/at_points.h"
+#include "points/point_aids.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/threads.h"
 #include "sdm/internal/vec3.h"
@@ -29,6 +32,8 @@ struct sdm_exact {
     sdm_nearest nearest; // tree and features of `surface`
     sdm_sign sign;
     double rounding; // bound on the rounding error of the coordinates, mm
+    sdm_point_aids *aids;
+    bool bounds;     // the surface bounds the solid: outside in front of it, inside behind it
 };
 
 const char *sdm_sign_method_name(sdm_sign_method m)
@@ -101,6 +106,7 @@ static sdm_status make_surface(sdm_exact *e, sdm_error *err)
     if (s) return s;
     // sheets that cancel everywhere enclose nothing: distances are then to the sheets
     e->report.unioned = changed && e->surface.n_tri;
+    e->bounds = e->survey.audit.closed && !e->opts.keep_overlap && (!changed || e->surface.n_tri);
     if (e->report.unioned) return SDM_OK;
     e->report.union_error_mm = 0;
     e->arena.used -= mesh_bytes(&e->surface) + e->surface.cap_tri * sizeof *e->source;
@@ -167,6 +173,7 @@ static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     if (!s) s = make_surface(e, err);
     if (!s) s = check_pseudonormal(e, err);
     if (!s) s = build_nearest(e, err);
+    if (!s) s = sdm_point_aids_create(&e->aids, err);
     if (!s) s = build_sign(e, err);
     if (s) return s;
     double largest = 0;
@@ -205,6 +212,7 @@ void sdm_exact_free(sdm_exact *e)
     sdm_mesh_dispose(&e->surface);
     sdm_free(e->source);
     sdm_sign_dispose(&e->sign);
+    sdm_point_aids_free(e->aids);
     sdm_arena_dispose(&e->arena);
     sdm_free(e);
 }
@@ -213,43 +221,43 @@ const sdm_exact_report *sdm_exact_get_report(const sdm_exact *e) { return &e->re
 const sdm_mesh *sdm_exact_surface(const sdm_exact *e) { return &e->surface; }
 const uint32_t *sdm_exact_source(const sdm_exact *e) { return e->source; }
 
-/* Is x a usable point? False for NaN and for coordinates whose squares could overflow. */
-static bool is_point(const double x[3])
+/* What the answers for n points need; *opts: the options that remain for them. */
+static sdm_points_job points_job(const sdm_exact *e, const sdm_exact_opts *opts, size_t n)
 {
-    return fabs(x[0]) <= 1e150 && fabs(x[1]) <= 1e150 && fabs(x[2]) <= 1e150;
+    const bool bounds = e->bounds && e->report.sign == SDM_SIGN_CROSSINGS;
+    return (sdm_points_job){
+        .surface = sdm_point_aids_use(e->aids, &e->nearest, bounds, opts->memory_limit, n),
+        .sign = &e->sign,
+        .rounding = e->rounding,
+        .seam = 16 * e->rounding + 2 * e->report.union_error_mm,
+        .opts = opts};
 }
 
 double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3], double normal[3],
                        uint32_t *triangle)
 {
-    uint32_t slot = 0;
-    int feature = SDM_FACE;
-    double q[3] = {NAN, NAN, NAN}, n[3] = {NAN, NAN, NAN};
-    double d = NAN;
-    if (is_point(x)) {
-        // the sign is found from the nearest triangle, the distance from the nearest feature of
-        // this triangle
-        (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
-        const bool inside = sdm_sign_inside(&e->sign, x, slot, q, feature);
-        d = sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
-        if (inside) d = -d;
-        (void)sdm_frame_closest(&e->nearest.frames[slot], x, q, &feature);
-        sdm_distance_gradient(&e->nearest, e->rounding, slot, x, q, d, n);
-    }
-    if (closest) memcpy(closest, q, sizeof q);
-    if (normal) memcpy(normal, n, sizeof n);
-    if (triangle) *triangle = e->nearest.tree.order[slot];
+    double d;
+    const sdm_exact_opts opts = opts_beside(e, 0);
+    const sdm_points_job job = points_job(e, &opts, 1);
+    sdm_point_find(&job, x, &(sdm_exact_at){&d, normal, closest, triangle}, 0);
     return d;
+}
+
+sdm_status sdm_exact_points(const sdm_exact *e, const double *x, size_t n, const sdm_exact_at *out,
+                            sdm_error *err)
+{
+    if (!e || !out || (n && !x))
+        return sdm_fail(err, SDM_E_ARG,
+                        "points without an engine, points or a place for the result");
+    const sdm_exact_opts opts = opts_beside(e, 0);
+    const sdm_points_job job = points_job(e, &opts, n);
+    return sdm_points_find(&job, x, n, out, err);
 }
 
 double sdm_exact_distance(const sdm_exact *e, const double x[3])
 {
-    uint32_t slot = 0;
-    int feature;
-    double q[3];
-    if (!is_point(x)) return NAN;
-    (void)sdm_nearest_find(&e->nearest, x, INFINITY, &slot, q, &feature);
-    return sqrt(sdm_nearest_feature(&e->nearest, x, &slot));
+    const sdm_exact_opts opts = opts_beside(e, 0);
+    return sdm_point_distance(points_job(e, &opts, 1).surface, x);
 }
 
 /* Fills values[] with the signed map and, if slot is not NULL, slot[] with the slot of the nearest
@@ -343,6 +351,35 @@ static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_
     sdm_free(frames);
     sdm_free(slot);
     sdm_free(own);
+    return s;
+}
+
+sdm_status sdm_exact_map_blocks(const sdm_exact *e, const sdm_grid *grid, double band_mm,
+                                sdm_blocks *out, sdm_error *err)
+{
+    if (!e || !grid || !out)
+        return sdm_fail(err, SDM_E_ARG,
+                        "blocks without an engine, a grid or a place for the result");
+    *out = (sdm_blocks){0};
+    sdm_status s = sdm_grid_check(grid, err);
+    if (s) return s;
+    const float band = (float)band_mm;
+    if (!(band > 0 && band < INFINITY))
+        return sdm_fail(err, SDM_E_ARG, "narrow band of %g mm, need a positive width", band_mm);
+    if (e->report.sign != SDM_SIGN_CROSSINGS)
+        return sdm_fail(err, SDM_E_ARG,
+                        "blocks need a closed mesh and the sign method crossings, not %s: the sign "
+                        "may change away from the surface; use the whole map",
+                        sdm_sign_method_name(e->report.sign));
+    sdm_exact_opts opts = opts_beside(e, 0);
+    s = sdm_grid_blocks_make(&e->nearest, grid, (double)band, &opts, out, err);
+    opts = opts_beside(e, sdm_blocks_bytes(out));
+    if (!s) s = sdm_grid_distance_blocks(&e->nearest, &opts, out, err);
+    if (!s) s = sdm_sign_blocks(&e->sign, &opts, out, err);
+    if (!s)
+        sdm_grid_blocks_prune(out);
+    else
+        sdm_blocks_dispose(out);
     return s;
 }
 

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "band.h"
+#include "sdm/internal/block_border.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
 #include "seal.h"
@@ -183,14 +184,22 @@ void fill_block(Grid &grid, Grid::Accessor &acc, const sdm_band &box, const Coor
         acc.addTile(1, corner, -background, false);
 }
 
-Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_band &box,
-                  float background, bool dense, bool half)
+/* An empty grid. */
+Grid::Ptr new_grid(const openvdb::math::Transform::Ptr &transform, float background, bool dense,
+                   bool half)
 {
     Grid::Ptr grid = Grid::create(background);
     grid->setName(GRID_NAME);
     grid->setTransform(transform);
     grid->setGridClass(dense ? openvdb::GRID_UNKNOWN : openvdb::GRID_LEVEL_SET);
     grid->setSaveFloatAsHalf(half);
+    return grid;
+}
+
+Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_band &box,
+                  float background, bool dense, bool half)
+{
+    Grid::Ptr grid = new_grid(transform, background, dense, half);
     Grid::Accessor acc = grid->getAccessor();
     const int low = -box.pad & ~7, dim = 8;
     for (int k = low; k < box.n[2] - box.pad; k += dim)
@@ -244,8 +253,8 @@ void check_half(const sdm_band &box, sdm_error *err)
                           static_cast<double>(box.values[i])));
 }
 
-Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_opts &o,
-                         sdm_vdb_report &report, sdm_error *err)
+/* The transform of a level set. */
+openvdb::math::Transform::Ptr uniform_transform(const sdm_grid &g, sdm_error *err)
 {
     const auto transform = transform_of(g, true);
     if (!transform->hasUniformScale())
@@ -253,12 +262,70 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
                       "to OpenVDB voxels of %g mm on turned axes are not uniform; write the map "
                       "itself with --dense",
                       g.spacing[0]));
+    return transform;
+}
+
+Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_opts &o,
+                         sdm_vdb_report &report, sdm_error *err)
+{
+    const auto transform = uniform_transform(g, err);
     const float background = background_value(band_of(o), transform->voxelSize()[0], o.half);
     owned_band box;
     need(sdm_band_close(&g, values, background, &o, &box.band, err));
     report.cut = box.band.cut;
     report.estimated_voxels = box.band.estimated;
     Grid::Ptr grid = grid_of(transform, box.band, background, false, o.half);
+    mend_creases(*grid, o, report, err);
+    return grid;
+}
+
+/* The leaf of one block; whether one of its values is negative. */
+Leaf *leaf_of(const sdm_blocks &b, size_t i, float background, bool half, bool &inside)
+{
+    const Coord corner(b.first[i][0], b.first[i][1], b.first[i][2]);
+    Leaf *leaf = new Leaf(corner, background, false);
+    for (openvdb::Index32 at = 0; at < Leaf::SIZE; at++) {
+        const Coord c = Leaf::offsetToLocalCoord(at);
+        const float v =
+            as_stored(b.values[i][(c[2] * SDM_BLOCK_SIZE + c[1]) * SDM_BLOCK_SIZE + c[0]], half);
+        inside = inside || v < 0;
+        if (std::fabs(v) < background)
+            leaf->setValueOn(at, v);
+        else if (v < 0)
+            leaf->setValueOff(at, -background);
+    }
+    return leaf;
+}
+
+Grid::Ptr make_from_blocks(const sdm_blocks &b, const sdm_vdb_opts &o, sdm_vdb_report &report,
+                           sdm_error *err)
+{
+    const auto transform = uniform_transform(b.grid, err);
+    const float background = background_value(band_of(o), transform->voxelSize()[0], o.half);
+    if (static_cast<float>(b.band_mm) != background)
+        need(sdm_fail(err, SDM_E_ARG, "blocks with a band of %g mm, need %g mm (sdm_vdb_band())",
+                      b.band_mm, static_cast<double>(background)));
+    if (sdm_blocks_reach_border(&b))
+        need(sdm_fail(err, SDM_E_ARG,
+                      "the band leaves the grid: blocks cannot be closed at its border; write the "
+                      "whole map"));
+    Grid::Ptr grid = new_grid(transform, background, false, o.half);
+    Grid::Accessor acc = grid->getAccessor();
+    bool inside = false;
+    for (size_t i = 0; i < b.n_block; i++) acc.addLeaf(leaf_of(b, i, background, o.half, inside));
+    for (int64_t t = 0; t < b.n[0] * b.n[1] * b.n[2]; t++) {
+        if (b.tile[t] != SDM_TILE_INSIDE) continue;
+        inside = true;
+        const Coord corner(static_cast<int>(t % b.n[0] * SDM_BLOCK_SIZE),
+                           static_cast<int>(t / b.n[0] % b.n[1] * SDM_BLOCK_SIZE),
+                           static_cast<int>(t / b.n[0] / b.n[1] * SDM_BLOCK_SIZE));
+        acc.addTile(1, corner, -background, false);
+    }
+    if (!inside)
+        need(sdm_fail(err, SDM_E_ARG,
+                      "no voxel of the map is inside the surface: there is no level set to write; "
+                      "use a grid that holds the shape, or write the map itself (--dense)"));
+    grid->tree().prune();
     mend_creases(*grid, o, report, err);
     return grid;
 }
@@ -330,6 +397,21 @@ std::string describe(const Grid &grid, bool sealed)
     return t;
 }
 
+// ---- writing
+
+/* Checks the grid, adds the metadata and writes the file. */
+void finish(const char *path, const Grid::Ptr &g, const sdm_vdb_opts &o, sdm_vdb_report &r,
+            sdm_error *err)
+{
+    check_cancelled(o, err);
+    if (!o.dense) check_level_set(*g, path, SDM_E_QUALITY, err);
+    r.active_voxels = static_cast<int64_t>(g->activeVoxelCount());
+    r.hash = hash_of(*g);
+    add_metadata(*g, o, r, err);
+    check_cancelled(o, err);
+    write_grid(path, g, err);
+}
+
 } // namespace
 
 sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values,
@@ -343,15 +425,42 @@ sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *va
         const sdm_vdb_opts o = opts ? *opts : sdm_vdb_opts();
         sdm_vdb_report r = {};
         check_options(*grid, o, err);
-        Grid::Ptr g = o.dense ? make_dense(*grid, values, o, r, err)
-                              : make_level_set(*grid, values, o, r, err);
-        check_cancelled(o, err);
-        if (!o.dense) check_level_set(*g, path, SDM_E_QUALITY, err);
-        r.active_voxels = static_cast<int64_t>(g->activeVoxelCount());
-        r.hash = hash_of(*g);
-        add_metadata(*g, o, r, err);
-        check_cancelled(o, err);
-        write_grid(path, g, err);
+        finish(path,
+               o.dense ? make_dense(*grid, values, o, r, err)
+                       : make_level_set(*grid, values, o, r, err),
+               o, r, err);
+        if (report) *report = r;
+    });
+}
+
+sdm_status sdm_vdb_band(const sdm_grid *grid, const sdm_vdb_opts *opts, double *band_mm,
+                        sdm_error *err)
+{
+    if (!grid || !band_mm) return sdm_fail(err, SDM_E_ARG, "band: a grid is needed");
+    const sdm_status s = sdm_grid_check(grid, err);
+    if (s) return s;
+    return guarded("band", SDM_E_ARG, err, [&] {
+        const sdm_vdb_opts o = opts ? *opts : sdm_vdb_opts();
+        check_options(*grid, o, err);
+        const auto transform = uniform_transform(*grid, err);
+        *band_mm =
+            static_cast<double>(background_value(band_of(o), transform->voxelSize()[0], o.half));
+    });
+}
+
+sdm_status sdm_vdb_write_blocks(const char *path, const sdm_blocks *blocks,
+                                const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err)
+{
+    if (!path || !*path || !blocks || !blocks->tile)
+        return sdm_fail(err, SDM_E_ARG, "level set: path and blocks are needed");
+    const sdm_status s = sdm_grid_check(&blocks->grid, err);
+    if (s) return s;
+    return guarded(path, SDM_E_IO, err, [&] {
+        const sdm_vdb_opts o = opts ? *opts : sdm_vdb_opts();
+        sdm_vdb_report r = {};
+        if (o.dense) need(sdm_fail(err, SDM_E_ARG, "blocks are written as a level set, not dense"));
+        check_options(blocks->grid, o, err);
+        finish(path, make_from_blocks(*blocks, o, r, err), o, r, err);
         if (report) *report = r;
     });
 }

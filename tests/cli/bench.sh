@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # sdmgen bench exact: results of the built-in methods and of other programs (replaced by scripts with known answers), and messages about
 # missing programs.
-# Tests: bench_case.c bench_compare.c bench_own.c bench_peers.c bench_report.c cmd_bench.c
+# Tests: bench_case.c bench_compare.c bench_own.c bench_peers.c bench_points.c bench_report.c cmd_bench.c
 . "$(dirname "$0")/common.sh"
 
 mkdir tmp peers none
@@ -151,4 +151,15 @@ expect 2 "share '0': need a number" sdmgen bench exact --share 0
 expect 2 "unexpected argument 'x'" sdmgen bench exact x
 expect 2 'edge' sdmgen bench exact --shape ellipsoid --edge 1e-9
 [ -z "$(ls tmp)" ] || bad "left in TMPDIR: $(ls tmp)"
+# Distances at points: figures for every row; many points at once are faster than brute force.
+expect 0 - sdmgen bench points --shape torus --repeat 1 --threads 2 --json
+for name in 'batch of 1000' 'batch of 100000' 'one by one' naive; do
+    above "$(row "$name" us_random)" 0
+    above "$(row "$name" us_near)" 0
+done
+above "$(row naive us_near)" "$(row 'batch of 100000' us_near)"
+expect 0 - sdmgen bench points --shape torus --repeat 1
+has '^  one by one +[0-9]'
+expect 2 "unexpected argument 'x'" sdmgen bench points x
+
 finish

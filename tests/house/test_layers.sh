@@ -37,14 +37,14 @@ check() {
     # the headers in include/sdm/ that belong to a part
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
-        own("core", "export grid memory pose shape status") # shape: types alone
-         own("core", "checksum clock distribution envelope file heap mat3 near processor rng rotation sampling shared table team text threads vec3")
+        own("core", "blocks export grid memory pose shape status") # shape: types alone
+         own("core", "block_border checksum clock distribution envelope file heap mat3 near processor rng rotation sampling shared table team text threads vec3")
          own("config", "config experiment mistakes")
         own("geom", "exact isosurface mesh")
         own("geom", "brute_force builder methods part_audit")
         own("nn", "model")
         own("nn", "container kernels model_threads pod point_network sdmnn template")
-        own("io", "image meshfile picture volume")
+        own("io", "image meshfile npy picture volume")
         own("shape", "registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check fit map phantom runtime vdb")
@@ -61,7 +61,7 @@ check() {
         parts("all", "core geom nn io shape shapes runtime all")
         parts("trainer", "core config geom nn io shape trainer")
         parts("cli", "core config geom nn io shape shapes runtime trainer cli")
-        rooms("framework/geom/", "memory simd exactly mesh solid features map sign layers methods .")
+        rooms("framework/geom/", "memory simd exactly mesh solid features map sign layers points methods .")
         rooms("framework/nn/", "kernels model pod template point sdmnn open")
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps phantom fit/data fit/solver fit/start fit/trust fit vdb")

@@ -81,6 +81,19 @@ static size_t clusters_list(const sdm_features *f, sdm_cluster_node **list)
     return n;
 }
 
+/* Sets the places of the edges and corners of a cluster. */
+static void cluster_set_places(const sdm_features *f, const sdm_cluster_node *node)
+{
+    uint32_t group = node->group + 1;
+    for (uint32_t i = node->edge; i < node->edge_end; i++)
+        f->place[i - f->edge_base] = 8 * group + (i - node->edge);
+    group += (node->edge_end - node->edge + 7) / 8;
+    for (uint32_t i = node->corner; i < node->corner_end; i++) {
+        const uint32_t at = i - node->corner;
+        f->place[i - f->edge_base] = 8 * (group + at / SDM_CORNER_LANES) + at % SDM_CORNER_LANES;
+    }
+}
+
 /* Next free number of an edge, a corner and a group. */
 typedef struct next_numbers {
     uint32_t edge, corner, group;
@@ -158,6 +171,7 @@ static sdm_status clusters_fill(const sdm_feature_builder *b, sdm_arena *arena, 
     f->end = next.corner;
     s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->group, next.group, "features", err);
     if (s) return s;
+    for (size_t i = 0; i < n; i++) cluster_set_places(f, list[i]);
     groups_choose()(b, list, n);
     return SDM_OK;
 }
@@ -178,6 +192,7 @@ static sdm_status builder_allocate(sdm_feature_builder *b, sdm_arena *arena, sdm
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->node, b->tree->n_node, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->centroid, n, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->exact, f->corner_base + n_vert, "features", err);
+    if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->place, n_edge + n_vert, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->of_slot, n, "features", err);
     if (!s) s = SDM_TAKE_UNSET(arena, SDM_LOW, &f->owner, f->corner_base + n_vert, "features", err);
     if (s) return s;

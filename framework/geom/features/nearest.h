@@ -29,3 +29,8 @@ double sdm_nearest_find(const sdm_nearest *n, const double x[3], double bound, u
    triangle with slot *slot, with the same bits as in a distance map. Sets *slot to the owner of
    this feature (sdm_features.owner). */
 double sdm_nearest_feature(const sdm_nearest *n, const double x[3], uint32_t *slot);
+
+/* Number of the feature nearest to x, and its squared distance *d2: the minimum over all features
+   of sdm_feature_distance2(); of several features with the same squared distance, bit for bit, the
+   highest number. [any thread] */
+uint32_t sdm_nearest_least(const sdm_nearest *n, const double x[3], double *d2);

@@ -94,6 +94,8 @@ typedef struct sdm_cluster_node {
 typedef struct sdm_features {
     /* nodes of the tree, [sdm_bvh.n_node] */
     sdm_cluster_node *node;
+    /* tree over the clusters for searches from single points; NULL: not made */
+    const struct sdm_wide_node *wide;
     /* centroids of the triangles, [n_tri][coordinate], scaled */
     float (*centroid)[3];
     /* at least one face is thin */
@@ -101,12 +103,17 @@ typedef struct sdm_features {
     /* groups of all clusters, see sdm_cluster_node.group */
     sdm_feature_group *group;
     uint32_t edge_base, corner_base, end;
+    /* 8 * group + lane of each edge and corner, [end - edge_base] */
+    uint32_t *place;
     /* the features in double, [end] */
     sdm_feature *exact;
     /* numbers of the edges and corners of each triangle, [n_tri][3 edges, 3 corners] */
     uint32_t (*of_slot)[6];
     /* slot of one triangle to which each feature belongs, [end] */
     uint32_t *owner;
+    /* side of the surface on which the region of each feature lies, see feature_side.h, [end];
+       NULL: not made, or the surface does not bound a solid */
+    const int8_t *side;
     /* centre of the surface's bounding box and half its diagonal, mm */
     double centre[3], radius;
     /* power of two that makes the longest edge 0.5 to 1 long */

@@ -1,6 +1,7 @@
 /* State of the current block, shared by stages 3 to 6. Part of map.inc, which defines the terms. */
 #pragma once
 
+#include "features/ambiguity.h"
 #include "grid_scratch.h"
 
 /* The current block. Stages 3 to 5 use float positions relative to its centre, scaled. */
@@ -16,6 +17,9 @@ typedef struct block {
     // [tile][vector]: a feature whose squared distance from the vector's centre is larger is not
     // the nearest feature of any voxel of the vector
     _Alignas(32) float far2[8][8];
+    // with a narrow band: a feature whose squared distance from the centre of a tile is larger lies
+    // outside the band for every voxel of the tile; INFINITY without a band
+    float tile_far2;
     // [SDM_BLOCKS, SDM_TILES, SDM_VECTORS]: half[level] * sdm_block_group.extent bounds the change
     // of a function from the centre of the block, of a tile or of a vector to its corners
     float half[SDM_PART_LEVELS];
@@ -28,8 +32,3 @@ static inline bool block_is_cube(const sdm_grid_job *job)
     const float *half = job->part[SDM_BLOCKS].half;
     return job->aligned && half[0] == half[1] && half[0] == half[2];
 }
-
-/* Two squared distances in float that differ by less than k (d + 1) may have either order; returns
-   k = 8 e for e = block.error. Reason: abs(error of d) <= 2 e, so abs(error of d^2) <= 4 (d + 1) e,
-   and the difference of two such values has at most twice this error. */
-static inline float ambiguity(float error) { return 8 * error; }

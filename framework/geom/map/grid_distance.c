@@ -193,6 +193,16 @@ static double job_set_tables(sdm_grid_job *job)
     return reach;
 }
 
+/* Where the value of voxel (i, j, k) is stored; NULL: it is not wanted. */
+static float *value_at(const sdm_grid_job *job, int64_t i, int64_t j, int64_t k)
+{
+    const int64_t s = SDM_BLOCK_SIZE;
+    const sdm_blocks *b = job->blocks;
+    if (!b) return &job->values[(k * job->n[1] + j) * job->n[0] + i];
+    const uint32_t number = b->tile[(k / s * b->n[1] + j / s) * b->n[0] + i / s];
+    return number < SDM_TILE_INSIDE ? &b->values[number][(k % s * s + j % s) * s + i % s] : NULL;
+}
+
 /* Does the work of sdm_grid_distance() voxel by voxel in double, for grids so far away or so large
    that float cannot tell features apart. */
 static sdm_status distance_by_points(const sdm_grid_job *job, const sdm_grid *g,
@@ -207,30 +217,29 @@ static sdm_status distance_by_points(const sdm_grid_job *job, const sdm_grid *g,
         for (int64_t i = 0; i < job->n[0] && !atomic_load(&stop); i++) {
             const double index[3] = {(double)i, (double)(row % job->n[1]),
                                      (double)(row / job->n[1])};
-            double x[3], q[3];
-            uint32_t slot = 0;
-            int feature;
+            float *value = value_at(job, i, row % job->n[1], row / job->n[1]);
+            double x[3], d2;
+            if (!value) continue;
             sdm_grid_world(g, index, x);
-            (void)sdm_nearest_find(job->surface, x, INFINITY, &slot, q, &feature);
-            const float d = (float)sqrt(sdm_nearest_feature(job->surface, x, &slot));
+            const uint32_t number = sdm_nearest_least(job->surface, x, &d2);
+            const float d = (float)sqrt(d2);
             const bool near = d < (float)job->band_mm || !(job->band_mm < INFINITY);
-            job->values[row * job->n[0] + i] = near ? d : (float)job->band_mm;
-            if (job->slot) job->slot[row * job->n[0] + i] = near ? slot : SDM_NONE;
+            *value = near ? d : (float)job->band_mm;
+            if (job->slot)
+                job->slot[row * job->n[0] + i] = near ? job->features->owner[number] : SDM_NONE;
         }
     }
     return atomic_load(&stop) ? sdm_fail(err, SDM_E_CANCELLED, "map stopped on request") : SDM_OK;
 }
 
-sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g,
-                             const sdm_exact_opts *opts, double band_mm, float *values,
-                             uint32_t *slot, sdm_error *err)
+/* Computes the map that *job describes so far: its surface and its outputs. */
+static sdm_status job_run(const sdm_grid_job *j, const sdm_grid *g, const sdm_exact_opts *opts,
+                          double band_mm, sdm_error *err)
 {
-    sdm_grid_job job = {.surface = surface,
-                        .features = &surface->features,
-                        .values = values,
-                        .slot = slot,
-                        .band = (float)(band_mm * surface->features.scale),
-                        .band_mm = band_mm};
+    sdm_grid_job job = *j;
+    job.features = &job.surface->features;
+    job.band = (float)(band_mm * job.features->scale);
+    job.band_mm = band_mm;
     for (int a = 0; a < 3; a++) {
         job.n[a] = g->n[a];
         job.origin[a] = g->origin[a];
@@ -273,4 +282,30 @@ sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g,
         sdm_grid_scratch_dispose(&scratch);
     }
     return status;
+}
+
+sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g,
+                             const sdm_exact_opts *opts, double band_mm, float *values,
+                             uint32_t *slot, sdm_error *err)
+{
+    const sdm_grid_job job = {.surface = surface, .values = values, .slot = slot};
+    return job_run(&job, g, opts, band_mm, err);
+}
+
+/* Sets the voxels of the blocks that lie beyond the grid to the band. */
+static void beyond_fill(const sdm_blocks *b)
+{
+    for (size_t i = 0; i < b->n_block; i++) {
+        bool whole = true;
+        for (int a = 0; a < 3; a++) whole &= b->first[i][a] + SDM_BLOCK_SIZE <= b->grid.n[a];
+        for (int v = 0; v < SDM_BLOCK_VOXELS && !whole; v++) b->values[i][v] = (float)b->band_mm;
+    }
+}
+
+sdm_status sdm_grid_distance_blocks(const sdm_nearest *surface, const sdm_exact_opts *opts,
+                                    const sdm_blocks *blocks, sdm_error *err)
+{
+    const sdm_grid_job job = {.surface = surface, .blocks = blocks};
+    beyond_fill(blocks);
+    return job_run(&job, &blocks->grid, opts, blocks->band_mm, err);
 }

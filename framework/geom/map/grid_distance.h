@@ -14,3 +14,9 @@
 sdm_status sdm_grid_distance(const sdm_nearest *surface, const sdm_grid *g,
                              const sdm_exact_opts *opts, double band_mm, float *values,
                              uint32_t *slot, sdm_error *err);
+
+/* The same for the voxels of blocks only, with the narrow band blocks->band_mm: fills
+   blocks->values, also of voxels beyond the grid. blocks->grid must have passed sdm_grid_check();
+   blocks->tile and blocks->values are set. */
+sdm_status sdm_grid_distance_blocks(const sdm_nearest *surface, const sdm_exact_opts *opts,
+                                    const sdm_blocks *blocks, sdm_error *err);

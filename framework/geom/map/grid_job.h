@@ -9,6 +9,7 @@
 
 #include "features/nearest.h"
 #include "features/surface_features.h"
+#include "sdm/blocks.h"
 #include "sdm/grid.h"
 
 /* Eight points, x[coordinate][lane]. */
@@ -40,8 +41,10 @@ typedef struct sdm_grid_parts {
 typedef struct sdm_grid_job {
     const sdm_nearest *surface;
     const sdm_features *features;
-    /* output: distances in mm, [nz][ny][nx] */
+    /* output: distances in mm, [nz][ny][nx]; unused if `blocks` is set */
     float *values;
+    /* output instead of values: only the voxels of these blocks are computed; NULL: all voxels */
+    const sdm_blocks *blocks;
     /* output: slot of a nearest triangle, [nz][ny][nx]; may be NULL */
     uint32_t *slot;
     /* number of voxels of the grid along each axis */

@@ -59,3 +59,13 @@ SDM_FOR_KIND v8f region_excess(int kind, const functions8 *x, const float (*exte
     const v8f mean = v8_sub(v8_mul(v8_add(x->f[1], x->f[2]), v8_all(0.5f)), v8_all(most[1]));
     return v8_max(all, v8_fma(minus_half, v8_all(function_value(kind, extent, 3, lane)), mean));
 }
+
+/* Squared distances of eight points from the plane of a face, the line of an edge or a corner, from
+   the functions of the feature at the points, and for a corner the vectors from it to the points.
+ */
+SDM_FOR_KIND v8f function_distance2(int kind, const functions8 *x, point8 from)
+{
+    if (kind == SDM_CORNERS) return p8_dot(from, from);
+    const v8f d2 = v8_mul(x->f[3], x->f[3]);
+    return kind == SDM_EDGES ? v8_fma(x->f[1], x->f[1], d2) : d2;
+}

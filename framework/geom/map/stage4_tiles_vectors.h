@@ -42,8 +42,8 @@ SDM_FOR_KIND functions8 block_feature_start(const sdm_grid_job *job, int kind, p
 }
 
 /* Moves the queued features into the batch and lists the pairs of a feature and a tile that meets
-   its region. No distance test here: clusters were culled by distance from the tiles, which rejects
-   almost all far features. */
+   its region and, with a narrow band, is near it. Without a band there is no distance test here:
+   clusters were culled by distance from the tiles, which rejects almost all far features. */
 SDM_FOR_KIND void batch_test_tiles(block *b, int kind)
 {
     const sdm_grid_job *job = b->job;
@@ -59,7 +59,14 @@ SDM_FOR_KIND void batch_test_tiles(block *b, int kind)
         const sdm_block_group *m = &p->group[lane_item(p->feature[i], n_group)];
         sdm_block_feature *x = &batch->feature[i];
         const functions8 f = block_feature_start(job, kind, to_voxel, m, lane, x);
-        const v8f excess = region_excess(kind, &f, m->extent, lane, minus_half, x->most);
+        v8f excess = region_excess(kind, &f, m->extent, lane, minus_half, x->most);
+        if (kind != SDM_THIN_FACES && b->tile_far2 < INFINITY) {
+            point8 from = p8_load(job->part[SDM_TILES].centre.x);
+            if (kind == SDM_CORNERS)
+                from = p8_add(from, p8_all(x->from[0], x->from[1], x->from[2]));
+            excess =
+                v8_max(excess, v8_sub(function_distance2(kind, &f, from), v8_all(b->tile_far2)));
+        }
         const unsigned mask = m->cluster->tiles & ~(unsigned)v8_greater(excess, error);
         met |= mask;
         n = lanes_append(job, batch->tile_pair, n, 8 * SDM_BATCH + 8, i, mask);
@@ -95,13 +102,10 @@ SDM_FOR_KIND void batch_test_vectors(const block *b, int kind)
         // block.far2 allows
         v8f excess = region_excess(kind, &f, x->extent, x->lane, minus_half, x->most);
         if (kind != SDM_THIN_FACES) {
-            v8f d2 = v8_mul(f.f[3], f.f[3]);
-            if (kind == SDM_EDGES) d2 = v8_fma(f.f[1], f.f[1], d2);
-            if (kind == SDM_CORNERS) {
-                const point8 from =
-                    p8_add(p8_load(job->vector[t].x), p8_all(x->from[0], x->from[1], x->from[2]));
-                d2 = p8_dot(from, from);
-            }
+            point8 from = p8_load(job->vector[t].x);
+            if (kind == SDM_CORNERS)
+                from = p8_add(from, p8_all(x->from[0], x->from[1], x->from[2]));
+            const v8f d2 = function_distance2(kind, &f, from);
             excess = v8_max(excess, v8_sub(d2, v8_load(b->far2[t])));
         }
         const unsigned mask = ~(unsigned)v8_greater(excess, error) & b->vectors_in_grid[t];

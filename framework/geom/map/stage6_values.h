@@ -5,8 +5,7 @@
 #include <assert.h>
 
 #include "block.h"
-#include "features/feature_distance.h"
-#include "simd/lanes.h"
+#include "features/feature_distance4.h"
 
 typedef struct tile {
     const sdm_grid_job *job;
@@ -72,7 +71,7 @@ static uint32_t voxel_settle(const tile *t, unsigned v, int lane, const double p
         assert(i < c->n);
         if (!(c->list[i].voxels >> lane & 1)) continue;
         const double d =
-            sdm_feature_distance2(t->job->features, t->job->surface->frames, c->list[i].number, p);
+            sdm_feature_distance2(t->job->features, t->job->surface->frames, c->list[i].number, p, *d2);
         if (!(d < *d2 || (d == *d2 && d < INFINITY))) continue;
         // an equal distance replaces the result: the list is read backwards, so the candidate found
         // first is read last
@@ -84,32 +83,6 @@ static uint32_t voxel_settle(const tile *t, unsigned v, int lane, const double p
     return best;
 }
 
-/* ax bx + ay by + az bz */
-static inline v4d dot4(v4d ax, v4d bx, v4d ay, v4d by, v4d az, v4d bz)
-{
-    return v4_add(v4_add(v4_mul(ax, bx), v4_mul(ay, by)), v4_mul(az, bz));
-}
-
-/* Squared distances of four points, each from its own feature x[number[i]]. The operations and
-   their order are those of sdm_feature_distance2(), hence the same bits. */
-static inline void distances4(const sdm_feature *x, const uint32_t number[4], v4d px, v4d py,
-                              v4d pz, double out[4])
-{
-    v4d a[4], u[4];
-    for (int i = 0; i < 4; i++) {
-        a[i] = v4_load(x[number[i]].a);
-        u[i] = v4_load(&x[number[i]].u[1]);
-    }
-    // after this the rows of a are ax ay az ux, those of u are uy uz length face
-    v4_transpose(a);
-    v4_transpose(u);
-    const v4d wx = v4_sub(px, a[0]), wy = v4_sub(py, a[1]), wz = v4_sub(pz, a[2]);
-    const v4d s = dot4(wx, a[3], wy, u[0], wz, u[1]);
-    const v4d rx = v4_sub(wx, v4_mul(s, a[3])), ry = v4_sub(wy, v4_mul(s, u[0])),
-              rz = v4_sub(wz, v4_mul(s, u[1]));
-    v4_store(out, v4_if_negative(u[3], v4_mul(s, s), dot4(rx, rx, ry, ry, rz, rz)));
-}
-
 /* Sets x->number of all voxels: the candidate that is clearly nearest in float, or else the one
    that is nearest in double. */
 static void tile_choose(const tile *t, voxels *x)
@@ -117,6 +90,7 @@ static void tile_choose(const tile *t, voxels *x)
     const sdm_grid_job *job = t->job;
     const sdm_candidates *c = t->candidates;
     const v8f k = v8_all(ambiguity(t->error));
+    const bool banded = job->band_mm < INFINITY;
     for (int v = 0; v < 8; v++) {
         if (!(t->vectors >> v & 1)) {
             for (int i = 0; i < 8; i++) x->number[voxel_index(job, v, i)] = 0;
@@ -125,6 +99,14 @@ static void tile_choose(const tile *t, voxels *x)
         // clear: the second nearest is farther than the first by more than the errors of both;
         // false for NaN (INFINITY - INFINITY)
         const unsigned at = 8 * t->number + (unsigned)v;
+        if (banded && c->last[at] == SDM_NONE) { // all voxels are outside the band
+            for (int i = 0; i < 8; i++) {
+                x->settled[x->n_settled] = (uint8_t)voxel_index(job, v, i);
+                x->number[x->settled[x->n_settled]] = SDM_NONE;
+                x->settled_d2[x->n_settled++] = INFINITY;
+            }
+            continue;
+        }
         const v8f first = v8_load(c->first[at]);
         const v8f limit = v8_fma(v8_add(v8_sqrt(first), v8_all(1)), k, first);
         const int clear = v8_greater(v8_load(c->second[at]), limit) & (int)~c->open[at];
@@ -159,24 +141,105 @@ static void tile_measure(const tile *t, voxels *x)
     for (int i = 0; i < x->n_settled; i++) x->d2[x->settled[i]] = x->settled_d2[i];
 }
 
-/* Sets x->number and x->d2 of a tile that has no candidates: without a narrow band by a search of
-   the tree; with one, all voxels lie outside of the band. */
+/* Sets x->number and x->d2 of a tile that has no candidates, by searches of the tree. */
 static void tile_search(const tile *t, voxels *x)
 {
     for (unsigned i = 0; i < 64; i++) {
         double p[3];
         voxel_position(t, i, p);
-        x->number[i] = SDM_NONE;
-        x->d2[i] = INFINITY;
-        if (!(t->job->band_mm < INFINITY)) x->number[i] = nearest_in_tree(t, p, &x->d2[i]);
+        x->number[i] = nearest_in_tree(t, p, &x->d2[i]);
     }
 }
 
-/* Writes the distances (mm) and the slots of the voxels that are inside the grid. */
-static void tile_write(const tile *t, voxels *x)
+/* Writes n values of a row of voxels that begins at `at` to the blocks that contain them. */
+static void row_write_blocks(const sdm_blocks *b, const int64_t at[3], int64_t n, const float *d)
+{
+    const int64_t row = (at[2] / SDM_BLOCK_SIZE * b->n[1] + at[1] / SDM_BLOCK_SIZE) * b->n[0],
+                  in_block = (at[2] % SDM_BLOCK_SIZE * SDM_BLOCK_SIZE + at[1] % SDM_BLOCK_SIZE) *
+                             SDM_BLOCK_SIZE;
+    for (int64_t i = at[0], end; i < at[0] + n; i = end) {
+        end = (i / SDM_BLOCK_SIZE + 1) * SDM_BLOCK_SIZE;
+        end = end < at[0] + n ? end : at[0] + n;
+        const uint32_t number = b->tile[row + i / SDM_BLOCK_SIZE];
+        if (number >= SDM_TILE_INSIDE) continue;
+        memcpy(&b->values[number][in_block + i % SDM_BLOCK_SIZE], &d[i - at[0]],
+               (size_t)(end - i) * sizeof *d);
+    }
+}
+
+/* Writes the first size[3] voxels of a tile if all of them are in one block; false if not. */
+static bool tile_store_block(const tile *t, const int64_t size[3], const float d[64])
+{
+    const sdm_blocks *b = t->job->blocks;
+    const int64_t *whole = t->job->part[SDM_TILES].size;
+    int64_t at[3];
+    for (int a = 0; a < 3; a++) {
+        at[a] = t->first[a] % SDM_BLOCK_SIZE;
+        if (at[a] + size[a] > SDM_BLOCK_SIZE) return false;
+    }
+    const uint32_t number =
+        b->tile[(t->first[2] / SDM_BLOCK_SIZE * b->n[1] + t->first[1] / SDM_BLOCK_SIZE) * b->n[0] +
+                t->first[0] / SDM_BLOCK_SIZE];
+    if (number >= SDM_TILE_INSIDE) return true;
+    for (int64_t z = 0; z < size[2]; z++) {
+        for (int64_t y = 0; y < size[1]; y++) {
+            float *to =
+                &b->values[number]
+                          [((at[2] + z) * SDM_BLOCK_SIZE + at[1] + y) * SDM_BLOCK_SIZE + at[0]];
+            const float *from = &d[(z * whole[1] + y) * whole[0]];
+            if (size[0] == 4) // the usual size: a constant lets the compiler inline memcpy
+                memcpy(to, from, 4 * sizeof *d);
+            else
+                memcpy(to, from, (size_t)size[0] * sizeof *d);
+        }
+    }
+    return true;
+}
+
+/* Writes distances (mm) and, if wanted, slots of the voxels of a tile that are inside the grid. */
+static inline void tile_store(const tile *t, const float d[64], const uint32_t slot[64])
 {
     const sdm_grid_job *job = t->job;
     const int64_t *whole = job->part[SDM_TILES].size;
+    // row by row, cut off at the end of the grid
+    int64_t size[3];
+    for (int a = 0; a < 3; a++)
+        size[a] = job->n[a] - t->first[a] < whole[a] ? job->n[a] - t->first[a] : whole[a];
+    if (job->blocks && tile_store_block(t, size, d)) return;
+    for (int64_t z = 0; z < size[2]; z++)
+        for (int64_t y = 0; y < size[1]; y++) {
+            const int64_t to =
+                ((t->first[2] + z) * job->n[1] + t->first[1] + y) * job->n[0] + t->first[0];
+            const int64_t from = (z * whole[1] + y) * whole[0];
+            if (job->blocks) {
+                const int64_t at[3] = {t->first[0], t->first[1] + y, t->first[2] + z};
+                row_write_blocks(job->blocks, at, size[0], &d[from]);
+                continue;
+            }
+            if (size[0] == 4) // the usual size: a constant lets the compiler inline memcpy
+                memcpy(&job->values[to], &d[from], 4 * sizeof *d);
+            else
+                memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);
+            if (job->slot) memcpy(&job->slot[to], &slot[from], (size_t)size[0] * sizeof *slot);
+        }
+}
+
+/* Writes a tile whose voxels all lie outside the band. */
+static void tile_write_far(const tile *t)
+{
+    float d[64];
+    uint32_t slot[64];
+    for (int i = 0; i < 64; i++) {
+        d[i] = (float)t->job->band_mm;
+        slot[i] = SDM_NONE;
+    }
+    tile_store(t, d, slot);
+}
+
+/* Writes the distances and the slots of a tile. */
+static void tile_write(const tile *t, voxels *x)
+{
+    const sdm_grid_job *job = t->job;
     float d[64];
     for (int i = 0; i < 64; i++) d[i] = (float)sqrt(x->d2[i]);
     // from features to triangles
@@ -188,20 +251,5 @@ static void tile_write(const tile *t, voxels *x)
             d[i] = (float)job->band_mm;
             x->number[i] = SDM_NONE;
         }
-    // row by row, cut off at the end of the grid
-    int64_t size[3];
-    for (int a = 0; a < 3; a++)
-        size[a] = job->n[a] - t->first[a] < whole[a] ? job->n[a] - t->first[a] : whole[a];
-    for (int64_t z = 0; z < size[2]; z++)
-        for (int64_t y = 0; y < size[1]; y++) {
-            const int64_t to =
-                ((t->first[2] + z) * job->n[1] + t->first[1] + y) * job->n[0] + t->first[0];
-            const int64_t from = (z * whole[1] + y) * whole[0];
-            if (size[0] == 4) // the usual size: a constant lets the compiler inline memcpy
-                memcpy(&job->values[to], &d[from], 4 * sizeof *d);
-            else
-                memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);
-            if (job->slot)
-                memcpy(&job->slot[to], &x->number[from], (size_t)size[0] * sizeof *x->number);
-        }
+    tile_store(t, d, x->number);
 }

@@ -47,6 +47,11 @@ bool sdm_sign_inside(const sdm_sign *s, const double x[3], uint32_t slot, const 
 sdm_status sdm_sign_map(const sdm_sign *s, const sdm_grid *g, const sdm_exact_opts *opts,
                         float *values, sdm_error *err);
 
+/* Negates the values of blocks inside the mesh, and sets SDM_TILE_INSIDE for tiles without block
+ * inside. For closed meshes only. The rest as sdm_sign_map(). */
+sdm_status sdm_sign_blocks(const sdm_sign *s, const sdm_exact_opts *opts, sdm_blocks *b,
+                           sdm_error *err);
+
 /* Compares the signs of a map with those of other methods: see sdm_exact_certify(). Voxels with
  * abs(value) <= rounding (mm) lie on the surface up to rounding and are not compared. SDM_E_NOMEM,
  * SDM_E_CANCELLED. */

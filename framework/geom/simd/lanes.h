@@ -51,6 +51,14 @@ static inline int v8_greater(v8f a, v8f b)
     return _mm256_movemask_ps(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_GT_OQ));
 }
 
+/* The largest lane; unspecified if a lane is NaN. */
+static inline float v8_highest(v8f a)
+{
+    __m128 x = _mm_max_ps(_mm256_castps256_ps128((__m256)a), _mm256_extractf128_ps((__m256)a, 1));
+    x = _mm_max_ps(x, _mm_movehl_ps(x, x));
+    return _mm_cvtss_f32(_mm_max_ss(x, _mm_movehdup_ps(x)));
+}
+
 static inline v8i v8_load_i(const uint32_t *p)
 {
     return (v8i)_mm256_loadu_si256((const __m256i *)(const void *)p);

@@ -110,6 +110,13 @@ static inline int v8_greater(v8f a, v8f b)
     return v4i_bits(a.low > b.low) | v4i_bits(a.high > b.high) << 4;
 }
 
+static inline float v8_highest(v8f a)
+{
+    const v4f x = v4f_max(a.low, a.high);
+    const float p = x[0] > x[1] ? x[0] : x[1], q = x[2] > x[3] ? x[2] : x[3];
+    return p > q ? p : q;
+}
+
 static inline v8i v8_load_i(const uint32_t *p)
 {
     v8i x;

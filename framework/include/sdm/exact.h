@@ -24,6 +24,7 @@
 #ifndef SDM_EXACT_H
 #define SDM_EXACT_H
 
+#include "sdm/blocks.h"
 #include "sdm/grid.h"
 #include "sdm/mesh.h"
 
@@ -142,6 +143,15 @@ typedef struct sdm_exact_layers {
 SDM_API sdm_status sdm_exact_map_layers(const sdm_exact *e, const sdm_grid *grid,
                                         const sdm_exact_layers *layers, sdm_error *err);
 
+/* *out = the narrow band of the map in blocks of 8 x 8 x 8 voxels: its values and signs are those
+ * of sdm_exact_map_layers() with this band_mm (mm, > 0, rounded to float), the same bits; voxels
+ * far from the surface cost neither time nor memory. Only for closed meshes with the sign method
+ * crossings, whose sign changes at the surface only. Free *out with sdm_blocks_dispose(). The same
+ * bits for any number of threads. SDM_E_ARG (NULL, an invalid grid or band, another sign method),
+ * SDM_E_NOMEM, SDM_E_CANCELLED. */
+SDM_API sdm_status sdm_exact_map_blocks(const sdm_exact *e, const sdm_grid *grid, double band_mm,
+                                        sdm_blocks *out, sdm_error *err);
+
 /* Derivatives of the map with respect to n parameters that move the vertices of the given mesh.
  * velocity[n][n_vert][3] = d(vertex)/d(parameter), mm per unit of the parameter;
  * derivative[n][nz][ny][nx] = d(distance)/d(parameter) in the same unit. With x* the nearest
@@ -164,6 +174,28 @@ SDM_API sdm_status sdm_exact_map_derivative(const sdm_exact *e, const sdm_grid *
  * results are NaN and *triangle has no meaning. [any thread] */
 SDM_API double sdm_exact_point(const sdm_exact *e, const double x[3], double closest[3],
                                double normal[3], uint32_t *triangle);
+
+/* Output arrays of sdm_exact_points() with one element per point, allocated by the caller; NULL:
+ * not wanted. */
+typedef struct sdm_exact_at {
+    double *distance;   /* [n] signed distance, mm */
+    double *gradient;   /* [n][3] unit vector along the gradient of the signed distance */
+    double *closest;    /* [n][3] nearest surface point, mm */
+    uint32_t *triangle; /* [n] nearest triangle, an index in sdm_exact_surface() */
+} sdm_exact_at;
+
+/* Answers of sdm_exact_point(), the same bits, for the points x[n][3], mm, in any order: many
+ * points at once are an order of magnitude cheaper. The points are sorted along a space-filling
+ * curve and computed in blocks of neighbours on all threads (n_threads of the options). An answer
+ * is a function of its own point: the distance is the smallest one in double precision over all
+ * faces, edges and corners, so it depends neither on the other points, nor on their order, the
+ * number of threads or the instruction set. At a point that is the centre of a voxel, bit for bit,
+ * the distance rounded to float is the value of sdm_exact_map(). A point with a coordinate that is
+ * not finite or above 1e150 in size has the answer NaN, and UINT32_MAX for the triangle. Memory: 16
+ * bytes per point, at most 64 MiB, and a few bytes per triangle and thread. SDM_E_ARG (NULL),
+ * SDM_E_NOMEM, SDM_E_CANCELLED; the output is incomplete then. [any thread] */
+SDM_API sdm_status sdm_exact_points(const sdm_exact *e, const double *x, size_t n,
+                                    const sdm_exact_at *out, sdm_error *err);
 
 /* Returns the absolute value of sdm_exact_point(), the same bits. Much cheaper on open meshes,
  * where the sign is a sum over the boundary. NaN as above. [any thread] */

@@ -6,6 +6,7 @@
 
 #include "bytes.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/npy.h"
 
 #define NPY_FILE_MAX ((size_t)1 << 31)
 #define NPY_HEADER_MAX ((size_t)1 << 16)
@@ -227,16 +228,19 @@ static sdm_status write_header(sdm_outfile *f, const char *descr, const size_t *
     return s ? s : sdm_outfile_write(f, text, (size_t)n, err);
 }
 
-/* Writes words[count] of 4 bytes, little endian. */
-static sdm_status write_words(sdm_outfile *f, const uint8_t *words, size_t count, sdm_error *err)
+/* Writes words[count] of 4 or 8 bytes, little endian. */
+static sdm_status write_words(sdm_outfile *f, const uint8_t *words, size_t size, size_t count,
+                              sdm_error *err)
 {
     uint8_t block[4096];
     for (size_t i = 0; i < count;) {
         size_t n = 0;
-        for (; n < sizeof block && i < count; n += 4) {
+        for (; n < sizeof block && i < count; n += size, i++) {
             uint32_t word;
-            memcpy(&word, words + 4 * i++, sizeof word);
-            sdm_put_uint(block + n, 4, word);
+            uint64_t wide;
+            memcpy(&word, words + size * i, sizeof word);
+            if (size == sizeof wide) memcpy(&wide, words + size * i, sizeof wide);
+            sdm_put_uint(block + n, size, size == sizeof wide ? wide : word);
         }
         const sdm_status s = sdm_outfile_write(f, block, n, err);
         if (s) return s;
@@ -244,8 +248,8 @@ static sdm_status write_words(sdm_outfile *f, const uint8_t *words, size_t count
     return SDM_OK;
 }
 
-/* Writes an array of 4-byte values of type `descr`. */
-static sdm_status write_array(const char *path, const char *descr, const void *words,
+/* Writes an array of values of type `descr` and `size` bytes, 4 or 8. */
+static sdm_status write_array(const char *path, const char *descr, const void *words, size_t size,
                               const size_t *shape, int n_dim, sdm_error *err)
 {
     if (!path || !words || !shape)
@@ -259,7 +263,7 @@ static sdm_status write_array(const char *path, const char *descr, const void *w
     sdm_outfile *f = NULL;
     s = sdm_outfile_open(path, &f, err);
     if (!s) s = write_header(f, descr, shape, n_dim, err);
-    if (!s) s = write_words(f, words, count, err);
+    if (!s) s = write_words(f, words, size, count, err);
     if (!s) return sdm_outfile_commit(&f, err);
     sdm_outfile_discard(&f);
     return s;
@@ -268,11 +272,17 @@ static sdm_status write_array(const char *path, const char *descr, const void *w
 sdm_status sdm_npy_write(const char *path, const float *values, const size_t *shape, int n_dim,
                          sdm_error *err)
 {
-    return write_array(path, "<f4", values, shape, n_dim, err);
+    return write_array(path, "<f4", values, sizeof *values, shape, n_dim, err);
 }
 
 sdm_status sdm_npy_write_uint32(const char *path, const uint32_t *values, const size_t *shape,
                                 int n_dim, sdm_error *err)
 {
-    return write_array(path, "<u4", values, shape, n_dim, err);
+    return write_array(path, "<u4", values, sizeof *values, shape, n_dim, err);
+}
+
+sdm_status sdm_npy_write_double(const char *path, const double *values, const size_t *shape,
+                                int n_dim, sdm_error *err)
+{
+    return write_array(path, "<f8", values, sizeof *values, shape, n_dim, err);
 }

@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 
+#include "sdm/blocks.h"
 #include "sdm/grid.h"
 
 #ifdef __cplusplus
@@ -68,6 +69,20 @@ typedef struct sdm_vdb_report {
    bytes, which other readers of OpenVDB files ignore. */
 SDM_API sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values,
                                  const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err);
+
+/* *band_mm = half width of the band of a level set on this grid, mm: that of opts->band_voxels,
+   rounded up so that checkLevelSet accepts it. SDM_E_ARG as for sdm_vdb_write(). [any thread] */
+SDM_API sdm_status sdm_vdb_band(const sdm_grid *grid, const sdm_vdb_opts *opts, double *band_mm,
+                                sdm_error *err);
+
+/* Writes a narrow-band map in blocks as a level set, without a dense map: each block becomes a leaf
+   of the tree. For blocks whose band_mm is that of sdm_vdb_band() the file has the same tree as
+   that of sdm_vdb_write() for the dense map, and is checked in the same way. opts->dense must not
+   be set. SDM_E_ARG also if the blocks have another band, or if the band reaches the border
+   of the grid: such a map must be written by sdm_vdb_write(). [any thread] */
+SDM_API sdm_status sdm_vdb_write_blocks(const char *path, const sdm_blocks *blocks,
+                                        const sdm_vdb_opts *opts, sdm_vdb_report *report,
+                                        sdm_error *err);
 
 /* Reads a file back: checks the checksum of the file, recomputes the hash and, for a level set,
    runs checkLevelSet. *text (`text` may be NULL) = new multi-line description (grid, class, voxels,

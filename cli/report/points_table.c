@@ -1,0 +1,156 @@
+/* Writes exact distances, gradients, nearest points and triangles at points. */
+#include "points_table.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "files.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/npy.h"
+#include "sdm/internal/text.h"
+
+enum { DISTANCE, GRADIENT, CLOSEST, TRIANGLE, N_KINDS };
+
+static const struct {
+    const char *name, *header;
+    size_t width;
+} kinds[N_KINDS] = {{"distance", "distance", 1},
+                    {"gradient", "gradient_x,gradient_y,gradient_z", 3},
+                    {"closest", "closest_x,closest_y,closest_z", 3},
+                    {"triangle", "triangle", 1}};
+
+/* Adds the column whose name is the first `length` characters of `word`. */
+static sdm_status add_column(cli_points_table *t, const char *word, size_t length, sdm_error *err)
+{
+    for (int k = 0; k < N_KINDS; k++) {
+        if (strlen(kinds[k].name) != length || strncmp(word, kinds[k].name, length)) continue;
+        for (int i = 0; i < t->n_columns; i++)
+            if (t->column[i] == k)
+                return sdm_fail(err, SDM_E_ARG, "--columns: '%s' is given twice", kinds[k].name);
+        t->column[t->n_columns++] = k;
+        return SDM_OK;
+    }
+    return sdm_fail(err, SDM_E_ARG,
+                    "--columns: unknown column '%.*s', known are distance, gradient, closest, "
+                    "triangle",
+                    (int)(length < 60 ? length : 60), word);
+}
+
+sdm_status cli_points_check(const cli_args *args, cli_points_table *t, sdm_error *err)
+{
+    const char *list = args->columns ? args->columns : "distance";
+    sdm_status s = SDM_OK;
+    for (const char *word = list; !s;) {
+        const size_t length = strcspn(word, ",");
+        s = add_column(t, word, length, err);
+        if (!word[length]) break;
+        word += length + 1;
+    }
+    if (s) return s;
+    if (args->outputs.n == 0)
+        return sdm_fail(err, SDM_E_ARG, "exact --points: an output is needed: -o FILE.csv or .npy");
+    if (strcmp(args->method, "exact") || args->certify || args->narrow > 0 || args->json ||
+        args->closest || args->normal || args->triangle || args->jacobian || args->size[0] > 0 ||
+        args->spacing[0] > 0 || !isnan(args->origin[0]))
+        return sdm_fail(err, SDM_E_ARG,
+                        "exact --points: options of maps (--size, --spacing, --origin, --method, "
+                        "--narrow, --certify, --json, --closest, --normal, --triangle, --jacobian) "
+                        "do not apply; use --columns");
+    for (size_t i = 0; i < args->outputs.n; i++)
+        if (!cli_ends_with_any(args->outputs.items[i], ".csv .npy"))
+            return sdm_fail(err, SDM_E_ARG,
+                            "output '%s': with --points its name must end in .csv or .npy",
+                            args->outputs.items[i]);
+    return cli_check_files(args, NULL, err);
+}
+
+static bool has_column(const cli_points_table *t, int kind)
+{
+    for (int i = 0; i < t->n_columns; i++)
+        if (t->column[i] == kind) return true;
+    return false;
+}
+
+sdm_status cli_points_allocate(cli_points_table *t, size_t n, sdm_error *err)
+{
+    sdm_status s = SDM_OK;
+    t->n = n;
+    if (has_column(t, DISTANCE)) s = SDM_ALLOC(&t->at.distance, n, "distances", err);
+    if (!s && has_column(t, GRADIENT)) s = SDM_ALLOC(&t->at.gradient, 3 * n, "gradients", err);
+    if (!s && has_column(t, CLOSEST)) s = SDM_ALLOC(&t->at.closest, 3 * n, "nearest points", err);
+    if (!s && has_column(t, TRIANGLE)) s = SDM_ALLOC(&t->at.triangle, n, "triangles", err);
+    return s;
+}
+
+void cli_points_dispose(cli_points_table *t)
+{
+    sdm_free(t->at.distance);
+    sdm_free(t->at.gradient);
+    sdm_free(t->at.closest);
+    sdm_free(t->at.triangle);
+    *t = (cli_points_table){0};
+}
+
+/* row = the answers for point i; returns their number. */
+static size_t row_fill(const cli_points_table *t, size_t i, double row[8])
+{
+    size_t n = 0;
+    for (int c = 0; c < t->n_columns; c++) {
+        const double *three = t->column[c] == GRADIENT ? t->at.gradient : t->at.closest;
+        if (t->column[c] == DISTANCE)
+            row[n++] = t->at.distance[i];
+        else if (t->column[c] == TRIANGLE)
+            row[n++] = t->at.triangle[i] == UINT32_MAX ? NAN : (double)t->at.triangle[i];
+        else
+            for (size_t a = 0; a < 3; a++) row[n++] = three[3 * i + a];
+    }
+    return n;
+}
+
+static sdm_status write_csv(const char *path, const cli_points_table *t, sdm_error *err)
+{
+    sdm_outfile *f = NULL;
+    sdm_status s = sdm_outfile_open(path, &f, err);
+    for (int c = 0; c < t->n_columns && !s; c++)
+        s = sdm_outfile_printf(f, err, "%s%s", c ? "," : "", kinds[t->column[c]].header);
+    for (size_t i = 0; i < t->n && !s; i++) {
+        double row[8];
+        char number[32];
+        const size_t n = row_fill(t, i, row);
+        for (size_t k = 0; k < n && !s; k++)
+            s = sdm_outfile_printf(f, err, "%s%s", k ? "," : "\n",
+                                   isnan(row[k]) ? "" : sdm_format_real(row[k], number));
+    }
+    if (!s) s = sdm_outfile_write(f, "\n", 1, err);
+    if (!s) return sdm_outfile_commit(&f, err);
+    sdm_outfile_discard(&f);
+    return s;
+}
+
+static sdm_status write_npy(const char *path, const cli_points_table *t, sdm_error *err)
+{
+    size_t width = 0, count;
+    double *values = NULL;
+    for (int c = 0; c < t->n_columns; c++) width += kinds[t->column[c]].width;
+    sdm_status s = sdm_mul(t->n, width, &count, err);
+    if (!s) s = SDM_ALLOC(&values, count, "table of answers", err);
+    for (size_t i = 0; i < t->n && !s; i++) {
+        double row[8];
+        const size_t n = row_fill(t, i, row);
+        memcpy(values + i * width, row, n * sizeof *row);
+    }
+    if (!s) s = sdm_npy_write_double(path, values, (const size_t[]){t->n, width}, 2, err);
+    sdm_free(values);
+    return s;
+}
+
+sdm_status cli_points_write(const cli_points_table *t, const cli_args *args, sdm_error *err)
+{
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < args->outputs.n && !s; i++) {
+        const char *path = args->outputs.items[i];
+        s = cli_ends_with(path, ".csv") ? write_csv(path, t, err) : write_npy(path, t, err);
+    }
+    return s;
+}

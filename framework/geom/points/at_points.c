@@ -1,0 +1,241 @@
+/* Signed distances at points: sorts them, computes them in blocks, finds their signs. */
+#include "at_points.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdatomic.h>
+#include <string.h>
+
+#include "features/feature_side.h"
+#include "memory/cancel.h"
+#include "point_job.h"
+#include "point_order.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/processor.h"
+#include "sdm/internal/threads.h"
+
+#define CHUNK ((size_t)1 << 22) // points that are sorted together; bounds the memory
+#define BLOCKS 16               // blocks of points that a thread takes at a time
+
+/* Is x a usable point? False for NaN and for coordinates whose squares could overflow. */
+static bool is_point(const double x[3])
+{
+    return fabs(x[0]) <= 1e150 && fabs(x[1]) <= 1e150 && fabs(x[2]) <= 1e150;
+}
+
+/* The functions of one instruction set. */
+typedef struct kernels {
+    sdm_point_kernel *block;
+    sdm_point_search *search;
+} kernels;
+
+static kernels kernels_choose(void)
+{
+#if defined(__x86_64__) && defined(__GNUC__)
+    const int level = sdm_processor_level();
+    if (level >= SDM_PROCESSOR_AVX512)
+        return (kernels){sdm_point_kernel_avx512, sdm_point_search_avx512};
+    if (level >= SDM_PROCESSOR_AVX2) return (kernels){sdm_point_kernel_avx2, sdm_point_search_avx2};
+#endif
+    return (kernels){sdm_point_kernel_generic, sdm_point_search_generic};
+}
+
+/* Stores the answer for x in element `index`: its nearest feature, the squared distance, and the
+   side by this feature. */
+static void point_finish(const sdm_points_job *job, const double x[3], uint32_t number, double d2,
+                         int side, const sdm_exact_at *out, size_t index)
+{
+    const sdm_nearest *s = job->surface;
+    const uint32_t slot = s->features.owner[number];
+    double d = sqrt(d2), q[3];
+    int feature;
+    const bool wants_point = out->closest || out->gradient;
+    // near the surface rounding decides on which side of the feature the point lies
+    const double largest = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
+    if (!(d > job->seam + 16 * DBL_EPSILON * largest)) side = SDM_SIDE_UNKNOWN;
+    if (wants_point || side == SDM_SIDE_UNKNOWN)
+        (void)sdm_frame_closest(&s->frames[slot], x, q, &feature);
+    if (side == SDM_SIDE_UNKNOWN ? sdm_sign_inside(job->sign, x, slot, q, feature)
+                                 : side == SDM_SIDE_INSIDE)
+        d = -d;
+    if (out->distance) out->distance[index] = d;
+    if (out->triangle) out->triangle[index] = s->tree.order[slot];
+    if (out->closest) memcpy(out->closest + 3 * index, q, sizeof q);
+    if (out->gradient)
+        sdm_distance_gradient(s, job->rounding, slot, x, q, d, out->gradient + 3 * index);
+}
+
+/* Stores the answer for a point that is not usable. */
+static void point_refuse(const sdm_exact_at *out, size_t index)
+{
+    if (out->distance) out->distance[index] = NAN;
+    if (out->triangle) out->triangle[index] = UINT32_MAX;
+    for (size_t a = 0; a < 3; a++) {
+        if (out->closest) out->closest[3 * index + a] = NAN;
+        if (out->gradient) out->gradient[3 * index + a] = NAN;
+    }
+}
+
+void sdm_point_find(const sdm_points_job *job, const double x[3], const sdm_exact_at *out,
+                    size_t index)
+{
+    if (!is_point(x)) {
+        point_refuse(out, index);
+        return;
+    }
+    double d2;
+    int side;
+    const uint32_t number = kernels_choose().search(job->surface, x, &d2, &side);
+    point_finish(job, x, number, d2, side, out, index);
+}
+
+double sdm_point_distance(const sdm_nearest *surface, const double x[3])
+{
+    double d2 = NAN;
+    int side;
+    if (is_point(x)) (void)kernels_choose().search(surface, x, &d2, &side);
+    return sqrt(d2);
+}
+
+static sdm_point_keys *keys_choose(void)
+{
+#if defined(__x86_64__) && defined(__GNUC__)
+    if (sdm_processor_level() >= SDM_PROCESSOR_AVX2) return sdm_point_keys_avx2;
+#endif
+    return sdm_point_keys_generic;
+}
+
+static void scratch_free(sdm_point_scratch *s)
+{
+    if (!s) return;
+    sdm_free(s->node);
+    sdm_free(s->away);
+    sdm_free(s->candidate);
+    sdm_free(s);
+}
+
+/* Bytes of a thread's scratch memory. */
+static size_t scratch_bytes(const sdm_features *f)
+{
+    return sizeof(sdm_point_scratch) +
+           f->edge_base * (sizeof(uint32_t) + sizeof(float[SDM_POINT_VECTORS])) +
+           (f->end + 1) * sizeof(sdm_point_candidate);
+}
+
+static sdm_status scratch_start(const sdm_features *f, sdm_point_scratch **out, sdm_error *err)
+{
+    sdm_status st = SDM_ALLOC(out, 1, "points of a block", err);
+    if (st) return st;
+    sdm_point_scratch *s = *out;
+    // every cluster has a face; every feature is a candidate at most once
+    st = sdm_alloc_unset((void **)&s->node, f->edge_base, sizeof *s->node, "clusters", err);
+    if (!st)
+        st = sdm_alloc_unset((void **)&s->away, f->edge_base, sizeof *s->away, "clusters", err);
+    if (!st)
+        st = sdm_alloc_unset((void **)&s->candidate, (size_t)f->end + 1, sizeof *s->candidate,
+                             "candidates", err);
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < 8; i++) s->reference.x[a][i] = f->centroid[0][a];
+    return st;
+}
+
+/* Answers for the block of sorted points key[n], 0 < n <= SDM_POINT_BLOCK, of x[][3]. */
+static void block_find(const sdm_points_job *job, sdm_point_kernel *kernel, sdm_point_scratch *s,
+                       const double *x, const sdm_point_key *key, size_t n, const sdm_exact_at *out)
+{
+    for (size_t i = 0; i < SDM_POINT_BLOCK; i++) {
+        const double *p = x + 3 * (size_t)key[i < n ? i : n - 1].index;
+        // a point that is not usable is replaced by any other
+        if (!is_point(p)) p = job->surface->features.centre;
+        for (int a = 0; a < 3; a++) s->x[i / 8][a][i % 8] = p[a];
+    }
+    kernel(job->surface, s);
+    for (size_t i = 0; i < n; i++) {
+        const double *p = x + 3 * (size_t)key[i].index;
+        if (is_point(p))
+            point_finish(job, p, s->number[i], s->d2[i], s->side[i], out, key[i].index);
+        else
+            point_refuse(out, key[i].index);
+    }
+}
+
+/* Box over which the points are sorted: that of the points, but not much larger than that of the
+   surface. */
+static void points_box(const sdm_features *f, const double *x, size_t n, double lo[3], double hi[3])
+{
+    for (size_t a = 0; a < 3; a++) {
+        lo[a] = f->centre[a] + 4 * f->radius;
+        hi[a] = f->centre[a] - 4 * f->radius;
+    }
+    for (size_t i = 0; i < n; i++)
+        for (size_t a = 0; a < 3; a++) {
+            lo[a] = x[3 * i + a] < lo[a] ? x[3 * i + a] : lo[a];
+            hi[a] = x[3 * i + a] > hi[a] ? x[3 * i + a] : hi[a];
+        }
+    for (size_t a = 0; a < 3; a++) {
+        lo[a] = fmax(lo[a], f->centre[a] - 4 * f->radius);
+        hi[a] = fmin(hi[a], f->centre[a] + 4 * f->radius);
+    }
+}
+
+/* Answers for up to CHUNK points. */
+static sdm_status chunk_find(const sdm_points_job *job, const double *x, size_t n,
+                             sdm_point_key *key, int n_threads, const sdm_exact_at *out,
+                             sdm_error *err)
+{
+    double lo[3], hi[3];
+    points_box(&job->surface->features, x, n, lo, hi);
+    sdm_point_order(x, n, lo, hi, keys_choose(), n_threads, key, key + n);
+    sdm_point_kernel *kernel = kernels_choose().block;
+    const size_t n_block = (n + SDM_POINT_BLOCK - 1) / SDM_POINT_BLOCK;
+    const size_t n_job = (n_block + BLOCKS - 1) / BLOCKS;
+    atomic_int stop = SDM_OK;
+    sdm_status status = SDM_OK;
+#pragma omp parallel num_threads(n_threads) if (n_job > 1)
+    {
+        sdm_point_scratch *scratch = NULL;
+        sdm_error local = {0};
+        const sdm_status ready = scratch_start(&job->surface->features, &scratch, &local);
+#pragma omp for schedule(dynamic)
+        for (size_t part = 0; part < n_job; part++) {
+            if (atomic_load(&stop)) continue;
+            sdm_status s = ready;
+            for (size_t b = part * BLOCKS; b < (part + 1) * BLOCKS && b < n_block && !s; b++) {
+                const size_t first = b * SDM_POINT_BLOCK, left = n - first;
+                block_find(job, kernel, scratch, x, key + first,
+                           left < SDM_POINT_BLOCK ? left : SDM_POINT_BLOCK, out);
+            }
+            if (!s && sdm_cancelled(job->opts))
+                s = sdm_fail(&local, SDM_E_CANCELLED, "points stopped on request");
+            if (!s || atomic_exchange(&stop, 1)) continue;
+            status = sdm_fail(err, s, "%s", local.text);
+        }
+        scratch_free(scratch);
+    }
+    return status;
+}
+
+sdm_status sdm_points_find(const sdm_points_job *job, const double *x, size_t n,
+                           const sdm_exact_at *out, sdm_error *err)
+{
+    const int n_threads = sdm_threads(job->opts->n_threads);
+    const size_t most = n < CHUNK ? n : CHUNK, limit = job->opts->memory_limit;
+    const size_t need = 2 * most * sizeof(sdm_point_key) +
+                        (size_t)n_threads * scratch_bytes(&job->surface->features);
+    if (limit && need > limit)
+        return sdm_fail(err, SDM_E_NOMEM, "%zu points need %zu bytes, memory_limit leaves %zu", n,
+                        need, limit);
+    sdm_point_key *key;
+    sdm_status s =
+        sdm_alloc_unset((void **)&key, 2 * most, sizeof *key, "order of the points", err);
+    for (size_t first = 0; first < n && !s; first += CHUNK) {
+        const size_t left = n - first;
+        const sdm_exact_at at = {out->distance ? out->distance + first : NULL,
+                                 out->gradient ? out->gradient + 3 * first : NULL,
+                                 out->closest ? out->closest + 3 * first : NULL,
+                                 out->triangle ? out->triangle + first : NULL};
+        s = chunk_find(job, x + 3 * first, left < CHUNK ? left : CHUNK, key, n_threads, &at, err);
+    }
+    sdm_free(key);
+    return s;
+}

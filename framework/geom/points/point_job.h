@@ -1,0 +1,60 @@
+/* Distances of many points: what the kernel, its driver and its scratch memory share.
+
+   Points are sorted along a space-filling curve and cut into blocks. A block has eight vectors, a
+   vector has eight points, one in each SIMD lane. Other terms are those of map/map.inc. */
+#pragma once
+
+#include "features/nearest.h"
+#include "map/grid_scratch.h"
+
+/* Points of a vector, vectors of a block, points of a block. */
+enum { SDM_LANES = 8, SDM_POINT_VECTORS = 8, SDM_POINT_BLOCK = SDM_LANES * SDM_POINT_VECTORS };
+
+/* A candidate of the current vector. bit i of `lanes`: the feature may be the nearest one of point
+   i. */
+typedef struct sdm_point_candidate {
+    uint32_t number;
+    uint32_t lanes;
+} sdm_point_candidate;
+
+/* Scratch memory of one thread. */
+typedef struct sdm_point_scratch {
+    /* the points of the block, mm, [vector][coordinate][lane]; all of them are finite */
+    _Alignas(64) double x[SDM_POINT_VECTORS][3][SDM_LANES];
+    /* result: number of the nearest feature of each point and its squared distance, mm^2. Of
+       several features with the same squared distance, bit for bit, the highest number */
+    uint32_t number[SDM_POINT_BLOCK];
+    _Alignas(32) double d2[SDM_POINT_BLOCK];
+    /* result: side of each point by sdm_feature_side(); unknown without sdm_features.side, and
+       where features that are nearest up to rounding differ */
+    int8_t side[SDM_POINT_BLOCK];
+    /* clusters of the block: indices of their nodes, and the distances of their boxes from the
+       centres of the vectors, [cluster][vector], scaled; INFINITY: the cluster does not hold the
+       nearest feature of a point of the vector */
+    uint32_t *node;
+    float (*away)[SDM_POINT_VECTORS];
+    size_t n_node;
+    /* candidates of the current vector */
+    sdm_point_candidate *candidate;
+    size_t n_candidate;
+    /* reference points of the vectors; at the start any points of the surface */
+    sdm_points reference;
+} sdm_point_scratch;
+
+/* Finds the nearest features of the points scratch->x. The nearest feature is found in float with a
+   margin for rounding errors; among all features within the margin the distances in double decide.
+   The result is the minimum over all features of sdm_feature_distance2(), so it does not depend on
+   the other points of the block or on the instruction set. */
+typedef void sdm_point_kernel(const sdm_nearest *surface, sdm_point_scratch *scratch);
+
+/* The same for a single point x, without scratch memory: returns the number of the nearest feature
+   and sets its squared distance and the side of x. */
+typedef uint32_t sdm_point_search(const sdm_nearest *surface, const double x[3], double *d2,
+                                  int *side);
+
+sdm_point_kernel sdm_point_kernel_generic;
+sdm_point_search sdm_point_search_generic;
+#if defined(__x86_64__) && defined(__GNUC__)
+sdm_point_kernel sdm_point_kernel_avx2, sdm_point_kernel_avx512;
+sdm_point_search sdm_point_search_avx2, sdm_point_search_avx512;
+#endif

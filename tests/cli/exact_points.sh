@@ -1,0 +1,76 @@
+#!/usr/bin/env bash
+# sdmgen exact --points: columns, input and output formats, mistakes with line numbers, no partial files.
+# Tests: points_file.c points_table.c
+. "$(dirname "$0")/common.sh"
+
+# row FILE N COLUMNS: these columns of line N, rounded to six decimals, without the sign of zero.
+row() { sed -n "$2p" "$1" | cut -d, -f "$3" | awk -F, '{ for (i = 1; i <= NF; i++) printf "%s%g", (i == 1 ? "" : ","), int($i * 1e6 + ($i < 0 ? -0.5 : 0.5)) / 1e6 + 0 }'; }
+
+# A cube of edge 2 around the origin.
+cat >cube.off <<'EOF'
+OFF
+8 12 0
+-1 -1 -1
+1 -1 -1
+-1 1 -1
+1 1 -1
+-1 -1 1
+1 -1 1
+-1 1 1
+1 1 1
+3 0 2 1
+3 1 2 3
+3 4 5 6
+3 5 7 6
+3 0 1 4
+3 1 5 4
+3 2 6 3
+3 3 6 7
+3 0 4 2
+3 2 4 6
+3 1 3 5
+3 3 7 5
+EOF
+# A byte order mark, a header, comments, blanks and Windows line ends; points in front of a face, inside, beyond an edge.
+printf '\xef\xbb\xbfx,y,z\r\n# a comment\n 3 , 0.25,0.125\r\n\n0.5,0.125,0\n4,5,0.5' >p.csv
+expect 0 - sdmgen exact --mesh cube.off --points p.csv -o d.csv -o d.npy --columns distance,gradient,closest,triangle --quiet
+present d.csv d.npy
+[ "$(sed -n 1p d.csv)" = 'distance,gradient_x,gradient_y,gradient_z,closest_x,closest_y,closest_z,triangle' ] || bad "header $(sed -n 1p d.csv)"
+[ "$(row d.csv 2 1-7)" = '2,1,0,0,1,0.25,0.125' ] || bad "row 1: $(row d.csv 2 1-7)"
+[ "$(row d.csv 3 1-2)" = '-0.5,1' ] || bad "row 2: $(row d.csv 3 1-2)"
+[ "$(row d.csv 4 1,5-7)" = '5,1,1,0.5' ] || bad "row 3: $(row d.csv 4 1,5-7)"
+[ "$(wc -l <d.csv)" -eq 4 ] || bad "$(wc -l <d.csv) lines"
+head -c 128 d.npy | tr -d '\0' | grep -a -q "'<f8', 'fortran_order': False, 'shape': (3, 8)" || bad "header of d.npy"
+[ "$(od -An -v -t f8 -w64 -j $(($(wc -c <d.npy) - 192)) d.npy | awk '{ printf "%.6f ", $1 }')" = '2.000000 -0.500000 5.000000 ' ] || bad 'values of d.npy'
+
+# The columns in another order; points from an array and from the vertices of a mesh.
+expect 0 - sdmgen exact --mesh cube.off --points p.csv -o xyz.npy --columns closest --quiet
+expect 0 - sdmgen exact --mesh cube.off --points xyz.npy -o on.csv --columns triangle,distance --quiet
+[ "$(sed -n 1p on.csv)" = 'triangle,distance' ] || bad "header $(sed -n 1p on.csv)"
+sed 1d on.csv | awk -F, '{ if ($2 > 1e-15 || $2 < -1e-15) exit 1 }' || bad "not on the surface: $(xargs <on.csv)"
+expect 0 - sdmgen exact --mesh cube.off --points cube.off -o on.csv --quiet
+sed 1d on.csv | awk '{ if ($1 > 1e-15 || $1 < -1e-15) exit 1 }' || bad "vertices not on the surface: $(xargs <on.csv)"
+# An array that is not [n][3].
+expect 3 'd.npy: array with 2 dimensions, the second of 8; need \[n\]\[3\]' sdmgen exact --mesh cube.off --points d.npy -o no.csv
+
+# Mistakes.
+printf 'x,y,z\n1,2,3\n1,2\n' >bad.csv
+expect 3 'bad.csv:3: 2 values, a line needs three' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
+printf '1,2,3\n1,two,3\n' >bad.csv
+expect 3 "bad.csv:2: 'two' is not a finite number" sdmgen exact --mesh cube.off --points bad.csv -o no.csv
+printf '1,2,3\n1,nan,3\n' >bad.csv
+expect 3 "bad.csv:2: 'nan' is not a finite number" sdmgen exact --mesh cube.off --points bad.csv -o no.csv
+printf '1,2,3\n1,2,3,4\n' >bad.csv
+expect 3 'bad.csv:2: 4 values, a line needs three' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
+printf 'x,y,z\n# nothing\n' >bad.csv
+expect 3 'bad.csv: no points' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
+expect 2 "name must end in .csv" sdmgen exact --mesh cube.off --points p.txt -o no.csv
+expect 2 "output 'no.nii': with --points" sdmgen exact --mesh cube.off --points p.csv -o no.nii
+expect 2 'an output is needed' sdmgen exact --mesh cube.off --points p.csv
+expect 2 "unknown column 'normal', known are" sdmgen exact --mesh cube.off --points p.csv -o no.csv --columns distance,normal
+expect 2 "'distance' is given twice" sdmgen exact --mesh cube.off --points p.csv -o no.csv --columns distance,distance
+expect 2 'options of maps' sdmgen exact --mesh cube.off --points p.csv -o no.csv --size 4,4,4
+expect 2 '--columns belongs to --points' sdmgen exact --mesh cube.off -o no.npy --columns distance
+expect 2 'would overwrite the input' sdmgen exact --mesh cube.off --points p.csv -o p.csv
+absent no.csv no.nii no.npy
+finish

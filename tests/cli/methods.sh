@@ -50,8 +50,8 @@ expect 2 'tolerance belongs to --method octree, not edt' sdmgen exact --shape to
 expect 2 'tolerance belongs to --method octree, not exact' sdmgen exact --shape torus --tolerance 0.1 -o x.npy
 expect 2 "tolerance '0'" sdmgen exact --shape torus --method octree --tolerance 0 -o x.npy
 expect 2 'certify belongs to --method exact, not edt' sdmgen exact --shape torus --method edt --certify -o x.npy
-grep -aq ': octree: torus' o.nrrd || bad 'o.nrrd does not name octree'
-grep -aq ': exact: torus' o.nrrd && bad 'o.nrrd calls the map of octree exact'
+grep -aq '; octree: torus' o.nrrd || bad 'o.nrrd does not name octree'
+grep -aq '; exact: torus' o.nrrd && bad 'o.nrrd calls the map of octree exact'
 
 # Every type of output.
 for method in naive cells octree edt; do

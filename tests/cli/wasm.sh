@@ -48,7 +48,7 @@ expect 0 - map $model wasm.npy rx=4.6
 has '^ellipsoid by the exact engine: '
 near "$(far_apart native.npy wasm.npy)" 0 1e-5
 expect 1 '^map: .*missing\.sdm: cannot open' map missing.sdm none.npy
-expect 1 "^map: .*'rx' .* is 5\.1 mm" map $model none.npy rx=5.1
+expect 1 "^map: .*'rx' = 5\.1 mm, allowed 1 \.\. 5 mm" map $model none.npy rx=5.1
 head -c 1000 $model >damaged.sdm
 expect 1 '^map: .*damaged\.sdm: truncated' map damaged.sdm none.npy
 absent none.npy

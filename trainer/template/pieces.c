@@ -18,7 +18,7 @@ enum {
 /* A rigid piece has at least this fraction of the vertices, all together at least the second. */
 static const double SMALLEST = 0.02, RIGID = 0.25;
 
-enum { FREE = UINT32_MAX, FLEXIBLE = UINT32_MAX - 1 };
+static const uint32_t FREE = UINT32_MAX, FLEXIBLE = UINT32_MAX - 1;
 
 /* The component and its motion. */
 typedef struct search {

@@ -70,8 +70,8 @@ static uint32_t voxel_settle(const tile *t, unsigned v, int lane, const double p
     for (uint32_t i = c->last[v]; i != SDM_NONE; i = c->list[i].before) {
         assert(i < c->n);
         if (!(c->list[i].voxels >> lane & 1)) continue;
-        const double d =
-            sdm_feature_distance2(t->job->features, t->job->surface->frames, c->list[i].number, p, *d2);
+        const double d = sdm_feature_distance2(t->job->features, t->job->surface->frames,
+                                               c->list[i].number, p, *d2);
         if (!(d < *d2 || (d == *d2 && d < INFINITY))) continue;
         // an equal distance replaces the result: the list is read backwards, so the candidate found
         // first is read last

@@ -40,6 +40,16 @@ static kernels kernels_choose(void)
     return (kernels){sdm_point_kernel_generic, sdm_point_search_generic};
 }
 
+/* Moves q into the box of the surface if x, at the distance d, lies so far away that the rounding
+   of q may be larger than the surface. */
+static void keep_in_box(const sdm_nearest *s, double d, double q[3])
+{
+    const sdm_bvh_node *box = &s->tree.node[0];
+    double size = 0;
+    for (int a = 0; a < 3; a++) size = fmax(size, box->hi[a] - box->lo[a]);
+    for (int a = 0; a < 3 && d > 1e9 * size; a++) q[a] = fmin(fmax(q[a], box->lo[a]), box->hi[a]);
+}
+
 /* Stores the answer for x in element `index`: its nearest feature, the squared distance, and the
    side by this feature. */
 static void point_finish(const sdm_points_job *job, const double x[3], uint32_t number, double d2,
@@ -53,8 +63,10 @@ static void point_finish(const sdm_points_job *job, const double x[3], uint32_t 
     // near the surface rounding decides on which side of the feature the point lies
     const double largest = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
     if (!(d > job->seam + 16 * DBL_EPSILON * largest)) side = SDM_SIDE_UNKNOWN;
-    if (wants_point || side == SDM_SIDE_UNKNOWN)
+    if (wants_point || side == SDM_SIDE_UNKNOWN) {
         (void)sdm_frame_closest(&s->frames[slot], x, q, &feature);
+        keep_in_box(s, d, q);
+    }
     if (side == SDM_SIDE_UNKNOWN ? sdm_sign_inside(job->sign, x, slot, q, feature)
                                  : side == SDM_SIDE_INSIDE)
         d = -d;

@@ -54,15 +54,15 @@ static void draw_points(const bench_points *b, bool near)
     const sdm_mesh *m = sdm_exact_surface(b->engine);
     const sdm_audit *box = &sdm_exact_get_report(b->engine)->audit;
     double diagonal = 0, area = 0, passed = 0;
-    for (int a = 0; a < 3; a++) diagonal += (box->max[a] - box->min[a]) * (box->max[a] - box->min[a]);
+    for (int a = 0; a < 3; a++)
+        diagonal += (box->max[a] - box->min[a]) * (box->max[a] - box->min[a]);
     for (size_t t = 0; t < m->n_tri; t++) area += triangle_area(m, t);
     diagonal = sqrt(diagonal);
     // the points near the surface pass from triangle to triangle in equal steps of area
     size_t t = 0;
     for (size_t i = 0; i < MOST; i++) {
         const double u = sdm_rng_uniform(SEED, i, 0), v = (1 - u) * sdm_rng_uniform(SEED, i, 1);
-        while (near && t + 1 < m->n_tri &&
-               passed + triangle_area(m, t) < area * (double)i / MOST)
+        while (near && t + 1 < m->n_tri && passed + triangle_area(m, t) < area * (double)i / MOST)
             passed += triangle_area(m, t++);
         for (size_t a = 0; a < 3; a++) {
             const double *p[3];

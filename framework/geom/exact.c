@@ -33,7 +33,7 @@ struct sdm_exact {
     sdm_sign sign;
     double rounding; // bound on the rounding error of the coordinates, mm
     sdm_point_aids *aids;
-    bool bounds;     // the surface bounds the solid: outside in front of it, inside behind it
+    bool bounds; // the surface bounds the solid: outside in front of it, inside behind it
 };
 
 const char *sdm_sign_method_name(sdm_sign_method m)

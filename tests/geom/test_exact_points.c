@@ -1,8 +1,8 @@
 /* Distances at many points on random meshes: the same bits as single points, in any order, for any
  * number of threads and every instruction set; compared with maps bit by bit, with brute force in
  * long double, and with signs by rays. Usage: test_exact_points [MESHES [FIRST]]
- * Tests: feature_side.c point_aids.c point_keys_avx2.c point_keys_generic.c point_order.c at_points.c
- * points_avx2.c points_avx512.c points_generic.c wide_tree.c */
+ * Tests: feature_side.c point_aids.c point_keys_avx2.c point_keys_generic.c point_order.c
+ * at_points.c points_avx2.c points_avx512.c points_generic.c wide_tree.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -37,11 +37,11 @@ static inline int sdm_in_region(const sdm_features *f, uint32_t number, const do
 }
 
 /* Squared distance (mm^2) from p to feature `number`; INFINITY if it is > most, where p does not
-   project into the face or the edge, or lies outside of the region of the edge or the corner. A feature whose region
-   does not hold p may be as near as the nearest one up to rounding (an edge and its end); since it
-   is left out here, the smallest distance over the features does not depend on how many of these
-   are compared. frames[slot]: the frames of the surface's triangles. The operations and their order
-   are those of distances4(), hence the same bits. */
+   project into the face or the edge, or lies outside of the region of the edge or the corner. A
+   feature whose region does not hold p may be as near as the nearest one up to rounding (an edge
+   and its end); since it is left out here, the smallest distance over the features does not depend
+   on how many of these are compared. frames[slot]: the frames of the surface's triangles. The
+   operations and their order are those of distances4(), hence the same bits. */
 static inline double sdm_feature_distance2(const sdm_features *f, const sdm_frame *frames,
                                            uint32_t number, const double p[3], double most)
 {

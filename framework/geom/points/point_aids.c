@@ -13,7 +13,7 @@
 enum { NOT_MADE, IN_WORK, READY };
 
 struct sdm_point_aids {
-    atomic_int state;   // IN_WORK forever if there is no memory
+    atomic_int state;    // IN_WORK forever if there is no memory
     atomic_size_t asked; // number of points so far
     int8_t *side;
     sdm_wide_node *wide;

@@ -11,9 +11,9 @@ typedef struct sdm_point_aids sdm_point_aids;
 sdm_status sdm_point_aids_create(sdm_point_aids **out, sdm_error *err);
 void sdm_point_aids_free(sdm_point_aids *a);
 
-/* The surface to be used for n further points: *surface with its members features.side (if `bounds`:
-   the surface bounds a solid) and features.wide, once they are made; else *surface itself: if few
-   points have been asked for, another thread is making them, or they do not fit into memory or
-   `limit` bytes (0: no limit). [any thread] */
+/* The surface to be used for n further points: *surface with its members features.side (if
+   `bounds`: the surface bounds a solid) and features.wide, once they are made; else *surface
+   itself: if few points have been asked for, another thread is making them, or they do not fit into
+   memory or `limit` bytes (0: no limit). [any thread] */
 const sdm_nearest *sdm_point_aids_use(sdm_point_aids *a, const sdm_nearest *surface, bool bounds,
                                       size_t limit, size_t n);

@@ -4,13 +4,17 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "report/generate_files.h"
 #include "report/json_values.h"
 #include "report/output.h"
+#include "report/points_table.h"
 #include "report/progress_bar.h"
 #include "report/terminal.h"
+#include "sdm/field.h"
 #include "sdm/image.h"
+#include "sdm/internal/block_border.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/config.h"
@@ -28,7 +32,12 @@ typedef struct job {
     sdm_param *params;
     double *rows; /* [n_rows][n_params] */
     size_t n_rows;
-    float *values;             /* [nz][ny][nx] mm */
+    sdm_grid grid;             /* of all maps */
+    bool own;                  /* the grid is that of the model */
+    bool banded;               /* bands suffice: only level sets are wanted */
+    double width;              /* of the bands, mm */
+    sdm_blocks band;           /* of the last row */
+    float *values;             /* [nz][ny][nx] mm; NULL: not needed yet */
     float *gradient;           /* [3][nz][ny][nx]; NULL: not wanted */
     float *jacobian;           /* [n_params][nz][ny][nx]; NULL: not wanted */
     double ms;                 /* total time of all maps */
@@ -51,6 +60,7 @@ static sdm_check_stat find_statistic(const cli_args *args)
 
 static void job_dispose(job *j)
 {
+    sdm_blocks_dispose(&j->band);
     sdm_free(j->jacobian);
     sdm_free(j->gradient);
     sdm_free(j->values);
@@ -103,12 +113,14 @@ static sdm_status read_rows(job *j, sdm_error *err)
     return s;
 }
 
-/* Creates the shape if --check, --max-error or --policy exact need it. */
+/* Creates the shape if --check, --max-error, --policy exact or --outside exact need it. */
 static sdm_status open_shape(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
     const bool checks = args->check || args->max_error > 0;
-    if (!checks && cli_policy(args) != SDM_RANGE_EXACT) return SDM_OK;
+    const bool exact =
+        cli_policy(args) == SDM_RANGE_EXACT || cli_outside(args) == SDM_OUTSIDE_EXACT;
+    if (!checks && !exact) return SDM_OK;
     sdm_status s = cli_open_registry(args, &j->registry, err);
     if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, err);
     return s && checks ? sdm_fail_in(err, s, "--%s needs the exact shape",
@@ -116,29 +128,56 @@ static sdm_status open_shape(job *j, sdm_error *err)
                        : s;
 }
 
+/* Chooses the grid. On another grid than the model's, level sets alone need no whole maps. */
+static sdm_status choose_grid(job *j, sdm_error *err)
+{
+    const cli_args *args = j->args;
+    const sdm_status s = cli_model_grid(args, &j->info->grid, &j->grid, &j->own, err);
+    if (s) return s;
+    const bool whole = j->own || args->check || args->max_error > 0 || args->gradient ||
+                       args->jacobian || cli_policy(args) == SDM_RANGE_EXACT;
+    j->banded = !whole && cli_blocks_suffice(args);
+    return j->banded ? cli_blocks_band(&j->grid, args, &j->width, err) : SDM_OK;
+}
+
+static sdm_status allocate_values(job *j, sdm_error *err)
+{
+    return sdm_alloc_unset((void **)&j->values, sdm_grid_count(&j->grid), sizeof *j->values,
+                           "distance map", err);
+}
+
 static sdm_status allocate_maps(job *j, sdm_error *err)
 {
-    const size_t n = sdm_grid_count(&j->info->grid);
+    const size_t n = sdm_grid_count(&j->grid);
     size_t count;
-    sdm_status s = SDM_ALLOC(&j->values, n, "distance map", err);
+    if (j->banded) return SDM_OK;
+    sdm_status s = allocate_values(j, err);
     if (!s && j->args->gradient) s = SDM_ALLOC(&j->gradient, 3 * n, "gradient", err);
     if (s || !j->args->jacobian) return s;
     s = sdm_mul(n, j->info->n_params, &count, err);
     return s ? s : SDM_ALLOC(&j->jacobian, count, "derivatives", err);
 }
 
+static sdm_status open_model(job *j, sdm_error *err)
+{
+    const sdm_status s = sdm_model_open(j->args->files.items[0], &j->model, err);
+    if (s) return s;
+    j->info = sdm_model_get_info(j->model);
+    return cli_model_params(j->info, &j->params, err);
+}
+
 /* Opens the model and checks everything before the first map is made. */
 static sdm_status prepare_job(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
+    if (args->columns)
+        return sdm_fail(err, SDM_E_ARG, "generate: --columns belongs to --points FILE");
     if (!args->outputs.n && !args->json && !args->gradient && !args->jacobian && !args->check)
         return sdm_fail(
             err, SDM_E_ARG,
             "generate: an output is needed: -o FILE, --gradient, --jacobian, --check or --json");
-    sdm_status s = sdm_model_open(args->files.items[0], &j->model, err);
-    if (s) return s;
-    j->info = sdm_model_get_info(j->model);
-    s = cli_model_params(j->info, &j->params, err);
+    sdm_status s = open_model(j, err);
+    if (!s) s = choose_grid(j, err);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
@@ -157,8 +196,9 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
     cli_add_params(j->params, j->info->n_params, j->rows + row * j->info->n_params, &params);
     sdm_status s =
         params.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the metadata") : SDM_OK;
-    const cli_map map = {.grid = &j->info->grid,
+    const cli_map map = {.grid = &j->grid,
                          .values = j->values,
+                         .blocks = j->band.tile ? &j->band : NULL,
                          .shape = j->info->shape,
                          .params = params.data,
                          .source = result->source,
@@ -175,7 +215,7 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
 
 static sdm_status write_row(const job *j, size_t row, const sdm_result *result, sdm_error *err)
 {
-    const sdm_grid *g = &j->info->grid;
+    const sdm_grid *g = &j->grid;
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1], nz = (size_t)g->n[2];
     cli_row_files files = {0};
     sdm_status s = cli_row_files_name(j->args, row + 1, &files, err);
@@ -229,6 +269,40 @@ static void notice_row(const job *j, size_t row, const sdm_result *r)
         printf("exact\n");
 }
 
+/* Computes the band at the parameters p; leaves it empty if it reaches the border of the grid,
+ * where only the whole map can be closed. */
+static sdm_status make_band(job *j, const double *p, const sdm_generate_opts *opts,
+                            sdm_result *result, sdm_error *err)
+{
+    sdm_blocks *b = &j->band;
+    sdm_blocks_dispose(b);
+    const sdm_status s = sdm_generate_band(j->model, p, opts, &j->grid, j->width, b, result, err);
+    if (s) return s;
+    if (!sdm_blocks_reach_border(b)) {
+        j->hash = sdm_crc64(j->hash, b->values, b->n_block * sizeof *b->values);
+        return SDM_OK;
+    }
+    sdm_blocks_dispose(b);
+    return j->values ? SDM_OK : allocate_values(j, err);
+}
+
+/* Computes the map or the band at the parameters p and adds it to the hash. */
+static sdm_status make_map(job *j, const double *p, const sdm_generate_opts *opts,
+                           sdm_result *result, sdm_error *err)
+{
+    const sdm_model *m = j->model;
+    sdm_status s = j->banded ? make_band(j, p, opts, result, err) : SDM_OK;
+    if (s || j->band.tile) return s;
+    if (!j->own)
+        s = sdm_generate_grid(m, p, opts, &j->grid, j->values, j->jacobian, result, err);
+    else if (j->jacobian)
+        s = sdm_generate_jacobian(m, p, opts, j->values, j->jacobian, result, err);
+    else
+        s = sdm_generate(m, p, opts, j->values, result, err);
+    if (!s) j->hash = sdm_crc64(j->hash, j->values, sdm_grid_count(&j->grid) * sizeof *j->values);
+    return s;
+}
+
 static sdm_status make_row(job *j, size_t row, sdm_error *err)
 {
     const cli_args *args = j->args;
@@ -241,14 +315,13 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
         .n_threads = (int)args->threads,
         .check = args->check,
         .max_error_mm = args->max_error,
-        .max_error_of = find_statistic(args)};
+        .max_error_of = find_statistic(args),
+        .outside = cli_outside(args)};
     // the map
     double *p = j->rows + row * j->info->n_params;
     sdm_result result = {0};
     const double start = sdm_clock();
-    const sdm_status s = j->jacobian ? sdm_generate_jacobian(j->model, p, &opts, j->values,
-                                                             j->jacobian, &result, err)
-                                     : sdm_generate(j->model, p, &opts, j->values, &result, err);
+    const sdm_status s = make_map(j, p, &opts, &result, err);
     if (s) return args->rows ? sdm_fail_in(err, s, "%s: row %zu", args->rows, row + 1) : s;
     j->ms += 1e3 * (sdm_clock() - start);
     // the metadata must hold the clamped parameters
@@ -258,7 +331,6 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
     j->n_exact += result.source == SDM_SOURCE_EXACT;
     j->n_exact_error += result.reason == SDM_REASON_ERROR;
     if (result.checked) add_check(j, &result.check);
-    j->hash = sdm_crc64(j->hash, j->values, sdm_grid_count(&j->info->grid) * sizeof *j->values);
     notice_row(j, row, &result);
     return write_row(j, row, &result, err);
 }
@@ -296,25 +368,93 @@ static sdm_status print_json(const job *j, sdm_error *err)
     if (j->shape && (j->args->check || j->args->max_error > 0)) add_check_json(j, &json);
     sdm_json_real(&json, "error_rmse_mm", j->info->accuracy.rmse_mm);
     sdm_json_text(&json, "values_crc64", hash);
-    cli_json_grid(&json, "grid", &j->info->grid, false);
+    cli_json_grid(&json, "grid", &j->grid, false);
     if (j->n_rows == 1) cli_json_params(&json, "parameters", j->params, j->info->n_params, j->rows);
     sdm_json_close(&json, '}');
     return cli_print_json(&json, err);
 }
 
+/* The points of --points and what the network says there. */
+typedef struct point_answers {
+    double *x; /* [n][3] */
+    size_t n;
+    float *values, *gradient, *slopes; /* [n], [n][3], [n][n_params]; NULL: not wanted */
+} point_answers;
+
+static sdm_status compute_points(job *j, point_answers *a, sdm_result *result, sdm_error *err)
+{
+    const sdm_generate_opts opts = {.policy = cli_policy(j->args),
+                                    .exact_shape = j->shape,
+                                    .n_threads = (int)j->args->threads,
+                                    .outside = cli_outside(j->args)};
+    size_t count;
+    sdm_status s = SDM_ALLOC(&a->values, a->n, "distances", err);
+    if (!s) s = SDM_ALLOC(&a->gradient, 3 * a->n, "gradients", err);
+    if (!s && j->args->jacobian) {
+        s = sdm_mul(a->n, j->info->n_params, &count, err);
+        if (!s) s = SDM_ALLOC(&a->slopes, count, "derivatives", err);
+    }
+    return s ? s
+             : sdm_generate_points(j->model, j->rows, &opts, a->x, a->n, a->values, a->gradient,
+                                   a->slopes, result, err);
+}
+
+static sdm_status write_points(const job *j, const point_answers *a, cli_points_table *t,
+                               sdm_error *err)
+{
+    sdm_status s = cli_points_allocate(t, a->n, err);
+    for (size_t i = 0; i < a->n && !s && t->at.distance; i++)
+        t->at.distance[i] = (double)a->values[i];
+    for (size_t i = 0; i < 3 * a->n && !s && t->at.gradient; i++)
+        t->at.gradient[i] = (double)a->gradient[i];
+    if (!s) s = cli_points_write(t, j->args, err);
+    if (!s && a->slopes)
+        s = sdm_npy_write(j->args->jacobian, a->slopes, (const size_t[]){a->n, j->info->n_params},
+                          2, err);
+    return s;
+}
+
+/* Does the work of --points. */
+static sdm_status run_points(job *j, sdm_error *err)
+{
+    cli_points_table table = {.n = 0};
+    point_answers a = {.n = 0};
+    sdm_result result = {0};
+    sdm_status s = cli_points_check_model(j->args, &table, err);
+    if (!s) s = open_model(j, err);
+    if (!s) s = read_rows(j, err);
+    if (!s) s = open_shape(j, err);
+    if (!s) s = check_rows(j, err);
+    if (!s) s = cli_read_points(j->args->points, &a.x, &a.n, err);
+    if (!s) s = compute_points(j, &a, &result, err);
+    if (!s) notice_row(j, 0, &result);
+    if (!s) s = write_points(j, &a, &table, err);
+    cli_points_dispose(&table);
+    sdm_free(a.slopes);
+    sdm_free(a.gradient);
+    sdm_free(a.values);
+    sdm_free(a.x);
+    return s;
+}
+
+static sdm_status run_maps(job *j, sdm_error *err)
+{
+    cli_progress progress;
+    sdm_status s = prepare_job(j, err);
+    cli_progress_start(&progress);
+    for (size_t i = 0; i < j->n_rows && !s; i++) {
+        s = make_row(j, i, err);
+        if (!s && i + 1 < j->n_rows) s = cli_check_interrupt(err);
+        cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j->n_rows, NULL);
+    }
+    cli_progress_clear(&progress);
+    return !s && j->args->json ? print_json(j, err) : s;
+}
+
 sdm_status cmd_generate(const cli_args *args, sdm_error *err)
 {
     job j = {.args = args};
-    cli_progress progress;
-    sdm_status s = prepare_job(&j, err);
-    cli_progress_start(&progress);
-    for (size_t i = 0; i < j.n_rows && !s; i++) {
-        s = make_row(&j, i, err);
-        if (!s && i + 1 < j.n_rows) s = cli_check_interrupt(err);
-        cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j.n_rows, NULL);
-    }
-    cli_progress_clear(&progress);
-    if (!s && args->json) s = print_json(&j, err);
+    const sdm_status s = args->points ? run_points(&j, err) : run_maps(&j, err);
     job_dispose(&j);
     return s;
 }

@@ -22,7 +22,18 @@ typedef struct entrant {
     bool finished; /* false: the shape does not allow this kind */
     sdm_accuracy accuracy;
     double seconds;
+    trainer run; /* its trial; run.kind is NULL without one */
 } entrant;
+
+static void entrant_dispose(entrant *e)
+{
+    if (!e->run.kind) return;
+    e->run.kind->dispose(&e->run);
+    trainer_dataset_dispose(&e->run.data);
+    sdm_free(e->run.blocks);
+    e->run.blocks = NULL;
+    e->run.kind = NULL;
+}
 
 /* The configuration of a trial: a few maps, no optimiser steps. */
 static void trial_config(const sdm_config *from, size_t n_params, sdm_network_kind kind,
@@ -51,42 +62,41 @@ static void trial_config(const sdm_config *from, size_t n_params, sdm_network_ki
 
 static bool trial_cancelled(void *user) { return trainer_cancelled(user); }
 
-/* Trains and measures one entrant. */
+/* Trains and measures one entrant. Keeps its design and its maps. */
 static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_error *err)
 {
     sdm_text metrics = {0};
-    trainer r = {.config = config,
-                 .shape = t->shape,
-                 .kind = trainer_kind_find(e->kind),
-                 .hooks = {.cancelled = t->hooks.cancelled, .user = t->hooks.user},
-                 .n_threads = t->n_threads,
-                 .started = sdm_clock(),
-                 .loss = NAN,
-                 .heldout_mse = NAN,
-                 .evaluated_step = -1,
-                 .metrics = &metrics};
-    const fill_hooks hooks = {.cancelled = trial_cancelled, .user = &r};
+    trainer *r = &e->run;
+    *r = (trainer){.config = config,
+                   .shape = t->shape,
+                   .kind = trainer_kind_find(e->kind),
+                   .hooks = {.cancelled = t->hooks.cancelled, .user = t->hooks.user},
+                   .n_threads = t->n_threads,
+                   .started = sdm_clock(),
+                   .loss = NAN,
+                   .heldout_mse = NAN,
+                   .evaluated_step = -1,
+                   .metrics = &metrics};
+    const fill_hooks hooks = {.cancelled = trial_cancelled, .user = r};
     sdm_error reason = {0};
-    sdm_status s = trainer_set_up(&r, &reason);
+    sdm_status s = trainer_set_up(r, &reason);
     if (s == SDM_E_UNSUPPORTED && e->kind != SDM_NETWORK_POD) {
         trainer_message(t, "auto: %s is left out: %s", e->name, reason.text);
         s = SDM_OK;
     } else {
         if (s && err) *err = reason;
-        if (!s) s = trainer_dataset_fill(&r.data, r.n_threads, &hooks, err);
-        if (!s) s = trainer_check_grid(&r, err);
-        if (!s) s = r.kind->begin(&r, err);
+        if (!s) s = trainer_dataset_fill(&r->data, r->n_threads, &hooks, err);
+        if (!s) s = trainer_check_grid(r, err);
+        if (!s) s = r->kind->begin(r, err);
         if (!s) {
-            trainer_enter(&r, SDM_PHASE_MODE_FIT);
-            s = r.kind->run(&r, false, err);
+            trainer_enter(r, SDM_PHASE_MODE_FIT);
+            s = r->kind->run(r, false, err);
         }
-        if (!s) s = trainer_export_measure(&r, &e->accuracy, err);
+        if (!s) s = trainer_export_measure(r, &e->accuracy, err);
         e->finished = !s;
     }
-    e->seconds = trainer_seconds(&r);
-    r.kind->dispose(&r);
-    trainer_dataset_dispose(&r.data);
-    sdm_free(r.blocks);
+    e->seconds = trainer_seconds(r);
+    r->metrics = NULL;
     sdm_text_dispose(&metrics);
     return s;
 }
@@ -120,6 +130,15 @@ static sdm_status add_record(const trainer *t, const entrant *e, size_t n, const
     return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : SDM_OK;
 }
 
+/* Hands the design and the maps of the entrant on to the training. */
+static void hand_on(entrant *e, trainer *t)
+{
+    t->design = e->run.design;
+    t->tried = e->run.data;
+    e->run.design = NULL;
+    e->run.data = (dataset){0};
+}
+
 sdm_status trainer_race(trainer *t, sdm_config *out, sdm_error *err)
 {
     // with an error this small near the surface, in units of the voxel, no other kind is tried
@@ -129,7 +148,7 @@ sdm_status trainer_race(trainer *t, sdm_config *out, sdm_error *err)
     const size_t n = sizeof e / sizeof *e;
     size_t n_params;
     sdm_instance_params(t->shape, &n_params);
-    const entrant *best = NULL;
+    entrant *best = NULL;
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < n && !s; i++) {
         if (i + 1 == n && !best) {
@@ -138,18 +157,28 @@ sdm_status trainer_race(trainer *t, sdm_config *out, sdm_error *err)
         }
         trial_config(t->config, n_params, e[i].kind, out);
         s = trial(t, out, &e[i], err);
-        if (s || !e[i].finished) continue;
+        if (s || !e[i].finished) {
+            entrant_dispose(&e[i]);
+            continue;
+        }
         trainer_message(t,
                         "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere (trial on "
                         "%lld maps, %.0f s)",
                         e[i].name, e[i].accuracy.rmse_near_mm, e[i].accuracy.rmse_mm,
                         (long long)out->data.start, e[i].seconds);
-        if (!best || merit(&e[i].accuracy) < merit(&best->accuracy)) best = &e[i];
+        const bool better = !best || merit(&e[i].accuracy) < merit(&best->accuracy);
+        entrant *worse = better ? best : &e[i];
+        if (better) best = &e[i];
+        if (worse) entrant_dispose(worse);
         if (merit(&best->accuracy) < enough) break;
     }
-    if (s) return s;
-    *out = *t->config;
-    sdm_config_choose_kind(out, best->kind);
-    trainer_message(t, "auto: network.kind is %s", best->name);
-    return add_record(t, e, n, best, err);
+    if (!s) {
+        *out = *t->config;
+        sdm_config_choose_kind(out, best->kind);
+        trainer_message(t, "auto: network.kind is %s", best->name);
+        s = add_record(t, e, n, best, err);
+        if (!s && best->finished) hand_on(best, t);
+    }
+    for (size_t i = 0; i < n; i++) entrant_dispose(&e[i]);
+    return s;
 }

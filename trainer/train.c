@@ -39,7 +39,10 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
                               .user = t};
     t->phase = SDM_PHASE_DATA;
     trainer_pace_start(t, 1);
+    t->data.known = t->tried.n_voxels ? &t->tried : NULL;
     const sdm_status s = trainer_dataset_fill(&t->data, t->n_threads, &hooks, err);
+    t->data.known = NULL;
+    trainer_dataset_dispose(&t->tried);
     if (s) return s;
     if (t->data.n_start < start)
         trainer_message(t,
@@ -177,6 +180,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     if (!s) s = sdm_team_start(t.n_threads, &team, err);
     if (!s) s = train_settle(&t, config, resume, settled, err);
     if (s) {
+        trainer_dataset_dispose(&t.tried);
         sdm_team_end(team);
         sdm_free(settled);
         sdm_text_dispose(&metrics);
@@ -194,6 +198,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     if (s) sdm_folder_remove_empty(folder, existing);
     t.kind->dispose(&t);
     trainer_dataset_dispose(&t.data);
+    trainer_dataset_dispose(&t.tried);
     sdm_free(t.blocks);
     sdm_text_dispose(&metrics);
     sdm_team_end(team);

@@ -90,6 +90,7 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
                        : o->kind == CLI_REAL2 ? "two numbers X,Y"
                        : o->kind == CLI_REAL3 ? "three numbers X,Y,Z"
                        : o->kind == CLI_REAL6 ? "six numbers"
+                       : o->kind == CLI_REAL9 ? "nine numbers"
                                               : "one number or three";
     char low[32], high[32];
     return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s in %s .. %s", o->name, value, form,
@@ -97,15 +98,15 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
 }
 
 /* Splits the text at commas. Returns the number of values in out; 0 when a part is not a number or
- * there are more than 6 parts. */
-static size_t split_numbers(const char *text, bool whole, double out[6])
+ * there are more than 9 parts. */
+static size_t split_numbers(const char *text, bool whole, double out[9])
 {
     size_t n = 0;
     for (const char *at = text; at; n++) {
         const char *comma = strchr(at, ',');
         const size_t length = comma ? (size_t)(comma - at) : strlen(at);
         char word[64];
-        if (n == 6 || length >= sizeof word) return 0;
+        if (n == 9 || length >= sizeof word) return 0;
         memcpy(word, at, length);
         word[length] = '\0';
         int64_t integer = 0;
@@ -119,9 +120,12 @@ static size_t split_numbers(const char *text, bool whole, double out[6])
 /* The value of a CLI_INT3 or CLI_REAL* option other than CLI_REAL. */
 static sdm_status store_vector(const cli_option *o, const char *value, void *field, sdm_error *err)
 {
-    double v[6];
+    double v[9];
     const size_t n = split_numbers(value, o->kind == CLI_INT3, v);
-    const size_t wanted = o->kind == CLI_REAL2 ? 2 : o->kind == CLI_REAL6 ? 6 : 3;
+    const size_t wanted = o->kind == CLI_REAL2   ? 2
+                          : o->kind == CLI_REAL6 ? 6
+                          : o->kind == CLI_REAL9 ? 9
+                                                 : 3;
     if (n != wanted && !(n == 1 && o->kind == CLI_REAL13)) return bad_value(o, value, err);
     for (size_t i = 0; i < wanted; i++) {
         const double x = n == 1 ? v[0] : v[i];
@@ -249,6 +253,8 @@ static void set_defaults(cli_args *args)
     args->samples = -1;
     args->naive = 2;
     args->origin[0] = args->origin[1] = args->origin[2] = NAN;
+    args->direction[0] = NAN;
+    args->outside = "refuse";
     args->max_mse = INFINITY;
     args->policy = "refuse";
     args->method = "exact";

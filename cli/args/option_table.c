@@ -88,7 +88,8 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "listed.\n"
      "points: time per point of exact distances in batches, one by one and by brute force.\n"
      "network: one map, a batch and derivatives of a model on one core, compared with the\n"
-     "exact engine if the shape is known and its data files exist.\n"
+     "exact engine if the shape is known and its data files exist; with --size also a map and\n"
+     "a band on that grid, and points.\n"
      "A time is the fastest of several runs.",
      "sdmgen bench exact", 1, 2},
     {"experiment", "CONFIG [key=value ...]",
@@ -158,6 +159,19 @@ const cli_option cli_options[] = {
     {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12,
      ON(CLI_EXACT) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(origin),
      "centre of the first voxel, LPS mm; default: the grid is centred on the mesh"},
+    {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576, ON(CLI_GENERATE), AT(size),
+     "voxels along x, y, z (default: the grid fills the box of the model's voxel centres)"},
+    {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_GENERATE), AT(spacing),
+     "voxel edge, one number or one per axis (default: the model's; with --size the smallest one "
+     "with which the grid covers the model's box)"},
+    {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_GENERATE), AT(origin),
+     "centre of the first voxel, LPS mm; default: the grid has the centre of the model's"},
+    {"direction", 0, CLI_REAL9, "XX,XY,...", NULL, -1, 1, ON(CLI_GENERATE), AT(direction),
+     "axes of the grid: orthonormal matrix, row by row, whose columns are the axes (default: the "
+     "model's)"},
+    {"outside", 0, CLI_CHOICE, NULL, "refuse|bound|exact", 0, 0, ON(CLI_GENERATE), AT(outside),
+     "voxels outside the box of the model's voxel centres: refuse (default), a lower bound of the "
+     "distance, or the exact distance"},
 
     /* the method */
     {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(spacing),
@@ -181,11 +195,13 @@ const cli_option cli_options[] = {
      "exact: the engine (default); naive: every triangle for every voxel, also triangles inside "
      "the union; cells: uniform cells of triangles (exact); octree: adaptive samples, error at "
      "most --tolerance; edt: distance transform, prints the bound on its error"},
-    {"points", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT), AT(points),
+    {"points", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(points),
      "distances at the points of a file instead of a map: .csv (x,y,z), .npy ([n][3]) or the "
      "vertices of .ply .stl .obj .off, LPS mm; -o FILE.csv or FILE.npy (float64), one row a point"},
     {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_EXACT), AT(columns),
      "columns for --points: distance,gradient,closest,triangle (default distance)"},
+    {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_GENERATE), AT(columns),
+     "columns for --points: distance,gradient (default distance)"},
     {"narrow", 0, CLI_REAL, "N", NULL, 0.5, 1e6, ON(CLI_EXACT), AT(narrow),
      "narrow band: clamp distances to N voxels (of the smallest edge), which is faster"},
     {"tolerance", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT), AT(tolerance),
@@ -222,7 +238,7 @@ const cli_option cli_options[] = {
     {"jacobian", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT),
      AT(jacobian),
      "also write the derivatives by the shape's parameters: float32 [parameter][z][y][x], mm per "
-     "unit"},
+     "unit (generate --points: [point][parameter])"},
     {"audit", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH), AT(audit),
      "check the mesh and print its properties, defects and parts"},
     {"turn-parts", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH) | ON(CLI_EXACT), AT(turn_parts),

@@ -31,6 +31,7 @@ typedef enum cli_kind {
     CLI_REAL2,  /* double[2], comma separated */
     CLI_REAL3,  /* double[3], comma separated */
     CLI_REAL6,  /* double[6], comma separated */
+    CLI_REAL9,  /* double[9], comma separated */
     CLI_REAL13  /* double[3], comma separated; a single number fills all three */
 } cli_kind;
 
@@ -116,7 +117,7 @@ struct cli_args {
     bool keep_overlap, certify;      /* exact */
     bool audit;                      /* mesh */
     bool turn_parts;                 /* mesh, exact */
-    const char *points, *columns;    /* exact: file of points; columns of the answers */
+    const char *points, *columns;    /* generate, exact: file of points, columns */
     double narrow;                   /* exact: voxels; 0: option missing */
     double tolerance;                /* exact: mm; 0: option missing */
     bool dump;                       /* config */
@@ -139,6 +140,8 @@ struct cli_args {
     double band;                     /* voxels; 0: option missing */
     double max_mse;                  /* eval: mm^2 */
     double spacing[3], origin[3];    /* mm */
+    double direction[9];             /* generate; direction[0] NaN: option missing */
+    const char *outside;             /* generate */
     int64_t size[3];                 /* voxels */
     int64_t samples;                 /* eval, verify, shapes */
     int64_t naive;                   /* eval */

@@ -141,6 +141,13 @@ sdm_range_policy cli_policy(const cli_args *args)
                                             : SDM_RANGE_REFUSE;
 }
 
+sdm_outside cli_outside(const cli_args *args)
+{
+    return !strcmp(args->outside, "bound")   ? SDM_OUTSIDE_BOUND
+           : !strcmp(args->outside, "exact") ? SDM_OUTSIDE_EXACT
+                                             : SDM_OUTSIDE_REFUSE;
+}
+
 /* ---- parameters ---- */
 
 /* Like sdm_parse_real(), but accepts NaN and infinities, also as the result of an overflow. */

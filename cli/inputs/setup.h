@@ -47,6 +47,9 @@ sdm_status cli_model_params(const sdm_model_info *info, sdm_param **out, sdm_err
 /* The value of --policy. */
 sdm_range_policy cli_policy(const cli_args *args);
 
+/* The value of --outside. */
+sdm_outside cli_outside(const cli_args *args);
+
 /* values[n] = the defaults, overridden by the "name=value" arguments of -p. SDM_E_ARG: an unknown
  * or repeated name, or not a number. NaN and infinities pass: the range check that follows rejects
  * them with the name of the parameter. */
@@ -75,6 +78,14 @@ void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm
  * without --size and --spacing it has 64 voxels along that edge, margins included. SDM_E_ARG. */
 sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const double max[3],
                             sdm_grid *out, sdm_error *err);
+
+/* *out = the grid of --size, --spacing, --origin and --direction for maps of a model. Without
+ * --size it fills the box of the voxel centres of the model's grid; without --spacing it is that of
+ * the model, or with --size the smallest uniform one with which the grid covers the box; without
+ * --origin the grid has the centre of the box; without --direction the axes are the model's. *own:
+ * no option is given, the grid is that of the model. SDM_E_ARG. */
+sdm_status cli_model_grid(const cli_args *args, const sdm_grid *model, sdm_grid *out, bool *own,
+                          sdm_error *err);
 
 /* As sdm_mesh_read(), but returns SDM_E_FORMAT instead of SDM_E_UNSUPPORTED for an unknown type of
  * file. */

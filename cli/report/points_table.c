@@ -1,4 +1,4 @@
-/* Writes exact distances, gradients, nearest points and triangles at points. */
+/* Writes distances, gradients, nearest points and triangles at points. */
 #include "points_table.h"
 
 #include <math.h>
@@ -37,16 +37,32 @@ static sdm_status add_column(cli_points_table *t, const char *word, size_t lengt
                     (int)(length < 60 ? length : 60), word);
 }
 
-sdm_status cli_points_check(const cli_args *args, cli_points_table *t, sdm_error *err)
+/* Fills the columns of --columns. */
+static sdm_status read_columns(const cli_args *args, cli_points_table *t, sdm_error *err)
 {
-    const char *list = args->columns ? args->columns : "distance";
     sdm_status s = SDM_OK;
-    for (const char *word = list; !s;) {
+    for (const char *word = args->columns ? args->columns : "distance"; !s;) {
         const size_t length = strcspn(word, ",");
         s = add_column(t, word, length, err);
         if (!word[length]) break;
         word += length + 1;
     }
+    return s;
+}
+
+static sdm_status check_outputs(const cli_args *args, sdm_error *err)
+{
+    for (size_t i = 0; i < args->outputs.n; i++)
+        if (!cli_ends_with_any(args->outputs.items[i], ".csv .npy"))
+            return sdm_fail(err, SDM_E_ARG,
+                            "output '%s': with --points its name must end in .csv or .npy",
+                            args->outputs.items[i]);
+    return cli_check_files(args, NULL, err);
+}
+
+sdm_status cli_points_check(const cli_args *args, cli_points_table *t, sdm_error *err)
+{
+    const sdm_status s = read_columns(args, t, err);
     if (s) return s;
     if (args->outputs.n == 0)
         return sdm_fail(err, SDM_E_ARG, "exact --points: an output is needed: -o FILE.csv or .npy");
@@ -57,12 +73,7 @@ sdm_status cli_points_check(const cli_args *args, cli_points_table *t, sdm_error
                         "exact --points: options of maps (--size, --spacing, --origin, --method, "
                         "--narrow, --certify, --json, --closest, --normal, --triangle, --jacobian) "
                         "do not apply; use --columns");
-    for (size_t i = 0; i < args->outputs.n; i++)
-        if (!cli_ends_with_any(args->outputs.items[i], ".csv .npy"))
-            return sdm_fail(err, SDM_E_ARG,
-                            "output '%s': with --points its name must end in .csv or .npy",
-                            args->outputs.items[i]);
-    return cli_check_files(args, NULL, err);
+    return check_outputs(args, err);
 }
 
 static bool has_column(const cli_points_table *t, int kind)
@@ -70,6 +81,29 @@ static bool has_column(const cli_points_table *t, int kind)
     for (int i = 0; i < t->n_columns; i++)
         if (t->column[i] == kind) return true;
     return false;
+}
+
+sdm_status cli_points_check_model(const cli_args *args, cli_points_table *t, sdm_error *err)
+{
+    const sdm_status s = read_columns(args, t, err);
+    if (s) return s;
+    if (has_column(t, CLOSEST) || has_column(t, TRIANGLE))
+        return sdm_fail(err, SDM_E_ARG,
+                        "generate --columns: a network knows distance and gradient only");
+    if (args->outputs.n == 0 && !args->jacobian)
+        return sdm_fail(err, SDM_E_ARG,
+                        "generate --points: an output is needed: -o FILE.csv or .npy, --jacobian");
+    if (args->rows || args->check || args->max_error > 0 || args->gradient || args->json ||
+        args->size[0] > 0 || args->spacing[0] > 0 || !isnan(args->origin[0]) ||
+        !isnan(args->direction[0]))
+        return sdm_fail(err, SDM_E_ARG,
+                        "generate --points: options of maps (--size, --spacing, --origin, "
+                        "--direction, --params, --check, --max-error, --gradient, --json) do not "
+                        "apply; use --columns");
+    if (args->jacobian && !cli_ends_with(args->jacobian, ".npy"))
+        return sdm_fail(err, SDM_E_ARG, "--jacobian '%s': its name must end in .npy",
+                        args->jacobian);
+    return check_outputs(args, err);
 }
 
 sdm_status cli_points_allocate(cli_points_table *t, size_t n, sdm_error *err)

@@ -1,4 +1,4 @@
-/* Exact answers at points: the columns of --columns, and the output file. */
+/* Answers at points: the columns of --columns, and the output file. */
 #pragma once
 
 #include "args/options.h"
@@ -15,6 +15,9 @@ typedef struct cli_points_table {
 /* Checks --columns, the outputs and other options of `exact --points`, and fills the columns.
  * SDM_E_ARG. */
 sdm_status cli_points_check(const cli_args *args, cli_points_table *t, sdm_error *err);
+
+/* The same for `generate --points`, whose columns are distance and gradient. */
+sdm_status cli_points_check_model(const cli_args *args, cli_points_table *t, sdm_error *err);
 
 /* Allocates the arrays of t->at for n points. cli_points_dispose() frees them. SDM_E_NOMEM. */
 sdm_status cli_points_allocate(cli_points_table *t, size_t n, sdm_error *err);

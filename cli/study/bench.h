@@ -4,6 +4,7 @@
 
 #include "args/options.h"
 #include "sdm/exact.h"
+#include "sdm/model.h"
 
 /* The mesh and the grid of a benchmark, with the exact map as the reference. */
 typedef struct cli_bench_case {
@@ -85,6 +86,19 @@ void cli_bench_compare(const cli_bench_case *c, const float *values, cli_bench_r
  * exceeds `start`, MiB; NaN: unknown. */
 long cli_bench_peak_start(void);
 double cli_bench_peak_mb(long start);
+
+/* Times of a model as a field (sdm/field.h) on one core: new parameters; a map and a band of 3
+ * voxels on a grid, points with gradient in a batch and one by one, all without the time of new
+ * parameters. */
+typedef struct cli_field_times {
+    sdm_grid grid;
+    double ms_params, ms_map, ms_band, us_point, us_single;
+    size_t blocks; /* of the band */
+} cli_field_times;
+
+/* Measures a model on the grid of --size. */
+sdm_status cli_bench_field(const sdm_model *m, const cli_args *args, uint64_t seed,
+                           cli_field_times *t, sdm_error *err);
 
 /* `sdmgen bench network MODEL`: measures one map, batches, derivatives and threads, compares them
  * with the arithmetic and memory speed of the machine, and prints the result. */

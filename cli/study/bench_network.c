@@ -8,6 +8,7 @@
 #include "bench.h"
 #include "evaluate.h"
 #include "inputs/setup.h"
+#include "report/json_values.h"
 #include "report/terminal.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/config.h"
@@ -27,6 +28,8 @@ typedef struct network_times {
     double peak_gmacs;  /* 10^9 multiply-adds per second of the matrix product on one core */
     double read_gbs;    /* GB/s of one core reading a block of the size of the weights repeatedly */
     sdm_error no_exact; /* why the exact engine was not timed */
+    bool has_field;     /* --size was given */
+    cli_field_times field;
 } network_times;
 
 /* A model with all memory that its derivatives need, allocated beforehand so that allocation is not
@@ -163,6 +166,19 @@ static void print_row(const char *name, double ms, double one, const char *note)
     printf("  %-26s %9.3f ms  %7.2f x one map%s%s\n", name, ms, ms / one, *note ? "   " : "", note);
 }
 
+static void print_field(const cli_field_times *t, double one)
+{
+    char name[80], note[80];
+    print_row("field: new parameters", t->ms_params, one, "");
+    snprintf(name, sizeof name, "map of %lld x %lld x %lld", (long long)t->grid.n[0],
+             (long long)t->grid.n[1], (long long)t->grid.n[2]);
+    print_row(name, t->ms_map, one, "");
+    snprintf(note, sizeof note, "%zu blocks of 8 x 8 x 8 voxels", t->blocks);
+    print_row("band of 3 voxels", t->ms_band, one, note);
+    printf("  %-26s %9.3f us\n  %-26s %9.3f us\n", "point of 100000, gradient", t->us_point,
+           "one point, gradient", t->us_single);
+}
+
 static void print_times(const network_times *t, const sdm_model_info *info)
 {
     const double one = t->maps.ms_network;
@@ -195,9 +211,21 @@ static void print_times(const network_times *t, const sdm_model_info *info)
         print_row("exact engine", t->maps.ms_exact, one, "");
     else
         printf("  %-26s not measured: %s\n", "exact engine", t->no_exact.text);
+    if (t->has_field) print_field(&t->field, one);
     printf("\nThe fastest of several runs, on one core unless stated otherwise. Peak: the matrix "
            "product, %.1f GMAC/s; reading: %.1f GB/s.\n",
            t->peak_gmacs, t->read_gbs);
+}
+
+static void add_field_json(const cli_field_times *t, sdm_json *j)
+{
+    cli_json_grid(j, "field_grid", &t->grid, false);
+    sdm_json_real(j, "ms_field_params", t->ms_params);
+    sdm_json_real(j, "ms_field_map", t->ms_map);
+    sdm_json_real(j, "ms_field_band", t->ms_band);
+    sdm_json_int(j, "field_band_blocks", (int64_t)t->blocks);
+    sdm_json_real(j, "us_field_point", t->us_point);
+    sdm_json_real(j, "us_field_single_point", t->us_single);
 }
 
 static sdm_status print_json(const network_times *t, const sdm_model_info *info, sdm_error *err)
@@ -228,6 +256,7 @@ static sdm_status print_json(const network_times *t, const sdm_model_info *info,
     sdm_json_real(&j, "ms_exact", t->maps.ms_exact);
     sdm_json_text(&j, "no_exact", t->no_exact.text);
     sdm_json_real(&j, "exact_over_network", t->maps.ms_exact / t->maps.ms_network);
+    if (t->has_field) add_field_json(&t->field, &j);
     sdm_json_close(&j, '}');
     return cli_print_json(&j, err);
 }
@@ -261,6 +290,8 @@ sdm_status cli_bench_network(const cli_args *args, sdm_error *err)
     if (!s) s = cli_time_maps(model, shape, seed, true, 0, &t.maps, err);
     if (!s) s = time_derivatives(model, seed, &t, err);
     if (!s) s = time_threads(model, seed, sdm_threads((int)args->threads), &t, err);
+    t.has_field = args->size[0] > 0;
+    if (!s && t.has_field) s = cli_bench_field(model, args, seed, &t.field, err);
     if (!s) s = measure_machine(info->weight_bytes, &t, err);
     if (!s && args->json)
         s = print_json(&t, info, err);

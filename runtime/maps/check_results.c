@@ -10,8 +10,8 @@ static bool error_too_large(const sdm_generate_opts *o, const sdm_check *c)
     return o->max_error_mm > 0 && !(sdm_check_get(c, o->max_error_of) <= o->max_error_mm);
 }
 
-/* Checks one map. The same mesh and engine serve the check and, if needed, the exact map. */
-static sdm_status check_one(const sdm_grid *grid, const double *p, const sdm_generate_opts *o,
+/* The same mesh and engine serve the check and, if needed, the exact map. */
+sdm_status sdm_check_result(const sdm_grid *grid, const double *p, const sdm_generate_opts *o,
                             int n_threads, float *values, sdm_result *result, sdm_error *err)
 {
     sdm_mesh mesh = {0};
@@ -69,8 +69,8 @@ sdm_status sdm_check_results(const sdm_model *m, const double *used, size_t n,
     for (size_t i = 0; i < n; i++) {
         if (results[i].source != SDM_SOURCE_NETWORK) continue;
         sdm_error e;
-        const sdm_status s = check_one(&info->grid, used + i * info->n_params, o, inner,
-                                       values + i * voxels, &results[i], &e);
+        const sdm_status s = sdm_check_result(&info->grid, used + i * info->n_params, o, inner,
+                                              values + i * voxels, &results[i], &e);
         if (s) {
 #pragma omp critical(sdm_check_results)
             first_error_keep(&first, i, s, &e);

@@ -16,3 +16,8 @@ static inline bool sdm_wants_check(const sdm_generate_opts *o)
 sdm_status sdm_check_results(const sdm_model *m, const double *used, size_t n,
                              const sdm_generate_opts *o, float *values, sdm_result *results,
                              sdm_error *err);
+
+/* Checks values[nz][ny][nx], a map by the network on `grid` at the parameters p, and completes
+ *result; otherwise as sdm_check_results(). */
+sdm_status sdm_check_result(const sdm_grid *grid, const double *p, const sdm_generate_opts *o,
+                            int n_threads, float *values, sdm_result *result, sdm_error *err);

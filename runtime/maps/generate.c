@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "check_results.h"
+#include "generate_parts.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/model_threads.h"
 #include "sdm/internal/text.h"
@@ -32,13 +33,10 @@ static int sharing_threads(const sdm_model *m, int wanted)
     return thread_count(wanted, (size_t)max);
 }
 
-static sdm_generate_opts options_or_default(const sdm_generate_opts *opts)
+sdm_status sdm_generate_check_options(const sdm_model *m, const sdm_generate_opts *opts,
+                                      sdm_generate_opts *o, sdm_error *err)
 {
-    return opts ? *opts : (sdm_generate_opts){.policy = SDM_RANGE_REFUSE};
-}
-
-static sdm_status check_options(const sdm_model *m, const sdm_generate_opts *o, sdm_error *err)
-{
+    *o = opts ? *opts : (sdm_generate_opts){.policy = SDM_RANGE_REFUSE};
     if (o->n_threads < 0)
         return sdm_fail(err, SDM_E_ARG, "%d threads, need 0 (all) or more", o->n_threads);
     if (o->policy != SDM_RANGE_REFUSE && o->policy != SDM_RANGE_CLAMP &&
@@ -50,10 +48,13 @@ static sdm_status check_options(const sdm_model *m, const sdm_generate_opts *o, 
                         o->max_error_mm);
     if ((unsigned)o->max_error_of > SDM_CHECK_MEAN)
         return sdm_fail(err, SDM_E_ARG, "figure %d of a check is unknown", (int)o->max_error_of);
-    if (o->policy != SDM_RANGE_EXACT && !sdm_wants_check(o)) return SDM_OK;
+    if ((unsigned)o->outside > SDM_OUTSIDE_EXACT)
+        return sdm_fail(err, SDM_E_ARG, "option %d for points outside is unknown", (int)o->outside);
+    const bool exact = o->policy == SDM_RANGE_EXACT || o->outside == SDM_OUTSIDE_EXACT;
+    if (!exact && !sdm_wants_check(o)) return SDM_OK;
     if (!o->exact_shape)
         return sdm_fail(err, SDM_E_ARG, "%s an instance of the shape (sdm_runtime_instance())",
-                        o->policy == SDM_RANGE_EXACT ? "the exact policy needs" : "checks need");
+                        exact ? "the exact policy needs" : "checks need");
     size_t n;
     sdm_instance_params(o->exact_shape, &n);
     const sdm_model_info *info = sdm_model_get_info(m);
@@ -72,10 +73,9 @@ static sdm_status refuse_param(const sdm_model_param *p, double value, sdm_error
                        "outside the trained range (see the policies clamp, exact)");
 }
 
-/* Checks params[n_params]. used[n_params] (may be NULL) = parameters for the network: clamped to
-   the trained range. *result = how the map is to be computed. */
-static sdm_status check_params(const sdm_model *m, const double *params, const sdm_generate_opts *o,
-                               double *used, sdm_result *result, sdm_error *err)
+sdm_status sdm_generate_check_params(const sdm_model *m, const double *params,
+                                     const sdm_generate_opts *o, double *used, sdm_result *result,
+                                     sdm_error *err)
 {
     const sdm_model_info *info = sdm_model_get_info(m);
     *result = (sdm_result){.source = SDM_SOURCE_NETWORK, .error_mm = info->accuracy.rmse_mm};
@@ -155,7 +155,8 @@ static sdm_status generate_all(const sdm_model *m, const double *params, size_t 
     const size_t p = info->n_params, voxels = sdm_grid_count(&info->grid);
     bool network = false;
     for (size_t i = 0; i < n; i++) {
-        const sdm_status s = check_params(m, params + i * p, o, used + i * p, &results[i], err);
+        const sdm_status s =
+            sdm_generate_check_params(m, params + i * p, o, used + i * p, &results[i], err);
         if (s) return fail_in_map(s, n, i, err);
         network = network || results[i].source == SDM_SOURCE_NETWORK;
     }
@@ -177,8 +178,8 @@ sdm_status sdm_generate_batch(const sdm_model *m, const double *params, size_t n
 {
     if (!m || (n && (!params || !values)))
         return sdm_fail(err, SDM_E_ARG, "generate: model, parameters and values are needed");
-    const sdm_generate_opts o = options_or_default(opts);
-    sdm_status s = check_options(m, &o, err);
+    sdm_generate_opts o;
+    sdm_status s = sdm_generate_check_options(m, opts, &o, err);
     if (s || !n) return s;
     const sdm_model_info *info = sdm_model_get_info(m);
     size_t count;
@@ -203,12 +204,13 @@ sdm_status sdm_generate(const sdm_model *m, const double *params, const sdm_gene
 
 /* Checks options and parameters of one map. *used = new array [n_params] with the parameters for
    the network; free with sdm_free(), also after an error. */
-static sdm_status prepare_one(const sdm_model *m, const double *params, const sdm_generate_opts *o,
-                              double **used, sdm_result *found, sdm_error *err)
+static sdm_status prepare_one(const sdm_model *m, const double *params,
+                              const sdm_generate_opts *opts, sdm_generate_opts *o, double **used,
+                              sdm_result *found, sdm_error *err)
 {
-    sdm_status s = check_options(m, o, err);
+    sdm_status s = sdm_generate_check_options(m, opts, o, err);
     if (!s) s = SDM_ALLOC(used, sdm_model_get_info(m)->n_params, "parameters", err);
-    return s ? s : check_params(m, params, o, *used, found, err);
+    return s ? s : sdm_generate_check_params(m, params, o, *used, found, err);
 }
 
 /* Computes the map and its derivatives at checked parameters. */
@@ -239,10 +241,10 @@ sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params,
     if (!m || !params || !values || !jacobian)
         return sdm_fail(err, SDM_E_ARG,
                         "generate: model, parameters, values and jacobian are needed");
-    const sdm_generate_opts o = options_or_default(opts);
+    sdm_generate_opts o;
     double *used = NULL;
     sdm_result found = {0};
-    sdm_status s = prepare_one(m, params, &o, &used, &found, err);
+    sdm_status s = prepare_one(m, params, opts, &o, &used, &found, err);
     if (!s) s = jacobian_at(m, params, used, &o, values, jacobian, &found, err);
     if ((!s || s == SDM_E_QUALITY) && result) *result = found;
     sdm_free(used);
@@ -319,10 +321,10 @@ sdm_status sdm_generate_jvp(const sdm_model *m, const double *params, const doub
     if (!m || !params || !direction || !values || !tangent)
         return sdm_fail(err, SDM_E_ARG,
                         "generate: model, parameters, direction, values and tangent are needed");
-    const sdm_generate_opts o = options_or_default(opts);
+    sdm_generate_opts o;
     double *used = NULL;
     sdm_result found = {0};
-    sdm_status s = prepare_one(m, params, &o, &used, &found, err);
+    sdm_status s = prepare_one(m, params, opts, &o, &used, &found, err);
     if (!s) s = jvp_at(m, params, used, direction, &o, values, tangent, &found, err);
     if ((!s || s == SDM_E_QUALITY) && result) *result = found;
     sdm_free(used);
@@ -336,10 +338,10 @@ sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, const floa
     if (!m || !params || !adjoint || !gradient)
         return sdm_fail(err, SDM_E_ARG,
                         "generate: model, parameters, adjoint and gradient are needed");
-    const sdm_generate_opts o = options_or_default(opts);
+    sdm_generate_opts o;
     double *used = NULL;
     sdm_result found = {0};
-    sdm_status s = prepare_one(m, params, &o, &used, &found, err);
+    sdm_status s = prepare_one(m, params, opts, &o, &used, &found, err);
     if (!s) s = vjp_at(m, params, used, adjoint, &o, gradient, &found, err);
     if (!s && result) *result = found;
     sdm_free(used);

@@ -1,7 +1,7 @@
 /* Narrow-band maps in blocks on random meshes and grids (turned, with voxels of three sizes, thin):
  * the same bits as the dense narrow-band map, for any number of threads and instruction set.
  * Usage: test_exact_blocks [MESHES [FIRST]]
- * Tests: blocks.c grid_blocks.c sign_blocks.c */
+ * Tests: map_blocks.c grid_blocks.c sign_blocks.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -47,7 +47,7 @@ check() {
         own("io", "image meshfile npy picture volume")
         own("shape", "registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
-        own("runtime", "check fit map phantom runtime vdb")
+        own("runtime", "check field fit map phantom runtime vdb")
          own("all", "sdmgen") # the header that includes all public ones
          own("trainer", "train verdict")
         parts("core", "core")
@@ -64,7 +64,7 @@ check() {
         rooms("framework/geom/", "memory simd exactly mesh solid features map sign layers points methods .")
         rooms("framework/nn/", "kernels model pod template point sdmnn open")
         rooms("framework/io/", ". mesh image picture")
-        rooms("runtime/", "maps phantom fit/data fit/solver fit/start fit/trust fit vdb")
+        rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit vdb")
         rooms("trainer/", "numerics data state pod template direct .")
         rooms("cli/", "args report inputs shapes phantom fit study .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", "."); rooms("shapes/", ".")

@@ -211,7 +211,7 @@ static void test_default_lengths(void **state)
 {
     (void)state;
     const sdm_fit_opts o = sdm_fit_defaults();
-    for (double voxel = 0.1; voxel < 0.801; voxel += 0.05) {
+    for (double voxel = 0.1; voxel < 1; voxel *= 2) {
         const sdm_fit_opts d = sdm_fit_defaults_for(voxel);
         assert_true(d.blur == o.blur && d.l_ref == o.l_ref && d.margin == o.margin &&
                     d.tissue_mm == o.tissue_mm && d.point_sd == o.point_sd);

@@ -1,7 +1,7 @@
 /* Level sets of cochleas, which have creases, sheets and gaps thinner than a voxel, where OpenVDB's
  * checkLevelSet still requires a gradient of 1. Each must be written, pass the check, keep the side
  * of every voxel and stay close to its map.
- * Level sets from blocks equal those from dense maps. Tests: vdb.cc vdb_creases.cc blocks.c */
+ * Level sets from blocks equal those from dense maps. Tests: vdb.cc vdb_creases.cc map_blocks.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

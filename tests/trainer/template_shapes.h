@@ -93,6 +93,103 @@ static const sdm_shape mechanism = {.abi = SDM_SHAPE_ABI,
                                     .n_params = LINK_PARAMS,
                                     .mesh = mechanism_mesh};
 
+/* The same, whose arm turns by more than half a turn to either side. */
+static const sdm_param wide_params[LINK_PARAMS] = {
+    {"arm", "rad", -4, 4, 0.1, "angle of the arm"},
+    {"hand", "rad", -0.5, 0.5, 0, "angle of the hand"},
+    {"block", "", 0.8, 1.25, 1, "stretch of the block"}};
+
+static const sdm_shape wide_mechanism = {.abi = SDM_SHAPE_ABI,
+                                         .size = sizeof(sdm_shape),
+                                         .name = "mechanism",
+                                         .summary = "boxes on joints",
+                                         .params = wide_params,
+                                         .n_params = LINK_PARAMS,
+                                         .mesh = mechanism_mesh};
+
+/* One closed surface: a tube of three links along x with round ends. Its vertices follow the links,
+   around the joints at x = 3 and 6 they are blended; the first joint turns about z, the second
+   about y. With `flexing`, p[1] bends the last link like a bow instead. */
+enum { WELDED_LONG = 72, WELDED_ROUND = 20, WELDED_PARAMS = 2 };
+static const double welded_blend = 0.35;
+static bool flexing;
+
+static inline void welded_move(const double *p, double x[3])
+{
+    for (int k = 2; k >= 1; k--) {
+        const double t = (x[0] - 3 * k) / (2 * welded_blend) + 0.5,
+                     u = t < 0   ? 0
+                         : t > 1 ? 1
+                                 : t,
+                     w = u * u * (3 - 2 * u);
+        double y[3] = {x[0] - 3 * k, x[1], x[2]};
+        if (k == 2 && flexing) {
+            x[2] += t < 0.5 ? 0 : 0.2 * p[1] * y[0] * y[0];
+            continue;
+        }
+        turn(&y[0], &y[k], p[k - 1]);
+        y[0] += 3 * k;
+        for (int a = 0; a < 3; a++) x[a] += w * (y[a] - x[a]);
+    }
+}
+
+static int welded_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                       const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    const size_t n = WELDED_LONG, m = WELDED_ROUND;
+    const double pi = 3.14159265358979323846, radius = 0.8, length = 9;
+    const int failed = host->reserve(host, out, n * m + 2, 2 * n * m);
+    if (failed) return failed;
+    for (size_t i = 0; i < n * m + 2; i++) {
+        // along the profile: a quarter of a circle, the side, a quarter of a circle
+        const double arc = radius * pi / 2, side = length - 2 * radius,
+                     s = i == n * m ? 0
+                         : i == n * m + 1
+                             ? 2 * arc + side
+                             : ((double)(i / m) + 0.5) / WELDED_LONG * (2 * arc + side),
+                     angle = s < arc          ? s / radius
+                             : s < arc + side ? pi / 2
+                                              : pi / 2 + (s - arc - side) / radius,
+                     v = 2 * pi * (double)(i % m) / WELDED_ROUND;
+        double *x = out->vert + 3 * i;
+        x[0] = radius - radius * cos(angle) + (s < arc ? 0 : fmin(s - arc, side));
+        x[1] = i >= n * m ? 0 : radius * sin(angle) * cos(v);
+        x[2] = i >= n * m ? 0 : radius * sin(angle) * sin(v);
+        welded_move(p, x);
+    }
+    uint32_t *t = out->tri;
+    for (uint32_t j = 0; j < m; j++) {
+        const uint32_t k = (j + 1) % WELDED_ROUND, last = (uint32_t)((n - 1) * m),
+                       pole = (uint32_t)(n * m);
+        for (uint32_t i = 0; i < last; i += WELDED_ROUND, t += 6) {
+            const uint32_t q[6] = {i + j,
+                                   i + k,
+                                   i + WELDED_ROUND + j,
+                                   i + k,
+                                   i + WELDED_ROUND + k,
+                                   i + WELDED_ROUND + j};
+            memcpy(t, q, sizeof q);
+        }
+        const uint32_t q[6] = {pole, k, j, pole + 1, last + j, last + k};
+        memcpy(t, q, sizeof q);
+        t += 6;
+    }
+    return 0;
+}
+
+static const sdm_param welded_params[WELDED_PARAMS] = {
+    {"first", "rad", -0.9, 0.9, 0, "angle of the first joint"},
+    {"second", "rad", -0.9, 0.9, 0, "angle of the second joint, or the bend"}};
+
+static const sdm_shape welded = {.abi = SDM_SHAPE_ABI,
+                                 .size = sizeof(sdm_shape),
+                                 .name = "welded",
+                                 .summary = "an arm of one surface",
+                                 .params = welded_params,
+                                 .n_params = WELDED_PARAMS,
+                                 .mesh = welded_mesh};
+
 /* A thin ring in smooth random displacement fields: sums of Gaussian bumps 3 mm wide. */
 static int ring_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                      const double *p, sdm_mesh_out *out)

@@ -1,7 +1,7 @@
 /* Training of the template network: accuracy without a training step, accuracy with a correction,
  * the same bits for any number of threads and after a resume, the choice of
  * the kind.
- * Tests: design.c race.c set_up.c template_kind.c template_maps.c warp_modes.c */
+ * Tests: design.c race.c rotations.c set_up.c template_kind.c template_maps.c warp_modes.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -25,6 +25,12 @@ static const char ring_text[] =
     "network: {kind: template, degree: 2}\n"
     "data: {static: 0, static_share: 0, start: 150, online: 50, holdout: 16, memory_gb: 0.5}\n"
     "train: {steps: 300}\n";
+
+static const char welded_text[] = "shape: {name: welded}\n"
+                                  "grid: {size: [32, 40, 40], spacing: 0.4, centre: [4.5, 0, 0]}\n"
+                                  "network: {kind: template}\n"
+                                  "data: {start: 100, online: 0, holdout: 12, memory_gb: 0.5}\n"
+                                  "train: {steps: 1}\n";
 
 static void read_config(sdm_config *c, const char *text, const char *const *overrides, size_t n)
 {
@@ -57,6 +63,39 @@ static void mechanism_needs_no_training(void **state)
     assert_int_equal(sdm_model_open(r.model_path, &m, NULL), SDM_OK);
     assert_string_equal(sdm_model_get_info(m)->kind, "template");
     sdm_model_free(m);
+    sdm_instance_free(shape);
+}
+
+// Rotations of more than half a turn are as exact as small ones.
+static void turns_are_unwrapped(void **state)
+{
+    (void)state;
+    mistaken = NONE;
+    sdm_instance *shape = instance_of(&wide_mechanism);
+    sdm_config c;
+    read_config(&c, mechanism_text, NULL, 0);
+    const sdm_train_report r = train(&c, shape);
+    if (!(r.accuracy.rmse_near_mm < 0.4 / 20)) fail_msg("%g mm", r.accuracy.rmse_near_mm);
+    sdm_instance_free(shape);
+}
+
+// An arm of one surface: its links are found, and the joints follow by warps of their own. The same
+// bits for any number of threads.
+static void welded_arm_is_followed(void **state)
+{
+    (void)state;
+    sdm_instance *shape = instance_of(&welded);
+    uint64_t model[3];
+    for (int threads = 1; threads <= 3; threads++) {
+        sdm_config c;
+        read_config(&c, welded_text, NULL, 0);
+        c.threads = c.data.workers = threads;
+        const sdm_train_report r = train(&c, shape);
+        assert_int_equal(r.steps, 0);
+        if (!(r.accuracy.rmse_near_mm < 0.4 / 10)) fail_msg("%g mm", r.accuracy.rmse_near_mm);
+        model[threads - 1] = hash_of("model.sdm");
+    }
+    assert_true(model[0] == model[1] && model[1] == model[2]);
     sdm_instance_free(shape);
 }
 
@@ -199,6 +238,8 @@ static void other_meshes_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(mechanism_needs_no_training),
+                                       cmocka_unit_test(turns_are_unwrapped),
+                                       cmocka_unit_test(welded_arm_is_followed),
                                        cmocka_unit_test(ring_reaches_its_accuracy),
                                        cmocka_unit_test(same_bits_for_threads),
                                        cmocka_unit_test(resume_is_bit_exact),

@@ -1,6 +1,6 @@
 /* The design of a template network from meshes: components, parts with their frames and parents,
  * shapes whose vertices do not correspond.
- * Tests: design.c family.c template_parts.c template_maps.c warp_modes.c */
+ * Tests: design.c family.c pieces.c template_parts.c template_maps.c warp_modes.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,6 +10,7 @@
 
 #include "sdm/internal/heap.h"
 #include "template/design.h"
+#include "template/pieces.h"
 #include "template/template_parts.h"
 #include "template_shapes.h"
 
@@ -212,25 +213,131 @@ static void ring_has_its_modes(void **state)
     sdm_instance_free(shape);
 }
 
+// True if the piece contains a vertex with x[0] near `at`.
+static bool piece_reaches(const pieces *found, size_t k, const sdm_mesh *m, double at)
+{
+    for (size_t i = found->first[k]; i < found->first[k + 1]; i++)
+        if (fabs(m->vert[3 * found->vertices[i]] - at) < 0.1) return true;
+    return false;
+}
+
+// Three links and two joints; a link and a bow. Every triangle lies in a piece.
+static void welded_links_are_found(void **state)
+{
+    (void)state;
+    for (int bow = 0; bow < 2; bow++) {
+        flexing = bow;
+        sdm_instance *shape = instance_of(&welded);
+        template_design d = blank(shape, NULL);
+        const sdm_mesh *m = &d.family.base;
+        pieces found;
+        assert_int_equal(trainer_family_create(&d.family, NULL), SDM_OK);
+        assert_int_equal(trainer_pieces_find(&d.family, 0, 0.005, 0.8, &found, NULL), SDM_OK);
+        assert_int_equal(found.n, bow ? 4 : 5);
+        // the middles of the links in the order of their size or of their place, then the joints
+        const double links[3] = {1.5, 4.5, 7.5};
+        for (int l = 0; l < 3; l++) {
+            size_t owners = 0;
+            for (size_t k = 0; k < found.n; k++)
+                if (piece_reaches(&found, k, m, links[l])) {
+                    owners++;
+                    assert_true(found.flexes[k] == (bow && l == 2));
+                }
+            assert_int_equal(owners, 1);
+        }
+        size_t n_flexing = 0;
+        for (size_t k = 0; k < found.n; k++) {
+            n_flexing += found.flexes[k];
+            if (!found.flexes[k]) continue;
+            // joints overlap the links by 0.8 mm
+            const double at = piece_reaches(&found, k, m, 3) ? 3 : 6;
+            assert_true(piece_reaches(&found, k, m, at));
+            assert_true(
+                piece_reaches(&found, k, m, at - (at == 6 && bow ? 0 : welded_blend) - 0.6));
+        }
+        assert_int_equal(n_flexing, 2);
+        for (size_t t = 0; t < m->n_tri; t++) {
+            bool covered = false;
+            for (size_t k = 0; k < found.n && !covered; k++) {
+                int corners = 0;
+                for (size_t i = found.first[k]; i < found.first[k + 1]; i++)
+                    for (int c = 0; c < 3; c++)
+                        corners += found.vertices[i] == m->tri[3 * t + (size_t)c];
+                covered = corners == 3;
+            }
+            assert_true(covered);
+        }
+        trainer_pieces_dispose(&found);
+        trainer_template_design_dispose(&d);
+        sdm_instance_free(shape);
+    }
+    flexing = false;
+}
+
+// A surface that bends everywhere has no rigid piece.
+static void ring_has_no_pieces(void **state)
+{
+    (void)state;
+    sdm_instance *shape = instance_of(&ring);
+    template_design d = blank(shape, NULL);
+    pieces found;
+    assert_int_equal(trainer_family_create(&d.family, NULL), SDM_OK);
+    assert_int_equal(trainer_pieces_find(&d.family, 0, 0.009, 1.8, &found, NULL), SDM_OK);
+    assert_int_equal(found.n, 0);
+    trainer_pieces_dispose(&found);
+    trainer_template_design_dispose(&d);
+    sdm_instance_free(shape);
+}
+
+// The design with pieces: the links are parts of a chain, the joints have warps.
+static void welded_arm_is_split(void **state)
+{
+    (void)state;
+    sdm_instance *shape = instance_of(&welded);
+    const sdm_grid grid =
+        sdm_grid_centred((const int64_t[]){30, 34, 34}, 0.5, (const double[]){4.5, 0, 0});
+    template_design d = blank(shape, &grid);
+    d.split = true;
+    sdm_error e = {0};
+    if (trainer_template_design(&d, &e)) fail_msg("%s", e.text);
+    assert_int_equal(d.n_parts, 5);
+    size_t still = 0, chained = 0, joints = 0;
+    for (size_t c = 0; c < d.n_parts; c++) {
+        const sdm_template_part *p = &d.parts[c];
+        joints += p->n_modes > 0;
+        still += p->frame == SDM_FRAME_NONE;
+        // the last link hangs on the middle one
+        chained += !p->n_modes && p->parent >= 0 && !d.parts[p->parent].n_modes;
+        assert_true(p->n_modes == 0 || p->frame == SDM_FRAME_RIGID);
+    }
+    assert_true(joints == 2 && still == 1 && chained == 1);
+    assert_true(d.motion_error_mm < 0.01);
+    trainer_template_design_dispose(&d);
+    sdm_instance_free(shape);
+}
+
 static void allocations_may_fail(void **state)
 {
     (void)state;
     mistaken = NONE;
-    sdm_instance *shape = instance_of(&mechanism);
-    const sdm_grid grid =
-        sdm_grid_centred((const int64_t[]){12, 10, 8}, 2, (const double[]){0, 0, 0});
-    sdm_error e;
-    sdm_status s = SDM_E_NOMEM;
-    for (unsigned long n = 1; s; n += 1 + n / 3) {
-        template_design d = blank(shape, &grid);
-        sdm_alloc_fail_after(n);
-        s = trainer_template_design(&d, &e);
-        sdm_alloc_fail_after(0);
-        trainer_template_design_dispose(&d);
-        assert_true(s == SDM_OK || s == SDM_E_NOMEM);
-        assert_true(n < 10000000);
+    for (int split = 0; split < 2; split++) {
+        sdm_instance *shape = instance_of(split ? &welded : &mechanism);
+        const sdm_grid grid =
+            sdm_grid_centred((const int64_t[]){12, 10, 8}, 2, (const double[]){0, 0, 0});
+        sdm_error e;
+        sdm_status s = SDM_E_NOMEM;
+        for (unsigned long n = 1; s; n += 1 + n / 3) {
+            template_design d = blank(shape, &grid);
+            d.split = split;
+            sdm_alloc_fail_after(n);
+            s = trainer_template_design(&d, &e);
+            sdm_alloc_fail_after(0);
+            trainer_template_design_dispose(&d);
+            assert_true(s == SDM_OK || s == SDM_E_NOMEM);
+            assert_true(n < 10000000);
+        }
+        sdm_instance_free(shape);
     }
-    sdm_instance_free(shape);
 }
 
 int main(void)
@@ -239,6 +346,7 @@ int main(void)
         cmocka_unit_test(components_join_vertices), cmocka_unit_test(mechanism_has_its_parts),
         cmocka_unit_test(other_meshes_are_refused), cmocka_unit_test(fine_grid_is_refused),
         cmocka_unit_test(some_shapes_are_one_part), cmocka_unit_test(ring_has_its_modes),
-        cmocka_unit_test(allocations_may_fail)};
+        cmocka_unit_test(welded_links_are_found),   cmocka_unit_test(ring_has_no_pieces),
+        cmocka_unit_test(welded_arm_is_split),      cmocka_unit_test(allocations_may_fail)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -26,6 +26,9 @@ typedef struct dataset {
     map_target target;
     bool only_holdout; /* no map is needed for the training */
     bool inside;       /* a voxel of a held-out map is inside the shape */
+    /* Maps that need not be made again: those of another data set of the same shape, grid, target,
+       blocks and seed; NULL: none. */
+    const struct dataset *known;
     const sdm_pod_block *blocks;
     size_t n_blocks, n_voxels, n_params; /* n_voxels: of the maps that the network learns */
     double min[SDM_POD_MAX_PARAMS], max[SDM_POD_MAX_PARAMS];

@@ -2,6 +2,7 @@
 #include "dataset_fill.h"
 
 #include <stdatomic.h>
+#include <string.h>
 
 #include "sdm/internal/sampling.h"
 #include "sdm/internal/threads.h"
@@ -22,11 +23,38 @@ static void static_params(const dataset *d, size_t index, double *p)
     }
 }
 
+/* Copies held-out map `index` from d->known; false: it is not there. */
+static bool take_holdout(const dataset *d, size_t index, const double *p)
+{
+    const dataset *k = d->known;
+    const size_t bytes = d->n_params * sizeof *p;
+    if (!k || index >= k->n_holdout || k->n_voxels != d->n_voxels ||
+        memcmp(p, k->holdout_params + index * d->n_params, bytes) != 0)
+        return false;
+    memcpy(d->holdout + index * d->n_voxels, k->holdout + index * d->n_voxels,
+           d->n_voxels * sizeof *d->holdout);
+    return true;
+}
+
+/* Copies the map of `slot`, random sample number `index`, from d->known; false: it is not there. */
+static bool take_random(const dataset *d, size_t slot, size_t index, const double *p)
+{
+    const dataset *k = d->known;
+    if (!k || index >= k->n_start || k->n_voxels != d->n_voxels) return false;
+    const size_t from = k->n_static + index;
+    if (memcmp(p, k->params + from * d->n_params, d->n_params * sizeof *p) != 0) return false;
+    memcpy(d->maps + slot * d->n_voxels, k->maps + from * d->n_voxels,
+           d->n_voxels * sizeof *d->maps);
+    d->scale[slot] = k->scale[from];
+    return true;
+}
+
 sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err)
 {
     enum { MIN_RANDOM = 128 }; // random maps made even if hooks->enough() is true
     const size_t all = d->n_holdout + d->n_static + d->n_start;
     size_t done = 0;
+    if (d->known) d->inside = d->known->inside;
     long failed = -1; // lowest index of a failed map: so the message does not depend on scheduling
     sdm_error first = {0};
     atomic_bool stop = false, enough = false;
@@ -45,7 +73,8 @@ sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hoo
                 double *p = d->holdout_params + at * d->n_params;
                 sdm_sample_params(d->seed, STREAM_HOLDOUT, at, d->min, d->max, d->distribution,
                                   d->n_params, p);
-                s = trainer_workbench_map(&w, d, p, d->holdout + at * d->n_voxels, &mine);
+                if (!take_holdout(d, at, p))
+                    s = trainer_workbench_map(&w, d, p, d->holdout + at * d->n_voxels, &mine);
             } else if (!s) {
                 // n_start <= n_ring, so random sample k lies in slot n_static + k
                 const size_t slot = at - d->n_holdout;
@@ -55,8 +84,9 @@ sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hoo
                 else
                     sdm_sample_params(d->seed, STREAM_TRAIN, slot - d->n_static, d->min, d->max,
                                       d->distribution, d->n_params, p);
-                s = trainer_workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels,
-                                                 &d->scale[slot], &mine);
+                if (slot < d->n_static || !take_random(d, slot, slot - d->n_static, p))
+                    s = trainer_workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels,
+                                                     &d->scale[slot], &mine);
             }
             // keep the first error, report progress, and check whether to stop
 #pragma omp critical(sdm_dataset_fill)

@@ -23,7 +23,8 @@ typedef struct error_measures {
 
 struct train_kind {
     /* Called before any map is made: may allocate t->design and set data.target or
-       data.only_holdout. NULL: nothing to do. */
+       data.only_holdout. NULL: nothing to do. t->design may be that of another run of this kind,
+       of the same shape, ranges, grid and seed: it is then taken over. */
     sdm_status (*prepare)(trainer *t, sdm_error *err);
     /* Edge of the blocks in which maps are stored (dataset.h), voxels; 0: map order. */
     size_t (*block)(const sdm_config *c);

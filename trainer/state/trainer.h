@@ -34,6 +34,7 @@ typedef struct trainer {
     sdm_pod_levels levels;
     sdm_pod_block *blocks;
     dataset data;
+    dataset tried;      /* maps of the race of kinds (race.h); empty: none */
     producer *producer; /* NULL: no online sample is left to make */
 
     /* CRC-64 of the shape's data files, by option; 0: the option names no file. */

@@ -8,6 +8,7 @@
 
 #include "motion.h"
 #include "regression.h"
+#include "rotations.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/memory.h"
 #include "template_maps.h"
@@ -175,6 +176,7 @@ static sdm_status design_motion(template_design *d, double tolerance, sdm_error 
                 y[i * d->n_numbers + p->amplitudes + m] = amplitude[c][i * p->n_modes + m];
         }
     }
+    if (!s) s = trainer_template_unwrap(d, n, y, err);
     if (!s) s = fit_functions(d, n, y, weight, tolerance, err);
     for (size_t c = 0; c < d->n_parts; c++) sdm_free(amplitude[c]);
     sdm_free(weight);
@@ -220,6 +222,7 @@ sdm_status trainer_template_design(template_design *d, sdm_error *err)
     const double h = fmin(fmin(d->grid->spacing[0], d->grid->spacing[1]), d->grid->spacing[2]);
     sdm_status s = trainer_family_create(&d->family, err);
     if (!s) s = trainer_template_parts(d, 0.02 * h, err);
+    if (!s && d->split && d->n_parts == 1) return SDM_OK;
     if (!s) s = design_motion(d, 0.005 * h, err);
     if (!s) s = trainer_template_maps(d, err);
     if (!s) s = make_model(d, err);

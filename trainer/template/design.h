@@ -5,7 +5,8 @@
 #include "template_design.h"
 
 /* Fills *d. family.shape, n_params, min, max, distribution, seed and n_threads, and grid must be
-   set. SDM_E_UNSUPPORTED: the vertices of the shape's meshes do not correspond. Call
+   set. With d->split, the design ends with d->model = NULL if it has one part only.
+   SDM_E_UNSUPPORTED: the vertices of the shape's meshes do not correspond. Call
    trainer_template_design_dispose() also after an error. */
 sdm_status trainer_template_design(template_design *d, sdm_error *err);
 void trainer_template_design_dispose(template_design *d);

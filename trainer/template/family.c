@@ -38,7 +38,7 @@ static void join(uint32_t *parent, uint32_t a, uint32_t b)
     if (b < a) parent[a] = b;
 }
 
-// Sets component and n_components.
+// Sets place, component and n_components.
 static sdm_status find_components(family *f, sdm_error *err)
 {
     const sdm_mesh *m = &f->base;
@@ -53,9 +53,12 @@ static sdm_status find_components(family *f, sdm_error *err)
     }
     // vertices at the same place, then the corners of each triangle
     qsort(places, m->n_vert, sizeof *places, compare_places);
-    for (size_t v = 1; v < m->n_vert; v++)
-        if (!memcmp(places[v].x, places[v - 1].x, sizeof places[v].x))
-            join(parent, places[v - 1].vertex, places[v].vertex);
+    for (size_t v = 0; v < m->n_vert; v++) {
+        const place *p = &places[v];
+        const bool again = v && !memcmp(p->x, p[-1].x, sizeof p->x);
+        f->place[p->vertex] = again ? f->place[p[-1].vertex] : p->vertex;
+        join(parent, f->place[p->vertex], p->vertex);
+    }
     for (size_t t = 0; t < m->n_tri; t++) {
         join(parent, m->tri[3 * t], m->tri[3 * t + 1]);
         join(parent, m->tri[3 * t], m->tri[3 * t + 2]);
@@ -85,6 +88,7 @@ sdm_status trainer_family_create(family *f, sdm_error *err)
     double p[SDM_POD_MAX_PARAMS];
     for (size_t i = 0; i < f->n_params; i++) p[i] = fmin(fmax(params[i].def, f->min[i]), f->max[i]);
     sdm_status s = sdm_instance_mesh(f->shape, p, &f->base, err);
+    if (!s) s = SDM_ALLOC(&f->place, f->base.n_vert, "components", err);
     if (!s) s = SDM_ALLOC(&f->component, f->base.n_vert, "components", err);
     return s ? s : find_components(f, err);
 }
@@ -93,7 +97,8 @@ void trainer_family_dispose(family *f)
 {
     sdm_mesh_dispose(&f->base);
     sdm_free(f->component);
-    f->component = NULL;
+    sdm_free(f->place);
+    f->component = f->place = NULL;
 }
 
 void trainer_family_params(const family *f, size_t index, double *p)

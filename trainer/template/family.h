@@ -14,6 +14,7 @@ typedef struct family {
     int n_threads;
     sdm_mesh base;       /* at the default parameters */
     size_t n_components; /* sets of triangles that are connected through vertices */
+    uint32_t *place;     /* [n_vert] first vertex at the same place */
     uint32_t *component; /* [n_vert] component of each vertex; UINT32_MAX: in no triangle */
 } family;
 
@@ -23,6 +24,9 @@ typedef struct family {
    trainer_family_dispose() also after an error. */
 sdm_status trainer_family_create(family *f, sdm_error *err);
 void trainer_family_dispose(family *f);
+
+/* Random parameters from this index on are for tests: no design uses them. */
+#define TRAINER_FAMILY_UNUSED ((size_t)1 << 20)
 
 /* p[n_params] = random parameters number `index`. */
 void trainer_family_params(const family *f, size_t index, double *p);

@@ -31,6 +31,17 @@ static void moments(const double *from, const double *to, const uint32_t *vertex
             }
 }
 
+double trainer_motion_error(const motion *a, const double x[3], const double to[3])
+{
+    double sum = 0;
+    for (int i = 0; i < 3; i++) {
+        const double e =
+            a->m[3 * i] * x[0] + a->m[3 * i + 1] * x[1] + a->m[3 * i + 2] * x[2] + a->b[i] - to[i];
+        sum += e * e;
+    }
+    return sqrt(sum);
+}
+
 // b from m and the means; returns the root mean square distance
 static double finish(const double *from, const double *to, const uint32_t *vertex, size_t n,
                      const double means[2][3], motion *out)

@@ -20,6 +20,9 @@ double trainer_motion_rigid(const double *from, const double *to, const uint32_t
 double trainer_motion_affine(const double *from, const double *to, const uint32_t *vertex, size_t n,
                              motion *out);
 
+/* Distance between the point to which a motion carries x[3], and to[3]. */
+double trainer_motion_error(const motion *a, const double x[3], const double to[3]);
+
 /* *out = outer^-1 inner; outer must be invertible. */
 void trainer_motion_relative(const motion *outer, const motion *inner, motion *out);
 

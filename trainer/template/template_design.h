@@ -8,9 +8,12 @@
 typedef struct template_design {
     family family;
     const sdm_grid *grid; /* grid of the maps */
+    /* Components that bend: true: they become rigid pieces and joints with a warp, false: the whole
+       shape becomes one part with a warp. */
+    bool split;
     size_t n_parts;
     sdm_template_part parts[SDM_TEMPLATE_MAX_PARTS]; /* arrays owned */
-    uint32_t *vertices;                              /* vertices of part 0, then of part 1, ... */
+    uint32_t *vertices; /* vertices of part 0, then of part 1, ...; joints share some */
     size_t first[SDM_TEMPLATE_MAX_PARTS + 1]; /* part c: vertices[first[c] .. first[c + 1] - 1] */
     size_t n_numbers, n_terms, degree;        /* N, F */
     double *functions;                        /* [N][F] */

@@ -107,66 +107,93 @@ static const char *frame_name(sdm_template_frame f)
 static void report_design(trainer *t, const template_state *s)
 {
     const template_design *d = &s->design;
-    size_t rigid = 0, affine = 0, still = 0;
+    size_t rigid = 0, affine = 0, still = 0, joints = 0, modes = 0;
     for (size_t c = 0; c < d->n_parts; c++) {
-        rigid += d->parts[c].frame == SDM_FRAME_RIGID;
-        affine += d->parts[c].frame == SDM_FRAME_AFFINE;
-        still += d->parts[c].frame == SDM_FRAME_NONE;
+        const sdm_template_part *p = &d->parts[c];
+        modes += p->n_modes;
+        joints += p->n_modes > 0;
+        rigid += !p->n_modes && p->frame == SDM_FRAME_RIGID;
+        affine += !p->n_modes && p->frame == SDM_FRAME_AFFINE;
+        still += !p->n_modes && p->frame == SDM_FRAME_NONE;
     }
-    if (d->parts[0].n_modes)
+    if (d->n_parts == 1 && modes)
         trainer_message(t,
                         "template: one part (%s frame) with a warp of %zu modes; polynomials of "
                         "degree %zu; error of the warp %.2g mm, of the amplitudes %.2g mm",
-                        frame_name(d->parts[0].frame), d->parts[0].n_modes, d->degree,
-                        d->warp_error_mm, d->motion_error_mm);
+                        frame_name(d->parts[0].frame), modes, d->degree, d->warp_error_mm,
+                        d->motion_error_mm);
     else
         trainer_message(t,
-                        "template: %zu parts (%zu rigid, %zu affine, %zu still); polynomials of "
-                        "degree %zu; error of the frames %.2g mm",
-                        d->n_parts, rigid, affine, still, d->degree, d->motion_error_mm);
+                        "template: %zu parts (%zu rigid, %zu affine, %zu still, %zu with warps of "
+                        "%zu modes); polynomials of degree %zu; error of the frames %.2g mm, of "
+                        "the warps %.2g mm",
+                        d->n_parts, rigid, affine, still, joints, modes, d->degree,
+                        d->motion_error_mm, d->warp_error_mm);
 }
 
-/* Compares the template without a correction with exact maps of a few random shapes. *rms = root
- * mean square error (mm) in voxels within a voxel of the surface. */
-static sdm_status check_design(const trainer *t, const template_state *s, double *rms,
+/* Errors of a template without a correction, mm, root mean square. */
+typedef struct design_error {
+    double near; /* in voxels within a voxel of the surface */
+    double all;
+} design_error;
+
+/* Compares a template without a correction with exact maps of a few random shapes. */
+static sdm_status check_design(const trainer *t, const template_design *design, design_error *e,
                                sdm_error *err)
 {
     enum { SHAPES = 8 };
     const dataset *d = &t->data;
-    const sdm_model *m = s->design.model;
+    const sdm_model *m = design->model;
     const size_t n = sdm_grid_count(d->grid);
     const double near = d->grid->spacing[0];
     workbench w = {0};
     float *map = NULL;
     void *scratch = NULL;
-    double sum = 0, count = 0, p[SDM_POD_MAX_PARAMS];
+    double sum = 0, count = 0, all = 0, p[SDM_POD_MAX_PARAMS];
     sdm_status status = trainer_workbench_create(&w, d, err);
     if (!status) status = SDM_ALLOC(&map, n, "template", err);
     if (!status) status = sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "template", err);
     for (size_t i = 0; i < SHAPES && !status; i++) {
-        trainer_family_params(&s->design.family, i, p);
+        trainer_family_params(&design->family, TRAINER_FAMILY_UNUSED + i, p);
         if ((status = trainer_workbench_exact(&w, d, p, err))) break;
         sdm_model_forward(m, p, 1, map, scratch);
-        for (size_t v = 0; v < n; v++)
-            if (fabs((double)w.exact[v]) <= near) {
-                const double e = (double)map[v] - (double)w.exact[v];
-                sum += e * e, count++;
-            }
+        for (size_t v = 0; v < n; v++) {
+            const double difference = (double)map[v] - (double)w.exact[v];
+            all += difference * difference / ((double)n * SHAPES);
+            if (fabs((double)w.exact[v]) <= near) sum += difference * difference, count++;
+        }
     }
-    *rms = sqrt(sum / fmax(count, 1));
+    *e = (design_error){sqrt(sum / fmax(count, 1)), sqrt(all)};
     sdm_free(scratch);
     sdm_free(map);
     trainer_workbench_dispose(&w);
     return status;
 }
 
-static sdm_status template_prepare(trainer *t, sdm_error *err)
+/* Designs the shape as rigid pieces and joints, too, and takes this design if it is the better one:
+   the error near the surface counts fully, that of all voxels a tenth. */
+static sdm_status try_pieces(const trainer *t, template_design *d, design_error *e, sdm_error *err)
 {
-    template_state *s = NULL;
-    sdm_status status = SDM_ALLOC(&s, 1, "template", err);
-    if (status) return status;
-    t->design = s;
-    dataset *d = &t->data;
+    template_design other = {.family = d->family, .grid = d->grid, .split = true};
+    design_error its = {INFINITY, INFINITY};
+    other.family.base = (sdm_mesh){0};
+    other.family.place = other.family.component = NULL;
+    sdm_status status = trainer_template_design(&other, err);
+    if (!status && other.model) status = check_design(t, &other, &its, err);
+    const bool better = !status && hypot(its.near, 0.1 * its.all) < hypot(e->near, 0.1 * e->all);
+    if (better) {
+        const template_design worse = *d;
+        *d = other, *e = its;
+        other = worse;
+    }
+    trainer_template_design_dispose(&other);
+    return status;
+}
+
+/* Designs the network: from meshes, with a look at a few exact maps. */
+static sdm_status make_design(const trainer *t, template_state *s, sdm_error *err)
+{
+    const dataset *d = &t->data;
     s->design.grid = &t->config->grid;
     s->design.family = (family){.shape = t->shape,
                                 .n_params = d->n_params,
@@ -175,21 +202,40 @@ static sdm_status template_prepare(trainer *t, sdm_error *err)
                                 .distribution = d->distribution,
                                 .seed = t->config->seed,
                                 .n_threads = t->n_threads};
-    if ((status = trainer_template_design(&s->design, err))) return status;
-    double rms = 0;
-    if ((status = check_design(t, s, &rms, err))) return status;
-    if (rms > t->config->grid.spacing[0])
+    design_error e = {0};
+    sdm_status status = trainer_template_design(&s->design, err);
+    if (status) return status;
+    if ((status = check_design(t, &s->design, &e, err))) return status;
+    if (s->design.parts[0].n_modes && (status = try_pieces(t, &s->design, &e, err))) return status;
+    if (e.near > t->config->grid.spacing[0])
         return sdm_fail(
             err, SDM_E_UNSUPPORTED,
             "carried along, the template misses the surface by %.2g mm (%.1f voxels): "
             "parts of the mesh fold or turn too far for one warp; use network.kind: pod",
-            rms, rms / t->config->grid.spacing[0]);
-    report_design(t, s);
+            e.near, e.near / t->config->grid.spacing[0]);
     s->corrected = s->design.n_parts == 1 &&
                    (s->design.parts[0].n_modes || s->design.parts[0].frame == SDM_FRAME_AFFINE);
+    return s->corrected ? correction_grid(s, err) : SDM_OK;
+}
+
+static sdm_status template_prepare(trainer *t, sdm_error *err)
+{
+    dataset *d = &t->data;
+    template_state *s = t->design;
+    if (!s) {
+        sdm_status status = SDM_ALLOC(&s, 1, "template", err);
+        t->design = s;
+        if (!status) status = make_design(t, s, err);
+        if (status) return status;
+    }
+    // a design that is taken over refers to the run that made it
+    s->design.grid = &t->config->grid;
+    s->design.family.min = d->min;
+    s->design.family.max = d->max;
+    s->design.family.distribution = d->distribution;
+    report_design(t, s);
     d->only_holdout = !s->corrected;
     if (!s->corrected) return SDM_OK;
-    if ((status = correction_grid(s, err))) return status;
     d->target = (map_target){.grid = &s->grid, .make = correction_of, .user = s};
     return SDM_OK;
 }
@@ -259,8 +305,8 @@ static sdm_status template_parts(const trainer *t, error_measures *out, sdm_erro
 static void template_dispose(trainer *t)
 {
     template_state *s = t->design;
+    trainer_kind_pod.dispose(t);
     if (!s) return;
-    if (s->corrected) trainer_kind_pod.dispose(t);
     trainer_template_design_dispose(&s->design);
     sdm_free(s->nodes);
     sdm_free(s);

@@ -41,8 +41,126 @@ static bool lattice_of(const box *b, double margin, double spacing, double nodes
     return count <= nodes;
 }
 
+/* The solid of a part: the components of the mesh to which it belongs, or what is nearer to its own
+   triangles than to the others of these components. */
+typedef struct part_solid {
+    sdm_exact *whole;      /* the components */
+    sdm_exact *own, *rest; /* the triangles of the part, the others; NULL: the part is the whole */
+} part_solid;
+
+static void solid_free(part_solid *p)
+{
+    sdm_exact_free(p->whole);
+    sdm_exact_free(p->own);
+    sdm_exact_free(p->rest);
+    *p = (part_solid){0};
+}
+
+// *exact = the triangles of the base mesh with the given flags
+static sdm_status make_exact(const family *f, const uint8_t *flags, uint8_t mask, uint8_t value,
+                             bool open, sdm_exact **exact, sdm_error *err)
+{
+    const sdm_mesh *m = &f->base;
+    sdm_mesh mesh = {0};
+    const sdm_exact_opts opts = {.keep_overlap = open, .n_threads = f->n_threads};
+    size_t n = 0;
+    for (size_t t = 0; t < m->n_tri; t++) n += (flags[t] & mask) == value;
+    sdm_status s = sdm_mesh_reserve(&mesh, m->n_vert, n, err);
+    if (!s) memcpy(mesh.vert, m->vert, 3 * m->n_vert * sizeof *mesh.vert);
+    n = 0;
+    for (size_t t = 0; t < m->n_tri && !s; t++)
+        if ((flags[t] & mask) == value)
+            memcpy(mesh.tri + 3 * n++, m->tri + 3 * t, 3 * sizeof *mesh.tri);
+    if (!s) s = sdm_exact_create(&mesh, &opts, exact, err);
+    sdm_mesh_dispose(&mesh);
+    return s;
+}
+
+// Prepares the solid of part c at the default parameters.
+static sdm_status make_solid(const template_design *d, size_t c, part_solid *out, sdm_error *err)
+{
+    enum { OWN = 1, NEAR = 2 }; // flags of a triangle: all corners in the part; of its components
+    const sdm_mesh *m = &d->family.base;
+    uint8_t *mine = NULL, *flags = NULL;
+    bool touched[SDM_TEMPLATE_MAX_PARTS] = {false}; // more components: one part has them all
+    const uint32_t *component = d->family.component;
+    const bool all = d->family.n_components > SDM_TEMPLATE_MAX_PARTS;
+    sdm_status s = SDM_ALLOC(&mine, m->n_vert, "template", err);
+    if (!s) s = SDM_ALLOC(&flags, m->n_tri, "template", err);
+    for (size_t k = d->first[c]; k < d->first[c + 1] && !s; k++) {
+        mine[d->vertices[k]] = 1;
+        if (!all) touched[component[d->vertices[k]]] = true;
+    }
+    size_t n_rest = 0;
+    for (size_t t = 0; t < m->n_tri && !s; t++) {
+        const uint32_t *v = m->tri + 3 * t;
+        if (all || touched[component[v[0]]]) flags[t] = NEAR;
+        if (mine[v[0]] && mine[v[1]] && mine[v[2]]) flags[t] |= OWN;
+        n_rest += flags[t] == NEAR;
+    }
+    if (!s) s = make_exact(&d->family, flags, NEAR, NEAR, false, &out->whole, err);
+    if (!s && n_rest) s = make_exact(&d->family, flags, OWN, OWN, true, &out->own, err);
+    if (!s && n_rest) s = make_exact(&d->family, flags, OWN | NEAR, NEAR, true, &out->rest, err);
+    sdm_free(flags);
+    sdm_free(mine);
+    return s;
+}
+
+/* Distance and its gradient at the nodes of a lattice. */
+typedef struct layers {
+    float *value, *gradient; /* [n], [n][3] */
+} layers;
+
+static void layers_free(layers *l)
+{
+    sdm_free(l->value);
+    sdm_free(l->gradient);
+    *l = (layers){0};
+}
+
+static sdm_status fill_layers(const sdm_exact *exact, const sdm_grid *grid, layers *l,
+                              sdm_error *err)
+{
+    const size_t n = sdm_grid_count(grid);
+    sdm_status s = SDM_ALLOC(&l->gradient, 3 * n, "template", err);
+    if (!s) s = SDM_ALLOC(&l->value, n, "template", err);
+    const sdm_exact_layers out = {.values = l->value, .normal = l->gradient};
+    return s ? s : sdm_exact_map_layers(exact, grid, &out, err);
+}
+
+/* Node of a part whose surface is open: u, v = distances to its own triangles and to the rest, with
+   gradients. Outside of the whole the distance is u. Inside, the part ends where the rest is as
+   near as its own triangles: for a plane across a tube, sqrt|u^2 - v^2| is the distance to this
+   cap. Its multiple grows beyond the cap soon to u, so that where the rest has moved away, only
+   what lies close to the cap seems nearer than it is; there the neighbours overlap. */
+static void open_node(bool inside, double u, const float gu[3], double v, const float gv[3],
+                      float out[4])
+{
+    static const double STEEP = 2, GRADIENT_MAX = 4;
+    double value = u, g[3] = {gu[0], gu[1], gu[2]};
+    if (inside) {
+        const double square = u * u - v * v, cap = sqrt(fabs(square)),
+                     signed_cap = square < 0 ? -STEEP * cap : STEEP * cap;
+        if (signed_cap < -u) {
+            value = -u;
+            for (int a = 0; a < 3; a++) g[a] = -g[a];
+        } else if (signed_cap < u) {
+            value = signed_cap;
+            double length = 0;
+            for (int a = 0; a < 3; a++) {
+                g[a] = STEEP * (u * g[a] - v * (double)gv[a]) / fmax(cap, 1e-30);
+                length += g[a] * g[a];
+            }
+            length = sqrt(length);
+            for (int a = 0; a < 3 && length > GRADIENT_MAX; a++) g[a] *= GRADIENT_MAX / length;
+        }
+    }
+    out[0] = (float)value;
+    for (int a = 0; a < 3; a++) out[1 + a] = (float)g[a];
+}
+
 // *nodes = new array: exact distance and gradient at the nodes
-static sdm_status fill_nodes(const sdm_exact *exact, const sdm_lattice *l, const float **nodes,
+static sdm_status fill_nodes(const part_solid *p, const sdm_lattice *l, const float **nodes,
                              sdm_error *err)
 {
     const size_t n = sdm_lattice_count(l);
@@ -52,37 +170,30 @@ static sdm_status fill_nodes(const sdm_exact *exact, const sdm_lattice *l, const
         grid.origin[a] = l->origin[a];
         grid.spacing[a] = l->spacing;
     }
-    float *out = NULL, *normal = NULL, *values = NULL;
+    float *out = NULL;
+    layers whole = {0}, own = {0}, rest = {0};
     sdm_status s = SDM_ALLOC(&out, 4 * n, "template", err);
     *nodes = out;
-    if (!s) s = SDM_ALLOC(&normal, 3 * n, "template", err);
-    if (!s) s = SDM_ALLOC(&values, n, "template", err);
-    const sdm_exact_layers layers = {.values = values, .normal = normal};
-    if (!s) s = sdm_exact_map_layers(exact, &grid, &layers, err);
+    if (!s) s = fill_layers(p->whole, &grid, &whole, err);
+    if (!s && p->own) s = fill_layers(p->own, &grid, &own, err);
+    if (!s && p->own) s = fill_layers(p->rest, &grid, &rest, err);
     for (size_t i = 0; i < n && !s; i++) {
-        out[4 * i] = values[i];
-        memcpy(out + 4 * i + 1, normal + 3 * i, 3 * sizeof *out);
+        if (p->own) {
+            // unsigned: signs of open surfaces mean nothing
+            for (int a = 0; a < 3; a++) {
+                if (own.value[i] < 0) own.gradient[3 * i + (size_t)a] *= -1;
+                if (rest.value[i] < 0) rest.gradient[3 * i + (size_t)a] *= -1;
+            }
+            open_node(whole.value[i] < 0, fabs((double)own.value[i]), own.gradient + 3 * i,
+                      fabs((double)rest.value[i]), rest.gradient + 3 * i, out + 4 * i);
+        } else {
+            out[4 * i] = whole.value[i];
+            memcpy(out + 4 * i + 1, whole.gradient + 3 * i, 3 * sizeof *out);
+        }
     }
-    sdm_free(values);
-    sdm_free(normal);
-    return s;
-}
-
-// The triangles of part c at the default parameters.
-static sdm_status part_mesh(const template_design *d, size_t c, sdm_mesh *out, sdm_error *err)
-{
-    const sdm_mesh *m = &d->family.base;
-    uint8_t *mine = NULL;
-    sdm_status s = SDM_ALLOC(&mine, m->n_vert, "template", err);
-    size_t n = 0;
-    for (size_t k = d->first[c]; k < d->first[c + 1] && !s; k++) mine[d->vertices[k]] = 1;
-    for (size_t t = 0; t < m->n_tri && !s; t++) n += mine[m->tri[3 * t]];
-    if (!s) s = sdm_mesh_reserve(out, m->n_vert, n, err);
-    if (!s) memcpy(out->vert, m->vert, 3 * m->n_vert * sizeof *out->vert);
-    n = 0;
-    for (size_t t = 0; t < m->n_tri && !s; t++)
-        if (mine[m->tri[3 * t]]) memcpy(out->tri + 3 * n++, m->tri + 3 * t, 3 * sizeof *out->tri);
-    sdm_free(mine);
+    layers_free(&whole);
+    layers_free(&own);
+    layers_free(&rest);
     return s;
 }
 
@@ -179,16 +290,12 @@ sdm_status trainer_template_maps(template_design *d, sdm_error *err)
         const double extra = p->n_modes ? 2 * p->warp.spacing : 4 * h;
         double spacing = 3 * h;
         while (!lattice_of(&reach[c], extra, spacing, FAR_NODES, &p->far)) spacing *= 1.2;
-        sdm_mesh mesh = {0};
-        sdm_exact *exact = NULL;
-        const sdm_exact_opts opts = {.n_threads = d->family.n_threads};
-        s = part_mesh(d, c, &mesh, err);
-        if (!s) s = sdm_exact_create(&mesh, &opts, &exact, err);
-        if (!s) s = fill_nodes(exact, &p->near, &p->near_nodes, err);
-        if (!s) s = fill_nodes(exact, &p->far, &p->far_nodes, err);
+        part_solid solid = {0};
+        s = make_solid(d, c, &solid, err);
+        if (!s) s = fill_nodes(&solid, &p->near, &p->near_nodes, err);
+        if (!s) s = fill_nodes(&solid, &p->far, &p->far_nodes, err);
         if (!s) measure_sag(p);
-        sdm_exact_free(exact);
-        sdm_mesh_dispose(&mesh);
+        solid_free(&solid);
     }
     return s;
 }

@@ -4,9 +4,13 @@
 #include <math.h>
 #include <string.h>
 
+#include "pieces.h"
 #include "sdm/memory.h"
 
 enum { SAMPLES = 192 };
+
+/* Pieces that flex overlap their neighbours by this multiple of the tolerance: four voxels. */
+static const double OVERLAP = 200;
 
 double trainer_template_motion(const template_design *d, size_t c, const double *vert, motion *out)
 {
@@ -20,9 +24,12 @@ double trainer_template_motion(const template_design *d, size_t c, const double 
 }
 
 // Lists the vertices of each component as a part; one part with those of all components if `whole`.
-static void list_vertices(template_design *d, bool whole)
+static sdm_status list_vertices(template_design *d, bool whole, sdm_error *err)
 {
     const size_t n = d->family.base.n_vert;
+    sdm_free(d->vertices);
+    const sdm_status s = SDM_ALLOC(&d->vertices, n, "parts", err);
+    if (s) return s;
     d->n_parts = whole ? 1 : d->family.n_components;
     size_t at = 0;
     for (size_t c = 0; c < d->n_parts; c++) {
@@ -32,6 +39,7 @@ static void list_vertices(template_design *d, bool whole)
                 d->vertices[at++] = (uint32_t)v;
     }
     d->first[d->n_parts] = at;
+    return SDM_OK;
 }
 
 // Largest distances that remain over the samples, and the largest rotation angle, of each part.
@@ -158,15 +166,16 @@ static int count_bits(uint64_t v)
     return n;
 }
 
-// Merges parts that never move relative to each other; those that never move at all become one
-// part without a frame.
+// Merges parts without a warp that never move relative to each other; those that never move at all
+// become one part without a frame.
 static sdm_status merge_parts(template_design *d, dependence *dep, sdm_error *err)
 {
     size_t to[SDM_TEMPLATE_MAX_PARTS], n = 0, old[SDM_TEMPLATE_MAX_PARTS];
     for (size_t c = 0; c < d->n_parts; c++) {
         to[c] = SDM_TEMPLATE_MAX_PARTS;
         for (size_t b = 0; b < c && to[c] == SDM_TEMPLATE_MAX_PARTS; b++)
-            if (!dep->on[c][b] || (!dep->on[c][d->n_parts] && !dep->on[b][d->n_parts]))
+            if (!d->parts[c].n_modes && !d->parts[b].n_modes &&
+                (!dep->on[c][b] || (!dep->on[c][d->n_parts] && !dep->on[b][d->n_parts])))
                 to[c] = to[b];
         if (to[c] == SDM_TEMPLATE_MAX_PARTS) old[n] = c, to[c] = n++;
     }
@@ -187,7 +196,7 @@ static sdm_status merge_parts(template_design *d, dependence *dep, sdm_error *er
         d->parts[m] = d->parts[old[m]];
         for (size_t b = 0; b < n; b++) merged.on[m][b] = dep->on[old[m]][old[b]];
         merged.on[m][n] = dep->on[old[m]][d->n_parts];
-        if (!merged.on[m][n]) d->parts[m].frame = SDM_FRAME_NONE;
+        if (!merged.on[m][n] && !d->parts[m].n_modes) d->parts[m].frame = SDM_FRAME_NONE;
     }
     memcpy(d->first, first, (n + 1) * sizeof *first);
     sdm_free(d->vertices);
@@ -213,8 +222,10 @@ static sdm_status order_parts(template_design *d, const dependence *dep, sdm_err
             for (size_t b = 0; b <= n; b++) {
                 const size_t candidate = b == 0 ? n : b - 1; // the world first
                 if (candidate < n && !placed[candidate]) continue;
-                // an affine parent would stretch its children
-                if (candidate < n && d->parts[candidate].frame == SDM_FRAME_AFFINE) continue;
+                // an affine parent would stretch its children, a joint moves only by half
+                if (candidate < n &&
+                    (d->parts[candidate].frame == SDM_FRAME_AFFINE || d->parts[candidate].n_modes))
+                    continue;
                 const int bits = count_bits(dep->on[c][candidate]);
                 if (bits < fewest) fewest = bits, best = c, best_parent = candidate;
             }
@@ -263,31 +274,84 @@ static bool has_cavity(const family *f)
     return false;
 }
 
-sdm_status trainer_template_parts(template_design *d, double tolerance, sdm_error *err)
+// Replaces the components that bend by their pieces; those without rigid pieces stay as they are.
+// The list of parts is left empty if there would be too many.
+static sdm_status split_parts(template_design *d, const residuals *r, double tolerance,
+                              sdm_error *err)
 {
-    sdm_status s = SDM_ALLOC(&d->vertices, d->family.base.n_vert, "parts", err);
-    if (s) return s;
-    bool whole = d->family.n_components > SDM_TEMPLATE_MAX_PARTS || has_cavity(&d->family);
-    residuals r;
-    list_vertices(d, whole);
-    if ((s = measure(d, &r, err))) return s;
-    // a component that bends: the whole shape becomes one part with a warp
-    for (size_t c = 0; c < d->n_parts && !whole; c++)
-        if (d->n_parts > 1 && r.affine[c] > tolerance) {
-            whole = true;
-            list_vertices(d, true);
-            if ((s = measure(d, &r, err))) return s;
+    const family *f = &d->family;
+    const double overlap = OVERLAP * tolerance;
+    uint32_t *vertices = NULL;
+    size_t first[SDM_TEMPLATE_MAX_PARTS + 1] = {0}, n = 0;
+    sdm_status s = SDM_OK;
+    for (uint32_t c = 0; c < f->n_components && !s; c++) {
+        const uint32_t *own = d->vertices + d->first[c];
+        pieces found = {0};
+        if (r->affine[c] > tolerance)
+            s = trainer_pieces_find(f, c, tolerance, overlap, &found, err);
+        const bool split = found.n > 0;
+        const size_t count = split ? found.n : 1,
+                     added = split ? found.first[found.n] : d->first[c + 1] - d->first[c];
+        if (n + count > SDM_TEMPLATE_MAX_PARTS) {
+            trainer_pieces_dispose(&found);
+            n = 0;
+            break;
         }
+        uint32_t *longer = NULL;
+        if (!s) s = SDM_ALLOC(&longer, first[n] + added, "parts", err);
+        if (!s) {
+            if (n) memcpy(longer, vertices, first[n] * sizeof *longer);
+            memcpy(longer + first[n], split ? found.vertices : own, added * sizeof *longer);
+            sdm_free(vertices);
+            vertices = longer;
+            for (size_t k = 1; k <= count; k++)
+                first[n + k] = first[n] + (split ? found.first[k] : added);
+            n += count;
+        }
+        trainer_pieces_dispose(&found);
+    }
+    sdm_free(d->vertices);
+    d->vertices = vertices;
+    d->n_parts = s ? 0 : n;
+    memcpy(d->first, first, sizeof first);
+    return s;
+}
+
+// The frames that the residuals ask for.
+static void choose_frames(template_design *d, const residuals *r, double tolerance)
+{
     for (size_t c = 0; c < d->n_parts; c++) {
         sdm_template_part *p = &d->parts[c];
         p->parent = -1;
-        p->n_modes = r.affine[c] > tolerance;
-        p->frame = r.still[c] <= tolerance    ? SDM_FRAME_NONE
-                   : r.rigid[c] <= tolerance  ? SDM_FRAME_RIGID
-                   : r.affine[c] <= tolerance ? SDM_FRAME_AFFINE
-                   : r.angle[c] > 0.7         ? SDM_FRAME_RIGID
-                                              : SDM_FRAME_NONE;
+        p->n_modes = r->affine[c] > tolerance;
+        p->frame = r->still[c] <= tolerance              ? SDM_FRAME_NONE
+                   : r->rigid[c] <= tolerance            ? SDM_FRAME_RIGID
+                   : r->affine[c] <= tolerance           ? SDM_FRAME_AFFINE
+                   : r->angle[c] > 0.7 || d->n_parts > 1 ? SDM_FRAME_RIGID
+                                                         : SDM_FRAME_NONE;
     }
+}
+
+sdm_status trainer_template_parts(template_design *d, double tolerance, sdm_error *err)
+{
+    bool whole = d->family.n_components > SDM_TEMPLATE_MAX_PARTS || has_cavity(&d->family);
+    residuals r;
+    sdm_status s = list_vertices(d, whole, err);
+    if (!s) s = measure(d, &r, err);
+    if (s) return s;
+    bool bends = false;
+    for (size_t c = 0; c < d->n_parts; c++) bends |= r.affine[c] > tolerance;
+    if (bends && d->split && !whole) {
+        s = split_parts(d, &r, tolerance, err);
+        if (!s && d->n_parts > 1) s = measure(d, &r, err);
+    }
+    // a component that bends: the whole shape becomes one part with a warp
+    if (!s && bends && d->n_parts != 1 && (!d->split || d->n_parts == 0)) {
+        s = list_vertices(d, true, err);
+        if (!s) s = measure(d, &r, err);
+    }
+    if (s) return s;
+    choose_frames(d, &r, tolerance);
     if (d->n_parts == 1) return SDM_OK;
     dependence dep;
     s = find_dependence(d, 2 * tolerance, &dep, err);

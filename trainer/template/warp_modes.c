@@ -91,6 +91,7 @@ static sdm_status extend_modes(template_design *d, size_t c, const float *modes,
     if (s) return s;
     for (size_t k = 0; k < n; k++)
         memcpy(x + 3 * k, d->family.base.vert + 3 * d->vertices[d->first[c] + k], 3 * sizeof *x);
+    const double before = d->warp_error_mm;
     warp_box(d, c, reach, min, max);
     for (int a = 0; a < 3; a++) longest = fmax(longest, max[a] - min[a]);
     for (double cells = 10;; cells *= 1.3) {
@@ -106,6 +107,7 @@ static sdm_status extend_modes(template_design *d, size_t c, const float *modes,
                                      &d->warp_error_mm, err);
         if (s || d->warp_error_mm <= tolerance) break;
     }
+    d->warp_error_mm = fmax(d->warp_error_mm, before);
     sdm_free(x);
     return s;
 }

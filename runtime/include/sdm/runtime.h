@@ -22,6 +22,16 @@ typedef enum sdm_range_policy {
     SDM_RANGE_EXACT
 } sdm_range_policy;
 
+/* Points outside of the box of the voxel centres of the model's grid (sdm/field.h). */
+typedef enum sdm_outside {
+    /* The call fails with SDM_E_RANGE. */
+    SDM_OUTSIDE_REFUSE = 0,
+    /* The value is a lower bound of the distance to the part of the solid in the box. */
+    SDM_OUTSIDE_BOUND,
+    /* The exact engine computes the distance; needs exact_shape. */
+    SDM_OUTSIDE_EXACT
+} sdm_outside;
+
 typedef enum sdm_source { SDM_SOURCE_NETWORK = 0, SDM_SOURCE_EXACT = 1 } sdm_source;
 
 /* Why the exact engine computed a map. */
@@ -55,6 +65,7 @@ typedef struct sdm_generate_opts {
        bound. */
     double max_error_mm;
     sdm_check_stat max_error_of; /* the statistic that max_error_mm bounds */
+    sdm_outside outside;         /* points and grids that leave the model's box (sdm/field.h) */
 } sdm_generate_opts;
 
 /* One map: values[nz][ny][nx] on the model's grid, mm, negative inside, for params[n_params] in the

@@ -15,7 +15,9 @@
  *   an exact map          sdm/exact.h           distances of a mesh, at points and on grids
  *   a map by a network    sdm/model.h           opens a model file
  *                         sdm/runtime.h         maps and derivatives at given parameters
+ *                         sdm/field.h           the same on any grid, at points, as a narrow band
  *                         sdm/check.h           error of a map
+ *   a narrow band         sdm/blocks.h          values near a surface, in blocks of voxels
  *   use of a map          sdm/map.h             gradient
  *                         sdm/isosurface.h      surface as a mesh
  *                         sdm/vdb.h             OpenVDB level set [sdmgen::vdb]
@@ -43,10 +45,12 @@
 #ifndef SDM_SDMGEN_H
 #define SDM_SDMGEN_H
 
+#include "sdm/blocks.h"
 #include "sdm/builtin_shapes.h"
 #include "sdm/check.h"
 #include "sdm/exact.h"
 #include "sdm/export.h"
+#include "sdm/field.h"
 #include "sdm/fit.h"
 #include "sdm/grid.h"
 #include "sdm/image.h"

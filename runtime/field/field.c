@@ -1,0 +1,137 @@
+/* A field: the splines of a model's map at one parameter vector. */
+#include "sdm/field.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "field_parts.h"
+#include "maps/check_results.h"
+#include "maps/generate_parts.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/threads.h"
+
+static sdm_status allocate(sdm_field *f, sdm_error *err)
+{
+    const size_t p = f->info->n_params, n_maps = f->derivatives ? p + 1 : 1;
+    int64_t longest = 0;
+    for (int a = 0; a < 3; a++) longest = f->shape.n[a] > longest ? f->shape.n[a] : longest;
+    size_t count;
+    sdm_status s = sdm_mul(n_maps, f->shape.count, &count, err);
+    if (!s) s = SDM_ALLOC(&f->splines, count, "splines of a field", err);
+    if (!s) s = SDM_ALLOC(&f->maps, n_maps * f->voxels, "maps of a field", err);
+    if (!s) s = SDM_ALLOC(&f->factor, (size_t)longest, "factors of a spline", err);
+    if (!s) s = SDM_ALLOC(&f->params, p, "parameters", err);
+    return s ? s : SDM_ALLOC(&f->used, p, "parameters", err);
+}
+
+sdm_status sdm_field_create(const sdm_model *m, const sdm_generate_opts *opts, bool derivatives,
+                            sdm_field **out, sdm_error *err)
+{
+    if (!m || !out)
+        return sdm_fail(err, SDM_E_ARG, "field: a model and a place for the field are needed");
+    *out = NULL;
+    sdm_generate_opts o;
+    sdm_status s = sdm_generate_check_options(m, opts, &o, err);
+    if (!s && sdm_wants_check(&o))
+        s = sdm_fail(err, SDM_E_ARG, "field: check and max_error_mm are for maps");
+    sdm_field *f = NULL;
+    if (!s) s = SDM_ALLOC(&f, 1, "field", err);
+    if (s) return s;
+    f->model = m;
+    f->info = sdm_model_get_info(m);
+    f->opts = o;
+    f->n_threads = sdm_threads(o.n_threads);
+    f->derivatives = derivatives;
+    f->shape = sdm_spline_shape(f->info->grid.n);
+    f->frame = sdm_spline_frame(&f->info->grid);
+    f->kernels = sdm_spline_kernels();
+    f->voxels = sdm_grid_count(&f->info->grid);
+    s = allocate(f, err);
+    if (s) {
+        sdm_field_free(f);
+        return s;
+    }
+    *out = f;
+    return SDM_OK;
+}
+
+static void free_exact(sdm_field *f)
+{
+    sdm_exact_free(f->engine);
+    sdm_mesh_dispose(&f->mesh);
+    f->engine = NULL;
+}
+
+void sdm_field_free(sdm_field *f)
+{
+    if (!f) return;
+    free_exact(f);
+    sdm_free(f->used);
+    sdm_free(f->params);
+    sdm_free(f->factor);
+    sdm_free(f->maps);
+    sdm_free(f->splines);
+    sdm_free(f);
+}
+
+/* The exact engine at the parameters of the field. */
+static sdm_status open_exact(sdm_field *f, sdm_error *err)
+{
+    const sdm_exact_opts exact = {.n_threads = f->opts.n_threads};
+    sdm_status s = sdm_instance_mesh(f->opts.exact_shape, f->params, &f->mesh, err);
+    return s ? s : sdm_exact_create(&f->mesh, &exact, &f->engine, err);
+}
+
+/* The maps and splines by the network. */
+static sdm_status fill_maps(sdm_field *f, sdm_error *err)
+{
+    const sdm_generate_opts plain = {.n_threads = f->opts.n_threads};
+    const size_t n_maps = f->derivatives ? f->info->n_params + 1 : 1;
+    const sdm_status s = f->derivatives
+                             ? sdm_generate_jacobian(f->model, f->used, &plain, f->maps,
+                                                     f->maps + f->voxels, NULL, err)
+                             : sdm_generate(f->model, f->used, &plain, f->maps, NULL, err);
+    for (size_t i = 0; i < n_maps && !s; i++)
+        sdm_spline_fit(&f->shape, f->maps + i * f->voxels, f->n_threads, f->factor,
+                       f->splines + i * f->shape.count);
+    return s;
+}
+
+sdm_status sdm_field_set_params(sdm_field *f, const double *params, sdm_result *result,
+                                sdm_error *err)
+{
+    if (!f || !params) return sdm_fail(err, SDM_E_ARG, "field: a field and parameters are needed");
+    f->ready = false;
+    free_exact(f);
+    memcpy(f->params, params, f->info->n_params * sizeof *params);
+    sdm_status s = sdm_generate_check_params(f->model, params, &f->opts, f->used, &f->result, err);
+    if (!s && !field_is_exact(f)) {
+        // clamped parameters are those of every later exact distance too
+        memcpy(f->params, f->used, f->info->n_params * sizeof *params);
+        s = fill_maps(f, err);
+    }
+    if (!s && (field_is_exact(f) || f->opts.outside == SDM_OUTSIDE_EXACT)) s = open_exact(f, err);
+    f->ready = !s;
+    if (!s && result) *result = f->result;
+    return s;
+}
+
+sdm_status sdm_field_check(const sdm_field *f, const float *slopes, sdm_error *err)
+{
+    if (!f->ready) return sdm_fail(err, SDM_E_ARG, "field: sdm_field_set_params() comes first");
+    if (slopes && !f->derivatives)
+        return sdm_fail(err, SDM_E_ARG, "field: created without derivatives, slopes are not known");
+    return SDM_OK;
+}
+
+sdm_status sdm_field_refuse(const sdm_field *f, const char *what, sdm_error *err)
+{
+    const sdm_grid *g = &f->info->grid;
+    const double last[3] = {(double)(g->n[0] - 1), (double)(g->n[1] - 1), (double)(g->n[2] - 1)};
+    double end[3];
+    sdm_grid_world(g, last, end);
+    return sdm_fail(err, SDM_E_RANGE,
+                    "%s the box in which the network knows the distance, from (%.6g, %.6g, %.6g) "
+                    "to (%.6g, %.6g, %.6g) mm; other ways for points outside: bound, exact",
+                    what, g->origin[0], g->origin[1], g->origin[2], end[0], end[1], end[2]);
+}

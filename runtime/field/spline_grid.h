@@ -1,0 +1,60 @@
+/* Splines at all voxels of a grid whose axes are parallel to those of the map. Internal to the room
+   `field`. */
+#pragma once
+
+#include "spline.h"
+
+/* A grid in the frame of a map. */
+typedef struct spline_grid {
+    spline_axis axis[3]; /* along x, y, z of the grid */
+    int32_t *memory;
+} spline_grid;
+
+/* The map from world coordinates (mm) to indices: index = to_index (world - origin), row-major. */
+typedef struct spline_frame {
+    double origin[3], to_index[9], spacing[3], dir[9];
+} spline_frame;
+
+spline_frame sdm_spline_frame(const sdm_grid *map);
+
+/* index[3] = the index of a world position. */
+static inline void sdm_spline_index(const spline_frame *f, const double world[3], double index[3])
+{
+    const double d[3] = {world[0] - f->origin[0], world[1] - f->origin[1], world[2] - f->origin[2]};
+    for (int a = 0; a < 3; a++)
+        index[a] = f->to_index[3 * a] * d[0] + f->to_index[3 * a + 1] * d[1] +
+                   f->to_index[3 * a + 2] * d[2];
+}
+
+/* Whether every axis of `grid` is parallel to one of the map (to 1e-9). */
+bool sdm_spline_is_parallel(const spline_frame *f, const sdm_grid *grid);
+
+/* The places of the positions (i + offset) stride, i < n[a], along each axis of a parallel grid.
+   Call sdm_spline_grid_dispose() also after an error. SDM_E_NOMEM. */
+sdm_status sdm_spline_grid_create(const spline_shape *s, const spline_frame *f,
+                                  const sdm_grid *grid, const int64_t n[3], double offset,
+                                  double stride, spline_grid *out, sdm_error *err);
+void sdm_spline_grid_dispose(spline_grid *g);
+
+/* *rows = new array [s->padded of z][of y][n[0]] where z and y are the axes of the map that belong
+   to those of the grid: the coefficients interpolated along x, in the rows that the grid needs;
+   free with sdm_free(). SDM_E_NOMEM. */
+sdm_status sdm_spline_rows(const spline_shape *s, const spline_grid *g, const float *coefficient,
+                           int n_threads, float **rows, sdm_error *err);
+
+/* values[nz][ny][nx] = the spline at the voxels of a grid; beyond the box, at the nearest point of
+   the box. Voxels at nodes get the value of map[] (NULL: that of the spline). SDM_E_NOMEM. */
+sdm_status sdm_spline_map(const spline_shape *s, const spline_grid *g, const float *coefficient,
+                          const float *map, int n_threads, float *values, sdm_error *err);
+
+/* The index of voxel (i, j, k) of the grid in the map if all three are nodes; else -1. */
+static inline int64_t sdm_spline_node(const spline_shape *s, const spline_grid *g,
+                                      const int64_t at[3])
+{
+    int64_t voxel[3];
+    for (int b = 0; b < 3; b++) {
+        voxel[g->axis[b].axis] = g->axis[b].node[at[b]];
+        if (g->axis[b].node[at[b]] < 0) return -1;
+    }
+    return (voxel[2] * s->n[1] + voxel[1]) * s->n[0] + voxel[0];
+}

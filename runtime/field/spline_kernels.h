@@ -1,0 +1,36 @@
+/* The inner loops of splines, compiled for several instruction sets. All give the same bits: a sum
+   of four products is (w0 c0 + w1 c1) + (w2 c2 + w3 c3) along x, then along y, then along z,
+   without fused multiply-adds. Internal to the room `field`. */
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* A block of 8 x 8 x 8 positions of a grid. */
+typedef struct spline_block {
+    const float *rows;  /* interpolated along x: the eight positions of coefficient row (0, 0) */
+    size_t line, plane; /* distances of rows of coefficients along y and z, in floats */
+    const int32_t *cell[2];      /* [8] y and z: the first of the four coefficients */
+    const float (*weight[2])[4]; /* [8] */
+} spline_block;
+
+typedef struct spline_table {
+    /* out[i] = sum over k of weight[i][k] row[cell[i] + k], i < n. */
+    void (*expand)(size_t n, const int32_t *cell, const float (*weight)[4], const float *row,
+                   float *out);
+    /* out[i] = sum over k of weight[k] row[k][i], i < n. */
+    void (*combine)(size_t n, const float *const row[4], const float weight[4], float *out);
+    /* out[8][8][8] = the values of a block. */
+    void (*block)(const spline_block *b, float *out);
+    /* The spline at one point. c: the first of its 4 x 4 x 4 coefficients, rows `line` and planes
+       `plane` floats apart; weight[3][4] along x, y, z. */
+    float (*value)(const float *c, size_t line, size_t plane, const float (*weight)[4]);
+    /* gradient[3] = its derivatives by the index; slope[3][4]: derivatives of the weights. */
+    void (*gradient)(const float *c, size_t line, size_t plane, const float (*weight)[4],
+                     const float (*slope)[4], float gradient[3]);
+} spline_table;
+
+extern const spline_table sdm_spline_generic, sdm_spline_avx2, sdm_spline_avx512;
+
+/* The table for this processor. */
+const spline_table *sdm_spline_kernels(void);

@@ -1,0 +1,106 @@
+/* The loops of spline_kernels.h, compiled once for each instruction set. Before inclusion, define
+   TABLE, the name of the spline_table. */
+#include <string.h>
+
+#include "spline_kernels.h"
+
+typedef float four __attribute__((vector_size(16)));
+typedef float four_u __attribute__((vector_size(16), aligned(4)));
+
+static inline four load(const float *p) { return *(const four_u *)p; }
+
+/* The sums of a, b, c and d, each (x0 + x1) + (x2 + x3). */
+static inline four sums(four a, four b, four c, four d)
+{
+    const four ab = __builtin_shufflevector(a, b, 0, 2, 4, 6) +
+                    __builtin_shufflevector(a, b, 1, 3, 5, 7),
+               cd = __builtin_shufflevector(c, d, 0, 2, 4, 6) +
+                    __builtin_shufflevector(c, d, 1, 3, 5, 7);
+    return __builtin_shufflevector(ab, cd, 0, 2, 4, 6) +
+           __builtin_shufflevector(ab, cd, 1, 3, 5, 7);
+}
+
+static inline float sum(four a) { return (a[0] + a[1]) + (a[2] + a[3]); }
+
+static inline four mix(const four *row, const float *w)
+{
+    return (w[0] * row[0] + w[1] * row[1]) + (w[2] * row[2] + w[3] * row[3]);
+}
+
+static void expand(size_t n, const int32_t *cell, const float (*weight)[4], const float *row,
+                   float *out)
+{
+    size_t i = 0;
+    for (; i + 4 <= n; i += 4) {
+        four product[4];
+        for (size_t k = 0; k < 4; k++) product[k] = load(weight[i + k]) * load(row + cell[i + k]);
+        *(four_u *)(out + i) = sums(product[0], product[1], product[2], product[3]);
+    }
+    for (; i < n; i++) out[i] = sum(load(weight[i]) * load(row + cell[i]));
+}
+
+static inline void combine_loop(size_t n, const float *restrict a, const float *restrict b,
+                                const float *restrict c, const float *restrict d, const float *w,
+                                float *restrict out)
+{
+    const float p = w[0], q = w[1], r = w[2], s = w[3];
+    for (size_t i = 0; i < n; i++) out[i] = (p * a[i] + q * b[i]) + (r * c[i] + s * d[i]);
+}
+
+static void combine(size_t n, const float *const row[4], const float weight[4], float *out)
+{
+    combine_loop(n, row[0], row[1], row[2], row[3], weight, out);
+}
+
+/* Planes of coefficients, interpolated along y too, are kept while z needs them: plane p in slot
+   p % 4. */
+static void block(const spline_block *b, float *out)
+{
+    float kept[4][64];
+    int32_t plane[4] = {-1, -1, -1, -1};
+    for (int k = 0; k < 8; k++, out += 64) {
+        for (int32_t p = b->cell[1][k]; p < b->cell[1][k] + 4; p++) {
+            if (plane[p & 3] == p) continue;
+            plane[p & 3] = p;
+            for (int j = 0; j < 8; j++) {
+                const float *row = b->rows + (size_t)p * b->plane + (size_t)b->cell[0][j] * b->line;
+                combine_loop(8, row, row + b->line, row + 2 * b->line, row + 3 * b->line,
+                             b->weight[0][j], kept[p & 3] + 8 * j);
+            }
+        }
+        const int32_t p = b->cell[1][k];
+        combine_loop(64, kept[p & 3], kept[(p + 1) & 3], kept[(p + 2) & 3], kept[(p + 3) & 3],
+                     b->weight[1][k], out);
+    }
+}
+
+static float value(const float *c, size_t line, size_t plane, const float (*weight)[4])
+{
+    const four x = load(weight[0]), y = load(weight[1]), z = load(weight[2]);
+    four column[4];
+    for (size_t k = 0; k < 4; k++) {
+        const float *row = c + k * plane;
+        column[k] = y * sums(x * load(row), x * load(row + line), x * load(row + 2 * line),
+                             x * load(row + 3 * line));
+    }
+    return sum(z * sums(column[0], column[1], column[2], column[3]));
+}
+
+static void gradient(const float *c, size_t line, size_t plane, const float (*weight)[4],
+                     const float (*slope)[4], float out[3])
+{
+    four row[4], by_z[4]; // interpolated along z, and its derivative by z
+    for (size_t j = 0; j < 4; j++) {
+        four column[4];
+        for (size_t k = 0; k < 4; k++) column[k] = load(c + k * plane + j * line);
+        row[j] = mix(column, weight[2]);
+        by_z[j] = mix(column, slope[2]);
+    }
+    const four x = load(weight[0]);
+    const four all = sums(load(slope[0]) * mix(row, weight[1]), x * mix(row, slope[1]),
+                          x * mix(by_z, weight[1]), x);
+    memcpy(out, &all, 3 * sizeof *out);
+}
+
+const spline_table TABLE = {
+    .expand = expand, .combine = combine, .block = block, .value = value, .gradient = gradient};

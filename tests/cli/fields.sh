@@ -1,0 +1,80 @@
+#!/usr/bin/env bash
+# sdmgen generate on other grids than the model's: size, spacing, origin, direction, bands without whole maps, grids that leave the box.
+# Tests: bench_field.c cmd_generate.c model_grid.c
+. "$(dirname "$0")/common.sh"
+model=../files-of-train/run/model.sdm
+present $model
+
+# crc OPTION...: the checksum of the values of the map
+crc() {
+    expect 0 - sdmgen generate $model -p a=4.2 "$@" --json
+    json values_crc64
+}
+
+# The model's own grid, however it is asked for, has the same values; every second voxel of a finer grid is one of it.
+own=$(crc)
+[ "$own" = "$(crc --size 16,14,12)" ] || bad 'size of the model: other values'
+[ "$own" = "$(crc --spacing 0.8)" ] || bad 'spacing of the model: other values'
+expect 0 - sdmgen generate $model -p a=4.2 --spacing 0.4 -o fine.nrrd -o fine.npy --jacobian j.npy --gradient g.npy --json
+has '"size": \[31, 27, 23\]'
+present fine.nrrd fine.npy j.npy g.npy
+[ "$(wc -c <j.npy)" -ge $((4 * 31 * 27 * 23 * 4)) ] || bad 'j.npy is too small'
+[ "$(crc --spacing 0.4)" = "$(crc --spacing 0.4 --threads 1)" ] || bad 'the values depend on the number of threads'
+[ "$own" != "$(crc --spacing 0.4)" ] || bad 'a finer grid has the values of the model'
+expect 0 - sdmgen generate $model --size 9,8,7 --spacing 0.3,0.2,0.1 --origin 0,0,1 --direction 0,1,0,-1,0,0,0,0,1 -o turned.nrrd --json
+has '"size": \[9, 8, 7\], "spacing": \[0.3, 0.2, 0.1\], "origin": \[0, 0, 1\]'
+grep -aq 'space directions: (0,-0.3' turned.nrrd || bad 'the direction is not in the file'
+expect 0 - sdmgen generate $model -p a=4.2 --spacing 0.4 --check
+has 'error near the surface'
+expect 0 'computed by the exact engine' sdmgen generate $model -p a=4.2 --spacing 0.4 --max-error 1e-6 -o e.npy
+
+# Level sets come from bands; with another output besides, from whole maps. Both are the same.
+if sdmgen generate $model -p a=4.2 --spacing 0.1 -o band.vdb --quiet 2>err; then
+    expect 0 - sdmgen verify band.vdb
+    sdmgen generate $model -p a=4.2 --spacing 0.1 -o whole.vdb -o whole.npy --quiet
+    hash_of() { sdmgen info "$1" | grep sdm_hash; }
+    [ "$(hash_of band.vdb)" = "$(hash_of whole.vdb)" ] || bad 'a band gives another level set than the map'
+    expect 0 - sdmgen generate $model -p a=4.2 --size 100,100,100 -o cube.vdb --quiet # the band stays in the box
+    expect 2 'a level set needs voxels of one size' sdmgen generate $model --spacing 0.1,0.1,0.2 -o x.vdb
+    expect 2 'need a larger one' sdmgen generate $model --spacing 1e-6 -o x.vdb
+fi
+
+# Points: the values of the grid, gradients, derivatives.
+printf 'x,y,z\n-6,-5.2,-4.4\n0.1,0.2,0.3\n' >points.csv
+expect 0 - sdmgen generate $model -p a=4.2 --points points.csv --columns distance,gradient -o at.csv -o at.npy --jacobian slopes.npy
+[ "$(head -n 1 at.csv)" = distance,gradient_x,gradient_y,gradient_z ] || bad 'points: wrong header'
+[ "$(wc -l <at.csv)" -eq 3 ] || bad 'points: wrong number of rows'
+expect 0 - sdmgen generate $model -p a=4.2 --points points.csv -o one.csv --outside bound
+printf '90,1,1\n' >far.csv
+expect 5 'point 0 .*outside of the box' sdmgen generate $model --points far.csv -o x.csv
+expect 2 'distance and gradient only' sdmgen generate $model --points points.csv --columns triangle -o x.csv
+expect 2 'do not apply' sdmgen generate $model --points points.csv --spacing 0.4 -o x.csv
+expect 2 'an output is needed' sdmgen generate $model --points points.csv
+expect 2 'belongs to --points' sdmgen generate $model --columns distance -o x.npy
+absent x.csv
+
+# Grids that leave the box of the model.
+expect 5 'the grid leaves the box.*bound, exact' sdmgen generate $model --size 30,30,30 -o x.npy
+expect 0 - sdmgen generate $model --size 30,30,30 --outside bound -o bound.npy
+expect 0 - sdmgen generate $model --size 30,30,30 --outside exact -o exact.npy
+cmp -s bound.npy exact.npy && bad 'bound and exact are the same'
+expect 0 'clamped to it' sdmgen generate $model -p a=7 --policy clamp --spacing 0.4 -o c.npy
+expect 5 "parameter 'a' = 7" sdmgen generate $model -p a=7 --spacing 0.4 -o x.npy
+
+# Times on another grid.
+expect 0 - sdmgen bench network $model --size 40,36,32 --json
+for key in ms_field_params ms_field_map ms_field_band field_band_blocks us_field_point us_field_single_point; do
+    awk -v v="$(json $key)" 'BEGIN { exit !(v > 0) }' || bad "bench: no $key"
+done
+expect 0 - sdmgen bench network $model --size 40,36,32
+has 'map of 40 x 36 x 32 +[0-9.]+ ms'
+
+# Mistakes.
+expect 2 'spacing' sdmgen generate $model --spacing 0 -o x.npy
+expect 2 'spacing' sdmgen generate $model --spacing nan -o x.npy
+expect 2 'not orthonormal' sdmgen generate $model --direction 1,0,0,0,1,0,0,0.1,1 -o x.npy
+expect 2 'nine numbers' sdmgen generate $model --direction 1,0,0 -o x.npy
+expect 2 'size' sdmgen generate $model --size 0,1,1 -o x.npy
+expect 2 'one of refuse\|bound\|exact' sdmgen generate $model --outside far -o x.npy
+absent x.npy x.vdb
+finish

@@ -196,6 +196,20 @@ static bool tile_store_block(const tile *t, const int64_t size[3], const float d
     return true;
 }
 
+/* Writes the first size[3] voxels of a tile to the blocks that contain them. A function of its own:
+   inlined, it would slow whole maps down. */
+static __attribute__((noinline)) void tile_store_blocks(const tile *t, const int64_t size[3],
+                                                        const float d[64])
+{
+    const int64_t *whole = t->job->part[SDM_TILES].size;
+    if (tile_store_block(t, size, d)) return;
+    for (int64_t z = 0; z < size[2]; z++)
+        for (int64_t y = 0; y < size[1]; y++) {
+            const int64_t at[3] = {t->first[0], t->first[1] + y, t->first[2] + z};
+            row_write_blocks(t->job->blocks, at, size[0], &d[(z * whole[1] + y) * whole[0]]);
+        }
+}
+
 /* Writes distances (mm) and, if wanted, slots of the voxels of a tile that are inside the grid. */
 static inline void tile_store(const tile *t, const float d[64], const uint32_t slot[64])
 {
@@ -205,17 +219,15 @@ static inline void tile_store(const tile *t, const float d[64], const uint32_t s
     int64_t size[3];
     for (int a = 0; a < 3; a++)
         size[a] = job->n[a] - t->first[a] < whole[a] ? job->n[a] - t->first[a] : whole[a];
-    if (job->blocks && tile_store_block(t, size, d)) return;
+    if (job->blocks) {
+        tile_store_blocks(t, size, d);
+        return;
+    }
     for (int64_t z = 0; z < size[2]; z++)
         for (int64_t y = 0; y < size[1]; y++) {
             const int64_t to =
                 ((t->first[2] + z) * job->n[1] + t->first[1] + y) * job->n[0] + t->first[0];
             const int64_t from = (z * whole[1] + y) * whole[0];
-            if (job->blocks) {
-                const int64_t at[3] = {t->first[0], t->first[1] + y, t->first[2] + z};
-                row_write_blocks(job->blocks, at, size[0], &d[from]);
-                continue;
-            }
             if (size[0] == 4) // the usual size: a constant lets the compiler inline memcpy
                 memcpy(&job->values[to], &d[from], 4 * sizeof *d);
             else
@@ -225,7 +237,7 @@ static inline void tile_store(const tile *t, const float d[64], const uint32_t s
 }
 
 /* Writes a tile whose voxels all lie outside the band. */
-static void tile_write_far(const tile *t)
+static __attribute__((noinline)) void tile_write_far(const tile *t)
 {
     float d[64];
     uint32_t slot[64];

@@ -60,7 +60,7 @@ static inline double body_distance(const body *o, const double y[3], double g[3]
     return o->kind == QUADRIC ? (length * length - o->r * o->r) / (2 * o->r) : length - o->r;
 }
 
-static inline toy toy_new(const sdm_grid *grid, size_t step)
+static inline toy toy_new(const sdm_grid *grid)
 {
     toy t = {.info = {.shape = "toy", .n_params = P, .seed = 7, .config = "seed: 7\n"}};
     for (int i = 0; i < P; i++) {
@@ -68,7 +68,7 @@ static inline toy toy_new(const sdm_grid *grid, size_t step)
         t.params[i].min = -1 + 3 * i, t.params[i].max = 2 + 4 * i, t.params[i].def = 2 * i;
     }
     t.info.grid = *grid;
-    t.spec = (sdm_template_spec){.degree = 2, .n_terms = sdm_poly_count(P, 2), .step = step};
+    t.spec = (sdm_template_spec){.degree = 2, .n_terms = sdm_poly_count(P, 2)};
     return t;
 }
 

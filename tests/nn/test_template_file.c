@@ -17,7 +17,7 @@ static const double ORIGIN[3] = {0, 0, 0};
 static toy make(void)
 {
     const sdm_grid grid = sdm_grid_centred((const int64_t[]){9, 1, 1}, 0.5, ORIGIN);
-    toy t = toy_new(&grid, 4);
+    toy t = toy_new(&grid);
     const sdm_lattice near = lattice(ORIGIN, 1, 0.5), far = lattice(ORIGIN, 4, 2),
                       warp = lattice(ORIGIN, 6, 3);
     const body o = {CAPSULE, {0, 0, 0}, {0, 0, 1}, 0.5};

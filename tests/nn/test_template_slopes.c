@@ -30,8 +30,9 @@ static const double TOLERANCE[TOYS] = {1e-3, 1e-3, 4e-3, 4e-3};
 
 static toy make(int which, const sdm_grid *grid)
 {
-    toy t = toy_new(grid, which == 3 ? 3 : 4);
-    const sdm_lattice near = lattice(ORIGIN, 4, 0.5), far = lattice(ORIGIN, 40, 2),
+    toy t = toy_new(grid);
+    // wide enough that no block of a part with a warp is interpolated from its corners
+    const sdm_lattice near = lattice(ORIGIN, which < 2 ? 4 : 16, 0.5), far = lattice(ORIGIN, 40, 2),
                       warp = lattice(ORIGIN, 40, 4);
     const body planes[3] = {{PLANE, {0, 0, 1}, {0, 0, 1}, 0},
                             {PLANE, {0, 2, 1}, {0, 0.6, 0.8}, 0},

@@ -190,8 +190,7 @@ sdm_template_spec trainer_template_spec(const template_design *d)
                                .n_terms = d->n_terms,
                                .degree = d->degree,
                                .functions = d->functions,
-                               .parts = d->parts,
-                               .step = d->step};
+                               .parts = d->parts};
 }
 
 // The network without a correction, to be evaluated during the training.
@@ -216,72 +215,14 @@ static sdm_status make_model(template_design *d, sdm_error *err)
     return s;
 }
 
-// *rms = root mean square difference of two models near the surface, mm, over a few random shapes.
-static sdm_status model_difference(const template_design *d, const sdm_model *a, const sdm_model *b,
-                                   double *rms, sdm_error *err)
-{
-    enum { SHAPES = 4 };
-    const size_t n = sdm_grid_count(d->grid);
-    const double near = 2 * d->grid->spacing[0];
-    float *x = NULL, *y = NULL;
-    void *scratch = NULL;
-    double p[SDM_POD_MAX_PARAMS], sum = 0, count = 0;
-    const size_t bytes_a = sdm_model_scratch_bytes(a, 1), bytes_b = sdm_model_scratch_bytes(b, 1);
-    sdm_status s = SDM_ALLOC(&x, n, "template", err);
-    if (!s) s = SDM_ALLOC(&y, n, "template", err);
-    if (!s) s = sdm_alloc(&scratch, bytes_a > bytes_b ? bytes_a : bytes_b, 1, "template", err);
-    for (size_t i = 0; i < SHAPES && !s; i++) {
-        trainer_family_params(&d->family, i, p);
-        sdm_model_forward(a, p, 1, x, scratch);
-        sdm_model_forward(b, p, 1, y, scratch);
-        for (size_t v = 0; v < n; v++)
-            if (fabs((double)x[v]) <= near)
-                sum += ((double)x[v] - (double)y[v]) * ((double)x[v] - (double)y[v]), count++;
-    }
-    *rms = sqrt(sum / fmax(count, 1));
-    sdm_free(scratch);
-    sdm_free(y);
-    sdm_free(x);
-    return s;
-}
-
-// The largest step between stations of the warp whose maps differ by at most `tolerance` from those
-// of the present step.
-static sdm_status choose_step(template_design *d, double tolerance, sdm_error *err)
-{
-    static const size_t STEPS[] = {8, 6};
-    sdm_model *fine = d->model;
-    const size_t step = d->step;
-    sdm_status s = SDM_OK;
-    bool found = false;
-    for (size_t i = 0; i < sizeof STEPS / sizeof *STEPS && !s && !found; i++) {
-        double rms = INFINITY;
-        d->model = NULL;
-        d->step = STEPS[i];
-        s = make_model(d, err);
-        if (!s) s = model_difference(d, fine, d->model, &rms, err);
-        found = !s && rms <= tolerance;
-        if (!found) sdm_model_free(d->model);
-    }
-    if (found) {
-        sdm_model_free(fine);
-    } else {
-        d->model = fine;
-        d->step = step;
-    }
-    return s;
-}
-
 sdm_status trainer_template_design(template_design *d, sdm_error *err)
 {
     const double h = fmin(fmin(d->grid->spacing[0], d->grid->spacing[1]), d->grid->spacing[2]);
-    d->step = 4;
     sdm_status s = trainer_family_create(&d->family, err);
     if (!s) s = trainer_template_parts(d, 0.02 * h, err);
     if (!s) s = design_motion(d, 0.005 * h, err);
-    if (!s) s = trainer_template_maps(d, 6, err);
+    if (!s) s = trainer_template_maps(d, err);
     if (!s) s = make_model(d, err);
-    if (!s && d->n_parts == 1 && d->parts[0].n_modes) s = choose_step(d, 0.005 * h, err);
     return s;
 }
 

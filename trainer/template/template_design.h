@@ -14,7 +14,6 @@ typedef struct template_design {
     size_t first[SDM_TEMPLATE_MAX_PARTS + 1]; /* part c: vertices[first[c] .. first[c + 1] - 1] */
     size_t n_numbers, n_terms, degree;        /* N, F */
     double *functions;                        /* [N][F] */
-    size_t step;                              /* as in sdm_template_spec */
     double motion_error_mm; /* error of frames and amplitudes on meshes left out, mm */
     double warp_error_mm;   /* root mean square error of warps at the vertices, mm; 0: no warp */
     sdm_model *model;       /* the network without a correction */

@@ -159,9 +159,9 @@ static void measure_sag(sdm_template_part *p)
     }
 }
 
-sdm_status trainer_template_maps(template_design *d, double margin, sdm_error *err)
+sdm_status trainer_template_maps(template_design *d, sdm_error *err)
 {
-    enum { FAR_NODES = 1 << 20 };
+    enum { FAR_NODES = 1 << 20, NEAR = 6, NEAR_WARPED = 3 }; // NEAR: voxels around the part
     const double h = fmin(fmin(d->grid->spacing[0], d->grid->spacing[1]), d->grid->spacing[2]);
     box reach[SDM_TEMPLATE_MAX_PARTS];
     sdm_status s = grid_boxes(d, reach, err);
@@ -170,7 +170,8 @@ sdm_status trainer_template_maps(template_design *d, double margin, sdm_error *e
         box b = EMPTY;
         for (size_t k = d->first[c]; k < d->first[c + 1]; k++)
             box_add(&b, d->family.base.vert + 3 * d->vertices[k]);
-        if (!lattice_of(&b, margin * h, h, SDM_TEMPLATE_MAX_NODES, &p->near))
+        const double margin = (p->n_modes ? NEAR_WARPED : NEAR) * h;
+        if (!lattice_of(&b, margin, h, SDM_TEMPLATE_MAX_NODES, &p->near))
             return sdm_fail(err, SDM_E_UNSUPPORTED,
                             "shape '%s': too large for a template with the spacing of the grid",
                             sdm_instance_shape(d->family.shape)->name);

@@ -15,8 +15,8 @@ static void add_lattice(sdm_text *t, const char *key, const sdm_lattice *l)
 static void describe(const sdm_template_spec *spec, sdm_text *t)
 {
     sdm_model_describe(spec->info, sdm_kind_template.name, t);
-    sdm_text_add(t, "template.degree=%zu\ntemplate.numbers=%zu\ntemplate.step=%zu\n", spec->degree,
-                 spec->n_numbers, spec->step);
+    sdm_text_add(t, "template.degree=%zu\ntemplate.numbers=%zu\ntemplate.step=%d\n", spec->degree,
+                 spec->n_numbers, SDM_TEMPLATE_STEP);
     sdm_text_add(t, "template.parts=%zu\n", spec->n_parts);
     for (size_t c = 0; c < spec->n_parts; c++) {
         const sdm_template_part *p = &spec->parts[c];

@@ -1,7 +1,5 @@
 /* Maps of a template network. No allocation. */
-#include <string.h>
-
-#include "template_rows.h"
+#include "template_work.h"
 
 static size_t correction_bytes(const template_network *k)
 {
@@ -15,19 +13,6 @@ size_t sdm_template_scratch_bytes(const sdm_model *m, size_t n, int n_threads)
     return sdm_template_carve(m, false, 1, correction_bytes(m->network), NULL, &w);
 }
 
-// values = the minimum over the parts
-static void fill_map(template_work *w, float *values)
-{
-    template_patch p = {.count = 0};
-    while (sdm_template_next(w, &p)) {
-        sdm_template_values(w, &p, w->value, NULL);
-        const float *from = w->value;
-        for (size_t z = 0; z < p.n[2]; z++)
-            for (size_t y = 0; y < p.n[1]; y++, from += p.n[0])
-                memcpy(values + sdm_template_line_at(w, &p, y, z), from, p.n[0] * sizeof *from);
-    }
-}
-
 void sdm_template_forward(const sdm_model *m, const double *params, size_t n, float *values,
                           void *scratch, int n_threads)
 {
@@ -35,12 +20,16 @@ void sdm_template_forward(const sdm_model *m, const double *params, size_t n, fl
     const template_network *k = m->network;
     template_work w;
     sdm_template_carve(m, false, 1, correction_bytes(k), scratch, &w);
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < n; i++, values += sdm_grid_count(&m->info.grid)) {
         const double *p = params + i * m->info.n_params;
-        sdm_template_begin(&w, p, false);
         if (k->correction)
             k->correction->kind->forward(k->correction, p, 1, w.correction, w.correction_scratch,
                                          1);
-        fill_map(&w, values + i * sdm_grid_count(&m->info.grid));
+        sdm_template_begin(&w, p, false);
+        for (size_t j = 0; j < w.n_blocks; j++) {
+            const template_block b = sdm_template_block(&w, j);
+            sdm_template_values(&w, &b, w.value, NULL);
+            sdm_template_store(&w, &b, w.value, values);
+        }
     }
 }

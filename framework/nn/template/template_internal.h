@@ -5,7 +5,7 @@
      control      the control displacements of one warp: the sum of its modes
      carried      for a voxel x, the point y of the template with T(y + U(y)) = x
      metric       B B^T with B = d y / d x: |grad_x d0(y(x))|^2 = g^T B B^T g
-     station      a voxel index at which y and the metric are computed exactly: every `step` voxels
+     station      a voxel index at which y and the metric are computed exactly: every fourth voxel
                   along each axis, from one step before the grid to one after it; between stations y
                   follows cubic B-splines, the metric is linear
      index        a point in units of the lattice `near`, from its first node */
@@ -15,8 +15,11 @@
 #include "sdm/internal/template.h"
 #include "template_kernels.h"
 
+/* Voxels between two stations, and the edge of a block of voxels. */
+enum { SDM_TEMPLATE_STEP = 4 };
+
 typedef struct template_network {
-    size_t n_parts, n_numbers, n_terms, degree, step;
+    size_t n_parts, n_numbers, n_terms, degree;
     uint8_t *exponents;      /* [F][P] */
     const double *functions; /* [N][F] */
     sdm_template_part parts[SDM_TEMPLATE_MAX_PARTS];
@@ -79,11 +82,11 @@ typedef struct station {
 
 /* Scratch memory of a warp for one map. */
 typedef struct warp_scratch {
-    float *control;   /* [nodes][4] */
-    float *points;    /* [stations][4] carried points as indices, coefficients of B-splines */
+    float *control; /* [nodes][4] */
+    /* [stations][4] carried points as indices; after sdm_template_prefilter() coefficients of the
+       B-splines through them */
+    float *points;
     float *metric;    /* [stations][8] */
-    float *plane;     /* [stations in a plane][12] points and metric of a plane of voxels */
-    float *line;      /* [stations in a line][12] the same for a line of voxels */
     station *station; /* [stations]; NULL unless derivatives are wanted */
 } warp_scratch;
 
@@ -91,7 +94,11 @@ typedef struct warp_scratch {
 void sdm_template_invert(const template_network *k, const sdm_template_part *part,
                          const part_pose *pose, const sdm_grid *grid, const warp_scratch *w);
 
-/* points[stations][4], metric[stations][8] = the derivatives of those of `w` in a direction in
+/* Turns points[stations][4] into the coefficients of the cubic B-splines that interpolate them. */
+void sdm_template_prefilter(const template_network *k, float *points);
+
+/* points[stations][4] (coefficients), metric[stations][8] = the derivatives of those of `w` in a
+   direction in
    which the frame has the derivative dm[9], db[3] and the warp the derivative `control`. */
 void sdm_template_invert_slope(const template_network *k, const sdm_template_part *part,
                                const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,

@@ -1,6 +1,7 @@
 /* The inner loops of the `template` network, one table for each instruction set. Each of
    template_kernels_*.c compiles the same source, template_kernels_simd.h, without contraction of
-   a * b + c, so that all instruction sets give the same bits. A row is a run of voxels along x. */
+   a * b + c, so that all instruction sets give the same bits. A row is an array with an element for
+   each voxel. */
 #pragma once
 
 #include <stddef.h>
@@ -24,20 +25,19 @@ typedef struct template_correction {
     float scale, offset[3]; /* as in template_level */
 } template_correction;
 
-/* Weights that expand values at nodes, `step` voxels apart, into voxels: cubic B-splines, or
- * linear. */
+/* Weights that expand values at stations into the four voxels between two of them: cubic B-splines,
+   or linear. */
 typedef struct template_expansion {
-    int step;                           /* 2 .. SDM_TEMPLATE_LANES */
-    float cubic[4][SDM_TEMPLATE_LANES]; /* weights of four nodes for each voxel of a cell */
-    float linear[SDM_TEMPLATE_LANES];   /* weight of the second of two nodes */
+    float cubic[4][4]; /* weights of four stations for each voxel */
+    float linear[4];   /* weight of the second of two stations */
 } template_expansion;
 
 typedef struct template_table {
-    /* c[0 .. n_c - 1][cells * step] = combinations of nodes: the first 3 by cubic B-splines of
-       points[cells + 3][4], the others linear in metric[cells + 3][8] (n_c = 3 or 9). Up to
-       SDM_TEMPLATE_LANES - 1 more elements of each row are written. */
-    void (*expand)(const template_expansion *e, size_t cells, const float *points,
-                   const float *metric, size_t n_c, float *const *c);
+    /* c[n_c][64] = combinations of stations in a block of 16 lines of four voxels: the first three
+       by cubic B-splines of points[line][4 stations][4], the others linear in metric[line][2
+       stations][8] (n_c = 3 or 9). stride: floats from one line to the next. */
+    void (*expand)(const template_expansion *e, const float *points, const float *metric,
+                   size_t stride, size_t n_c, float *const *c);
     /* f[n] = distance and g[3][n] = gradient of the template at the indices u[3][n] in the lattice
        `near`, interpolated in `l`; indices outside the lattice are clamped. */
     void (*lookup)(const template_level *l, size_t n, const float *const *u, float *f,

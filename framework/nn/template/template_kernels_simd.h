@@ -60,6 +60,13 @@ static inline void halves(vec a, vec b, vec out[2])
     out[0] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11);
     out[1] = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
 }
+// Four floats at p, and four on the next line.
+static inline vec load_lines(const float *p, size_t stride)
+{
+    typedef float four __attribute__((vector_size(16), aligned(4)));
+    const four a = *(const four *)p, b = *(const four *)(p + stride);
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
+}
 /* The elements i and i + 1 of the first four floats, four times each. */
 #define SHUFFLE_PLANES(v, i)                                                                       \
     __builtin_shufflevector(v, v, i, i, i, i, (i) + 1, (i) + 1, (i) + 1, (i) + 1)
@@ -71,6 +78,11 @@ static inline void store_planes(float *p, vec v)
     memcpy(p + 16, (const char *)&v + 16, 16);
 }
 #else
+static inline vec load_lines(const float *p, size_t stride)
+{
+    (void)stride;
+    return load(p);
+}
 static inline void store_planes(float *p, vec v) { store(p, v); }
 static inline vec repeat_two(const float *p)
 {
@@ -83,55 +95,29 @@ static inline vec repeat_four(const float *p) { return load(p); }
 static inline vec mix(vec a, vec b, vec t) { return a + t * (b - a); }
 static inline veci splat_int(int32_t v) { return v - (veci){0}; }
 
-static void expand_cell(const template_expansion *e, const float *points, const float *metric,
-                        size_t n_c, float *const *c, size_t at)
+// VW / 4 lines of four voxels.
+static void expand(const template_expansion *e, const float *points, const float *metric,
+                   size_t stride, size_t n_c, float *const *c)
 {
-    for (int i = 0; i < e->step; i += VW) {
-        for (int a = 0; a < 3; a++)
-            store(c[a] + at + i, load(e->cubic[0] + i) * splat(points[a]) +
-                                     load(e->cubic[1] + i) * splat(points[4 + a]) +
-                                     load(e->cubic[2] + i) * splat(points[8 + a]) +
-                                     load(e->cubic[3] + i) * splat(points[12 + a]));
-        for (size_t a = 3; a < n_c; a++)
-            store(c[a] + at + i,
-                  mix(splat(metric[5 + a]), splat(metric[13 + a]), load(e->linear + i)));
+    vec w[4];
+    EACH(k, 4) w[k] = repeat_four(e->cubic[k]);
+    const vec t = repeat_four(e->linear);
+    for (size_t at = 0; at < 64; at += VW, points += VW / 4 * stride, metric += VW / 4 * stride) {
+        vec p[4];
+        EACH(k, 4) p[k] = load_lines(points + 4 * k, stride);
+        EACH(a, 3)
+        store(c[a] + at, w[0] * spread(p[0], a) + w[1] * spread(p[1], a) + w[2] * spread(p[2], a) +
+                             w[3] * spread(p[3], a));
+        if (n_c == 3) continue;
+        vec low[2], change[2];
+        EACH(k, 2)
+        {
+            low[k] = load_lines(metric + 4 * k, stride);
+            change[k] = load_lines(metric + 8 + 4 * k, stride) - low[k];
+        }
+        EACH(a, 6)
+        store(c[3 + a] + at, spread(low[a / 4], a % 4) + t * spread(change[a / 4], a % 4));
     }
-}
-
-// VW / 4 cells of step 4, the usual one: four voxels of a vector belong to a cell.
-static inline void expand_four(const vec *w, vec t, const float *points, const float *metric,
-                               size_t n_c, float *const *c, size_t at)
-{
-    vec p[4];
-    EACH(k, 4) p[k] = load(points + 4 * k);
-    EACH(a, 3)
-    store(c[a] + at, w[0] * spread(p[0], a) + w[1] * spread(p[1], a) + w[2] * spread(p[2], a) +
-                         w[3] * spread(p[3], a));
-    if (n_c == 3) return;
-    vec low[2], high[2];
-#if VW == 8
-    halves(load(metric + 8), load(metric + 16), low);
-    halves(load(metric + 16), load(metric + 24), high);
-#else
-    EACH(k, 2) low[k] = load(metric + 8 + 4 * k), high[k] = load(metric + 16 + 4 * k);
-#endif
-    const vec change[2] = {high[0] - low[0], high[1] - low[1]};
-    EACH(a, 6) store(c[3 + a] + at, spread(low[a / 4], a % 4) + t * spread(change[a / 4], a % 4));
-}
-
-static void expand(const template_expansion *e, size_t cells, const float *points,
-                   const float *metric, size_t n_c, float *const *c)
-{
-    size_t i = 0;
-    if (e->step == 4) {
-        vec w[4];
-        EACH(k, 4) w[k] = repeat_four(e->cubic[k]);
-        const vec t = repeat_four(e->linear);
-        for (; i + VW / 4 <= cells; i += VW / 4)
-            expand_four(w, t, points + 4 * i, metric + 8 * i, n_c, c, 4 * i);
-    }
-    for (; i < cells; i++)
-        expand_cell(e, points + 4 * i, metric + 8 * i, n_c, c, (size_t)e->step * i);
 }
 
 // The cells of a lattice.

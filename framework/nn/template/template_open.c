@@ -135,9 +135,8 @@ static sdm_status open_correction(sdm_model *m, const sdm_section *sections, siz
 // Weights of the stations for the voxels between them.
 static void expansion_set_up(template_network *k)
 {
-    k->expansion.step = (int)k->step;
-    for (size_t i = 0; i < k->step; i++) {
-        const double t = (double)i / (double)k->step, s = 1 - t;
+    for (size_t i = 0; i < SDM_TEMPLATE_STEP; i++) {
+        const double t = (double)i / SDM_TEMPLATE_STEP, s = 1 - t;
         k->expansion.cubic[0][i] = (float)(s * s * s / 6);
         k->expansion.cubic[1][i] = (float)((3 * t * t * t - 6 * t * t + 4) / 6);
         k->expansion.cubic[2][i] = (float)((3 * s * s * s - 6 * s * s + 4) / 6);
@@ -176,7 +175,7 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     m->network = k;
     k->degree = (size_t)sdm_lines_int(lines, "template.degree", 0, 12);
     k->n_numbers = (size_t)sdm_lines_int(lines, "template.numbers", 0, 1 << 20);
-    k->step = (size_t)sdm_lines_int(lines, "template.step", 2, SDM_TEMPLATE_LANES);
+    sdm_lines_int(lines, "template.step", SDM_TEMPLATE_STEP, SDM_TEMPLATE_STEP);
     k->n_parts = (size_t)sdm_lines_int(lines, "template.parts", 1, SDM_TEMPLATE_MAX_PARTS);
     for (size_t c = 0; c < k->n_parts && !lines->failed; c++)
         read_part(lines, c, k->n_numbers, &k->parts[c]);
@@ -185,7 +184,8 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     if (k->n_terms > 1u << 20)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: polynomials of degree %zu", k->degree);
     // stations: one before the grid, one after it
-    for (int a = 0; a < 3; a++) k->stations[a] = ((size_t)m->info.grid.n[a] - 1) / k->step + 4;
+    for (int a = 0; a < 3; a++)
+        k->stations[a] = ((size_t)m->info.grid.n[a] - 1) / SDM_TEMPLATE_STEP + 4;
     if ((s = check_stations(m, err))) return s;
     if ((s = SDM_ALLOC(&k->exponents, k->n_terms * m->info.n_params, "model polynomials", err)))
         return s;

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "template_rows.h"
+#include "template_work.h"
 
 typedef float quad __attribute__((vector_size(16)));
 
@@ -13,6 +13,8 @@ static quad quad_at(const float *p)
     memcpy(&q, p, sizeof q);
     return q;
 }
+
+enum { BLOCK = SDM_TEMPLATE_STEP, VOXELS = SDM_TEMPLATE_BLOCK_VOXELS };
 
 /* Derivatives of the value of a voxel: by its index u[3], and by the metric xx, yy, zz, yz, xz,
    xy. */
@@ -151,11 +153,11 @@ typedef struct slopes_work {
     double (*db)[3];        /* [D][n_parts] */
     float *control;         /* control displacements of the warp of the first part */
     float *points, *metric; /* [D][stations][4], [D][stations][8] */
-    float *plane, *line;    /* [D][stations in a plane][12], [stations in a line][12] */
-    float *row[9];          /* du, d metric */
-    value_slope *slope;     /* [row] */
-    float *value;           /* [row] the map */
-    uint8_t *nearest;       /* [row] part with the smallest value */
+    warp_lines *lines;      /* [warps][D] */
+    float *row[9];          /* [64] du, d metric */
+    value_slope *slope;     /* [64] */
+    float *value;           /* [64] the map, or a derivative */
+    uint8_t *nearest;       /* [64] part with the smallest value */
 } slopes_work;
 
 static size_t slopes_carve(const sdm_model *m, size_t n, size_t correction_scratch, void *memory,
@@ -176,14 +178,18 @@ static size_t slopes_carve(const sdm_model *m, size_t n, size_t correction_scrat
     s->control = sdm_template_take(memory, &at, 4 * control * sizeof *s->control);
     s->points = sdm_template_take(memory, &at, warps * n * 4 * stations * sizeof *s->points);
     s->metric = sdm_template_take(memory, &at, warps * n * 8 * stations * sizeof *s->metric);
-    s->plane = sdm_template_take(
-        memory, &at, warps * n * 12 * k->stations[0] * k->stations[1] * sizeof *s->plane);
-    s->line = sdm_template_take(memory, &at, 12 * k->stations[0] * sizeof *s->line);
-    const size_t row = sdm_template_row_floats(&m->info.grid);
-    for (int i = 0; i < 9; i++) s->row[i] = sdm_template_take(memory, &at, row * sizeof *s->row[i]);
-    s->slope = sdm_template_take(memory, &at, row * sizeof *s->slope);
-    s->value = sdm_template_take(memory, &at, row * sizeof *s->value);
-    s->nearest = sdm_template_take(memory, &at, row);
+    s->lines = sdm_template_take(memory, &at, warps * n * sizeof *s->lines);
+    for (size_t i = 0; i < warps * n; i++) {
+        warp_lines l = {.points = s->points + 4 * i * stations,
+                        .metric = s->metric + 8 * i * stations};
+        sdm_template_take_lines(k, memory, &at, &l);
+        if (memory) s->lines[i] = l;
+    }
+    for (int i = 0; i < 9; i++)
+        s->row[i] = sdm_template_take(memory, &at, VOXELS * sizeof *s->row[i]);
+    s->slope = sdm_template_take(memory, &at, VOXELS * sizeof *s->slope);
+    s->value = sdm_template_take(memory, &at, VOXELS * sizeof *s->value);
+    s->nearest = sdm_template_take(memory, &at, VOXELS);
     return at;
 }
 
@@ -218,12 +224,13 @@ static void slopes_begin(slopes_work *s, const double *direction)
                                       s->control, s->dm[d * k->n_parts + c],
                                       s->db[d * k->n_parts + c], s->points + 4 * at,
                                       s->metric + 8 * at);
+            s->lines[at / stations].plane_of = s->lines[at / stations].line_of = SIZE_MAX;
         }
     }
 }
 
-// s->row = derivatives of u and metric of part c, which has no warp, in the voxels of a patch.
-static void affine_slope(const slopes_work *s, size_t c, size_t d, const template_patch *patch)
+// s->row = derivatives of u and metric of part c, which has no warp, in the voxels of a block.
+static void affine_slope(const slopes_work *s, size_t c, size_t d, const template_block *block)
 {
     const template_network *k = s->w.k;
     const part_pose *pose = &s->w.pose[c];
@@ -231,108 +238,87 @@ static void affine_slope(const slopes_work *s, size_t c, size_t d, const templat
                  *b = pose->inverse;
     double moved[9];
     sdm_template_inverse_slope(pose, dm, moved);
-    for (size_t z = 0, v = 0; z < patch->n[2]; z++)
-        for (size_t y = 0; y < patch->n[1]; y++, v += patch->n[0]) {
-            double du[2][3]; // at the first two voxels of a line
-            for (int e = 0; e < 2; e++) {
-                const double voxel[3] = {(double)patch->at[0] + e, (double)(patch->at[1] + y),
-                                         (double)(patch->at[2] + z)};
-                double p[3];
-                sdm_grid_world(s->w.grid, voxel, p);
-                for (int i = 0; i < 3; i++) p[i] -= pose->b[i];
-                for (int i = 0; i < 3; i++) {
-                    double sum = 0;
-                    for (int j = 0; j < 3; j++)
-                        sum += moved[3 * i + j] * p[j] - b[3 * i + j] * db[j];
-                    du[e][i] = sum / k->parts[c].near.spacing;
-                }
-            }
+    for (size_t line = 0; line < BLOCK * BLOCK; line++) {
+        double du[2][3]; // at the first two voxels of the line
+        for (int e = 0; e < 2; e++) {
+            const double voxel[3] = {(double)(BLOCK * block->at[0]) + e,
+                                     (double)(BLOCK * block->at[1] + line % BLOCK),
+                                     (double)(BLOCK * block->at[2] + line / BLOCK)};
+            double p[3];
+            sdm_grid_world(s->w.grid, voxel, p);
+            for (int i = 0; i < 3; i++) p[i] -= pose->b[i];
             for (int i = 0; i < 3; i++) {
-                const float from = (float)du[0][i], by = (float)(du[1][i] - du[0][i]);
-                for (size_t x = 0; x < patch->n[0]; x++) s->row[i][v + x] = from + by * (float)x;
+                double sum = 0;
+                for (int j = 0; j < 3; j++) sum += moved[3 * i + j] * p[j] - b[3 * i + j] * db[j];
+                du[e][i] = sum / k->parts[c].near.spacing;
             }
         }
+        for (int i = 0; i < 3; i++) {
+            const float from = (float)du[0][i], by = (float)(du[1][i] - du[0][i]);
+            for (size_t x = 0; x < BLOCK; x++) s->row[i][BLOCK * line + x] = from + by * (float)x;
+        }
+    }
     float metric[6];
     sdm_template_metric_slope(b, moved, metric);
     for (int i = 0; i < 6; i++)
-        for (size_t v = 0; v < patch->count; v++) s->row[3 + i][v] = metric[i];
+        for (size_t v = 0; v < VOXELS; v++) s->row[3 + i][v] = metric[i];
 }
 
-// Derivatives of the voxels of a patch in which part c is the nearest, after sdm_template_run().
-static void patch_slopes(slopes_work *s, size_t c, const template_patch *p, float *const *out)
+// s->value = the derivative along direction d in the voxels of a block in which part c is the
+// nearest, after sdm_template_run().
+static void block_slope(slopes_work *s, size_t c, size_t d, const template_block *b)
 {
     template_work *w = &s->w;
     const template_network *k = w->k;
-    const size_t stations = k->stations[0] * k->stations[1];
-    const size_t voxels = k->correction ? sdm_grid_count(&k->correction->info.grid) : 0;
-    if (sdm_template_is_rigid(k, c))
-        for (int a = 0; a < 6; a++)
-            for (size_t i = 0; i < p->count; i++) w->row.metric[a][i] = a < 3;
-    for (size_t i = 0; i < p->count; i++)
-        if (s->nearest[i] == c) s->slope[i] = slope_of_value(w, c, i);
-    for (size_t d = 0; d < s->n; d++) {
-        if (k->parts[c].n_modes) {
-            sdm_template_line(k, s->plane + 12 * stations * (warp_number(k, c) * s->n + d),
-                              p->at[1], s->line);
-            sdm_template_kernels()->expand(&k->expansion, (p->count + k->step - 1) / k->step,
-                                           s->line, s->line + 4 * k->stations[0], 9, s->row);
-        } else {
-            affine_slope(s, c, d, p);
-        }
-        float *sum = s->value;
-        for (size_t i = 0; i < p->count; i++) {
-            sum[i] = 0;
-            if (s->nearest[i] != c) continue;
-            for (int a = 0; a < 3; a++) sum[i] += s->slope[i].u[a] * s->row[a][i];
-            for (int a = 0; a < 6; a++) sum[i] += s->slope[i].metric[a] * s->row[3 + a][i];
-        }
-        if (w->correction && c == 0) {
-            template_correction change = k->correction_lattice;
-            change.map = w->correction + (1 + d) * voxels;
-            sdm_template_kernels()->correct(&change, p->count, (const float *const *)w->row.u, sum);
-        }
-        for (size_t z = 0, i = 0; z < p->n[2]; z++)
-            for (size_t y = 0; y < p->n[1]; y++) {
-                float *to = out[d] + sdm_template_line_at(w, p, y, z);
-                for (size_t x = 0; x < p->n[0]; x++, i++)
-                    if (s->nearest[i] == c) to[x] = sum[i];
-            }
+    if (w->part[c].warped)
+        sdm_template_expand(k, b, &s->lines[warp_number(k, c) * s->n + d], 9, s->row);
+    else
+        affine_slope(s, c, d, b);
+    for (size_t v = 0; v < VOXELS; v++) {
+        float sum = 0;
+        for (int a = 0; a < 3 && s->nearest[v] == c; a++) sum += s->slope[v].u[a] * s->row[a][v];
+        for (int a = 0; a < 6 && s->nearest[v] == c; a++)
+            sum += s->slope[v].metric[a] * s->row[3 + a][v];
+        s->value[v] = sum;
+    }
+    if (w->correction && c == 0) {
+        template_correction change = k->correction_lattice;
+        change.map = w->correction + (1 + d) * sdm_grid_count(&k->correction->info.grid);
+        sdm_template_kernels()->correct(&change, VOXELS, (const float *const *)w->row.u, s->value);
     }
 }
 
-// s->value and s->nearest of a patch, and the lines of the map.
-static void patch_map(slopes_work *s, const template_patch *p, float *values)
+// out[D] = the derivatives in the voxels of a block in which part c is the nearest.
+static void block_slopes(slopes_work *s, size_t c, const template_block *b, float *const *out)
 {
     template_work *w = &s->w;
-    sdm_template_values(w, p, s->value, s->nearest);
-    for (size_t z = 0, i = 0; z < p->n[2]; z++)
-        for (size_t y = 0; y < p->n[1]; y++, i += p->n[0])
-            memcpy(values + sdm_template_line_at(w, p, y, z), s->value + i,
-                   p->n[0] * sizeof *values);
+    if (w->loaded != c) sdm_template_run(w, c, b);
+    if (w->part[c].rigid)
+        for (int a = 0; a < 6; a++)
+            for (size_t v = 0; v < VOXELS; v++) w->row.metric[a][v] = a < 3;
+    for (size_t v = 0; v < VOXELS; v++)
+        if (s->nearest[v] == c) s->slope[v] = slope_of_value(w, c, v);
+    const size_t nx = (size_t)w->grid->n[0], ny = (size_t)w->grid->n[1],
+                 first = BLOCK * ((b->at[2] * ny + b->at[1]) * nx + b->at[0]);
+    for (size_t d = 0; d < s->n; d++) {
+        block_slope(s, c, d, b);
+        for (size_t z = 0; z < b->n[2]; z++)
+            for (size_t y = 0; y < b->n[1]; y++)
+                for (size_t x = 0, v = BLOCK * (BLOCK * z + y); x < b->n[0]; x++, v++)
+                    if (s->nearest[v] == c) out[d][first + (z * ny + y) * nx + x] = s->value[v];
+    }
 }
 
 // values = the map, out[D] = its derivatives
 static void fill_slopes(slopes_work *s, float *values, float *const *out)
 {
     template_work *w = &s->w;
-    const template_network *k = w->k;
-    const size_t plane = k->stations[0] * k->stations[1], stations = plane * k->stations[2];
-    template_patch p = {.count = 0};
-    while (sdm_template_next(w, &p)) {
-        for (size_t c = 0; c < k->n_parts && w->by_lines && p.at[1] == 0; c++)
-            for (size_t d = 0; d < s->n && k->parts[c].n_modes; d++) {
-                const size_t at = warp_number(k, c) * s->n + d;
-                sdm_template_plane(k, s->points + 4 * at * stations, s->metric + 8 * at * stations,
-                                   p.at[2], s->plane + 12 * at * plane);
-            }
-        patch_map(s, &p, values);
-        for (size_t c = 0; c < k->n_parts; c++) {
-            bool nearest = false;
-            for (size_t i = 0; i < p.count; i++) nearest |= s->nearest[i] == c;
-            if (!nearest) continue;
-            if (k->n_parts > 1) sdm_template_run(w, c, &p);
-            patch_slopes(s, c, &p, out);
-        }
+    for (size_t i = 0; i < w->n_blocks; i++) {
+        const template_block b = sdm_template_block(w, i);
+        sdm_template_values(w, &b, s->value, s->nearest);
+        sdm_template_store(w, &b, s->value, values);
+        for (size_t c = 0; c < w->k->n_parts; c++)
+            if (memchr(s->nearest, (int)c, VOXELS)) block_slopes(s, c, &b, out);
     }
 }
 
@@ -352,7 +338,6 @@ static void forward_mode(const sdm_model *m, const double *params, bool jacobian
     const template_network *k = m->network;
     slopes_work s;
     slopes_carve(m, n, correction_bytes(k, jacobian), scratch, &s);
-    sdm_template_begin(&s.w, params, true);
     if (k->correction) {
         const sdm_model_kind *kind = k->correction->kind;
         float *map = s.w.correction, *slopes = map + sdm_grid_count(&k->correction->info.grid);
@@ -361,6 +346,7 @@ static void forward_mode(const sdm_model *m, const double *params, bool jacobian
         else
             kind->jvp(k->correction, params, direction, map, slopes, s.w.correction_scratch, 1);
     }
+    sdm_template_begin(&s.w, params, true);
     slopes_begin(&s, direction);
     fill_slopes(&s, values, out);
 }

@@ -121,11 +121,11 @@ static void newton(const sdm_lattice *l, const float *control, const double q[3]
 }
 
 // Position of a station in the world.
-static void station_world(const template_network *k, const sdm_grid *grid, size_t x, size_t y,
-                          size_t z, double out[3])
+static void station_world(const sdm_grid *grid, size_t x, size_t y, size_t z, double out[3])
 {
-    const double step = (double)k->step, index[3] = {step * ((double)x - 1), step * ((double)y - 1),
-                                                     step * ((double)z - 1)};
+    const double step = SDM_TEMPLATE_STEP,
+                 index[3] = {step * ((double)x - 1), step * ((double)y - 1),
+                             step * ((double)z - 1)};
     sdm_grid_world(grid, index, out);
 }
 
@@ -178,7 +178,7 @@ static void spline_prefilter(float *v, size_t n, size_t stride)
     }
 }
 
-static void prefilter_all(const template_network *k, float *points)
+void sdm_template_prefilter(const template_network *k, float *points)
 {
     const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2];
     for (size_t i = 0; i < ny * nz; i++) spline_prefilter(points + 4 * nx * i, nx, 4);
@@ -200,7 +200,7 @@ void sdm_template_invert(const template_network *k, const sdm_template_part *par
             double y[3] = {0}, last[3] = {0}, inverse[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
             for (size_t i = 0; i < nx; i++, at++) {
                 double x[3], q[3], b[9];
-                station_world(k, grid, i, j, z, x);
+                station_world(grid, i, j, z, x);
                 for (int c = 0; c < 3; c++) x[c] -= pose->b[c];
                 m3_apply(pose->inverse, x, q);
                 // start: the station before it, moved to first order
@@ -224,7 +224,6 @@ void sdm_template_invert(const template_network *k, const sdm_template_part *par
                 memcpy(w->station[at].inverse, inverse, sizeof inverse);
             }
         }
-    prefilter_all(k, w->points);
 }
 
 void sdm_template_invert_slope(const template_network *k, const sdm_template_part *part,
@@ -242,7 +241,7 @@ void sdm_template_invert_slope(const template_network *k, const sdm_template_par
             for (size_t i = 0; i < nx; i++, at++) {
                 const station *s = &w->station[at];
                 double x[3], dq[3], t[3], u[3], du[9], du0[9], u0[3], ddu[3][9], f[3], dy[3];
-                station_world(k, grid, i, j, z, x);
+                station_world(grid, i, j, z, x);
                 // q = m^-1 (x - b): dq = d(m^-1) (x - b) - m^-1 db
                 for (int c = 0; c < 3; c++) x[c] -= pose->b[c];
                 m3_apply(moved, x, dq);
@@ -267,5 +266,5 @@ void sdm_template_invert_slope(const template_network *k, const sdm_template_par
                 sdm_template_metric_slope(b, c2, metric + 8 * at);
                 metric[8 * at + 6] = metric[8 * at + 7] = 0;
             }
-    prefilter_all(k, points);
+    sdm_template_prefilter(k, points);
 }

@@ -10,8 +10,8 @@
                                       (free-form deformation; Rueckert et al. 1999)
      x       = T_c(y + U_c(y))        carries a point y of the template to the point x of the map
      d_c(x)  = d0_c(y) / |grad_x d0_c(y(x))| + r(y)
-     map     = min over the parts c of d_c; the distance to a rigid part in a block of 4 x 4 x 4
-             voxels beyond the lattice `near` is interpolated between the corners of the block
+     map     = min over the parts c of d_c; in a block of 4 x 4 x 4 voxels beyond the lattice `near`
+   of a part (not an affine one), d_c is interpolated between the corners of the block
 
    d0_c is the exact map of part c at the default parameters. The quotient is the distance to first
    order (Taubin 1994): it is exact on the surface, with its gradient. The correction r is a `pod`
@@ -93,7 +93,6 @@ typedef struct sdm_template_spec {
     size_t degree;           /* total degree of phi; n_terms = sdm_poly_count(P, degree) */
     const double *functions; /* [N][F] */
     const sdm_template_part *parts;
-    size_t step; /* voxels between two nodes at which the warp is inverted, 2 .. 8 */
     /* The model file of the `pod` network r; NULL: none. Its grid lies in the template's frame. */
     const uint8_t *correction;
     size_t correction_size;

@@ -1,0 +1,141 @@
+/* The distances to a part of a template network at the corners of the blocks, from which blocks far
+   from the part are interpolated. */
+#include <math.h>
+
+#include "template_work.h"
+
+enum { BLOCK = SDM_TEMPLATE_STEP };
+
+// True if the index u[3] lies in a lattice.
+static bool is_in(const template_level *l, const float u[3])
+{
+    bool in = true;
+    for (int a = 0; a < 3; a++) {
+        const float x = u[a] * l->scale + l->offset[a];
+        in &= x >= 0 && x <= (float)(l->n[a] - 1);
+    }
+    return in;
+}
+
+// Sets the distance at the corners of a row, the points row.u, to NAN outside of the lattice `far`.
+static void forget_outside(const template_work *w, size_t c, float *corner)
+{
+    const template_level *far = &w->k->far[c];
+    const template_row *r = &w->row;
+    for (size_t x = 0; x <= w->blocks[0]; x++)
+        if (!is_in(far, (const float[]){r->u[0][x], r->u[1][x], r->u[2][x]})) corner[4 * x] = NAN;
+}
+
+/* Rigid parts: points on a regular lattice. */
+
+static void rigid_row(const template_work *w, size_t c, size_t y, size_t z, float *corner)
+{
+    const part_state *part = &w->part[c];
+    const template_row *r = &w->row;
+    const size_t n = w->blocks[0] + 1;
+    float by[3][3]; // change of the point (mm) by a block along each axis
+    for (int i = 0; i < 3; i++) {
+        const double u = part->from[i] + part->by[1][i] * (double)(BLOCK * y) +
+                         part->by[2][i] * (double)(BLOCK * z);
+        for (size_t x = 0; x < n; x++)
+            r->u[i][x] = (float)(u + part->by[0][i] * (double)(BLOCK * x));
+        for (int a = 0; a < 3; a++)
+            by[a][i] = (float)(BLOCK * w->k->parts[c].near.spacing * part->by[a][i]);
+    }
+    sdm_template_lookup(w, c, n);
+    for (size_t x = 0; x < n; x++) {
+        corner[4 * x] = r->f[x];
+        for (int a = 0; a < 3; a++)
+            corner[4 * x + 1 + (size_t)a] =
+                by[a][0] * r->g[0][x] + by[a][1] * r->g[1][x] + by[a][2] * r->g[2][x];
+    }
+    const float first[3] = {r->u[0][0], r->u[1][0], r->u[2][0]},
+                last[3] = {r->u[0][n - 1], r->u[1][n - 1], r->u[2][n - 1]};
+    if (!is_in(&w->k->far[c], first) || !is_in(&w->k->far[c], last)) forget_outside(w, c, corner);
+}
+
+/* Parts with a warp: the corners are stations. The distance is f s + r with the template f, the
+   factor s of the metric and the correction r. The gradients of the carried points, of s and of r
+   are central differences between stations. */
+
+enum { F = 0, G = 1, S = 4, R = 5, SAMPLE = 8 };
+
+// w->sample of row (y, z) of stations.
+static void sample_row(template_work *w, size_t c, size_t first, size_t n)
+{
+    const float *points = w->warp[c].points + 4 * first, *metric = w->warp[c].metric + 8 * first;
+    const template_table *t = sdm_template_kernels();
+    const template_row *r = &w->row;
+    float *out = w->sample + SAMPLE * first;
+    for (size_t x = 0; x < n; x++) {
+        for (size_t a = 0; a < 3; a++) r->u[a][x] = points[4 * x + a];
+        for (size_t a = 0; a < 6; a++) r->metric[a][x] = metric[8 * x + a];
+        r->value[x] = 1;
+        r->far_f[x] = 0;
+    }
+    sdm_template_lookup(w, c, n);
+    t->normalise(n, r->value, (const float *const *)r->g, (const float *const *)r->metric,
+                 r->value);
+    for (size_t x = 0; x < n; x++) r->far_f[x] = 0; // lookup may have used it
+    if (w->correction_at.map && c == 0)
+        t->correct(&w->correction_at, n, (const float *const *)r->u, r->far_f);
+    for (size_t x = 0; x < n; x++, out += SAMPLE) {
+        out[F] = r->f[x];
+        for (size_t a = 0; a < 3; a++) out[G + a] = r->g[a][x];
+        out[S] = r->value[x];
+        out[R] = r->far_f[x];
+    }
+}
+
+// Bits 2 a and 2 a + 1 are set if the index lies below or above the lattice `near` along axis a.
+static uint8_t side_of(const template_level *near, const float u[3])
+{
+    unsigned side = 0;
+    for (int a = 0; a < 3; a++)
+        side |= (unsigned)(u[a] < 0) << 2 * a | (unsigned)(u[a] > (float)(near->n[a] - 1))
+                                                    << (2 * a + 1);
+    return (uint8_t)side;
+}
+
+// The corner at a station; stride[a]: stations between neighbours along axis a.
+static void warped_corner(const template_work *w, size_t c, size_t at, const size_t stride[3],
+                          float corner[4])
+{
+    const float *p = w->warp[c].points, *s = w->sample + SAMPLE * at;
+    const float half = 0.5f, h = (float)w->k->parts[c].near.spacing;
+    corner[0] = s[F] * s[S] + s[R];
+    for (size_t a = 0; a < 3; a++) {
+        const size_t above = at + stride[a], below = at - stride[a];
+        const float *up = w->sample + SAMPLE * above, *down = w->sample + SAMPLE * below;
+        float change = 0;
+        for (size_t i = 0; i < 3; i++) change += s[G + i] * (p[4 * above + i] - p[4 * below + i]);
+        corner[1 + a] = half * (h * s[S] * change + (s[F] * (up[S] - down[S]) + (up[R] - down[R])));
+    }
+}
+
+static void warped_corners(template_work *w, size_t c, float *corner, uint8_t *side)
+{
+    const size_t *n = w->k->stations, stride[3] = {1, n[0], n[0] * n[1]};
+    for (size_t row = 0; row < n[1] * n[2]; row++) sample_row(w, c, row * n[0], n[0]);
+    for (size_t z = 0; z <= w->blocks[2]; z++)
+        for (size_t y = 0; y <= w->blocks[1]; y++)
+            for (size_t x = 0; x <= w->blocks[0]; x++, corner += 4, side++) {
+                const size_t at = 1 + x + stride[1] * (1 + y) + stride[2] * (1 + z);
+                const float *u = w->warp[c].points + 4 * at;
+                warped_corner(w, c, at, stride, corner);
+                if (!is_in(&w->k->far[c], u)) corner[0] = NAN;
+                *side = side_of(&w->k->near[c], u);
+            }
+}
+
+void sdm_template_corners(template_work *w, size_t c)
+{
+    const size_t line = w->blocks[0] + 1, rows = w->blocks[1] + 1, planes = w->blocks[2] + 1,
+                 first = c * line * rows * planes;
+    float *corner = w->corner + 4 * first;
+    if (w->part[c].warped)
+        warped_corners(w, c, corner, w->side + first);
+    else if (w->part[c].rigid)
+        for (size_t z = 0; z < planes; z++)
+            for (size_t y = 0; y < rows; y++, corner += 4 * line) rigid_row(w, c, y, z, corner);
+}

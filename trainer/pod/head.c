@@ -46,36 +46,87 @@ static sdm_status all_latent(const pod_state *pod, const float *w, size_t n, flo
     return s;
 }
 
-/* factor[L][L] = Cholesky factor of z^T z, with z[n][L]. */
-static sdm_status head_factorise(const pod_state *pod, size_t n, const float *z, double *factor,
-                                 sdm_error *err)
+sdm_status trainer_head_equations(const pod_state *pod, const float *w, head_equations *e,
+                                  sdm_error *err)
 {
-    const size_t latents = pod->arch.n_latent;
-    float *gram = NULL;
-    sdm_status s = SDM_ALLOC(&gram, latents * latents, "head", err);
-    if (s) return s;
-    sdm_gemm(latents, latents, n, (sdm_view){z, 1, latents}, (sdm_view){z, latents, 1}, false, gram,
-             latents, trainer_threads(pod->t));
-    // hidden units can be linearly dependent: a ridge, raised until the matrix is positive definite
-    for (double ridge = pod->ridge;; ridge *= 10) {
-        for (size_t i = 0; i < latents * latents; i++)
-            factor[i] = 0.5 * ((double)gram[i] + gram[i % latents * latents + i / latents]);
-        for (size_t i = 0; i < latents; i++) factor[i * latents + i] += ridge * (double)n;
-        if (!trainer_cholesky(latents, factor)) break;
-        if (ridge > 1) {
-            s = sdm_fail(err, SDM_E_INTERNAL, "the head's least squares has no solution");
-            break;
-        }
+    enum { CHUNK = 1024 };
+    const size_t n = pod->t->data.n_static + trainer_dataset_random_slots(&pod->t->data);
+    const size_t latents = pod->arch.n_latent, k = pod->arch.n_coefficients;
+    float *z = NULL, *y = NULL;
+    size_t *slots = NULL;
+    e->maps = n;
+    sdm_status s = SDM_ALLOC(&z, n * latents, "head", err);
+    if (!s) s = SDM_ALLOC(&y, CHUNK * k, "head", err);
+    if (!s) s = SDM_ALLOC(&e->gram, latents * latents, "head", err);
+    if (!s) s = SDM_ALLOC(&e->right, latents * k, "head", err);
+    if (!s) s = trainer_dataset_first_slots(n, &slots, err);
+    if (!s) s = all_latent(pod, w, n, z, err);
+    // right-hand sides, CHUNK maps at a time
+    for (size_t at = 0; at < n && !s; at += CHUNK) {
+        const size_t rows = n - at < CHUNK ? n - at : CHUNK;
+        if ((s = trainer_coefficients_project(pod, false, slots + at, rows, y, err))) break;
+        sdm_gemm(latents, k, rows, (sdm_view){z + at * latents, 1, latents}, (sdm_view){y, k, 1},
+                 at > 0, e->right, k, trainer_threads(pod->t));
     }
-    sdm_free(gram);
+    if (!s)
+        sdm_gemm(latents, latents, n, (sdm_view){z, 1, latents}, (sdm_view){z, latents, 1}, false,
+                 e->gram, latents, trainer_threads(pod->t));
+    sdm_free(slots);
+    sdm_free(y);
+    sdm_free(z);
     return s;
 }
 
-/* A substitution: the arguments of head_substitute(). */
+void trainer_head_equations_dispose(head_equations *e)
+{
+    sdm_free(e->gram);
+    sdm_free(e->right);
+    *e = (head_equations){0};
+}
+
+sdm_status trainer_head_of_modes(const pod_state *pod, float *head, sdm_error *err)
+{
+    const sdm_pod_arch *a = &pod->arch;
+    const size_t r = pod->n_modes, latents = a->n_latent, k = a->n_coefficients;
+    float *of_modes = NULL; // [R][L]
+    const sdm_status s = SDM_ALLOC(&of_modes, r * latents, "head", err);
+    if (s) return s;
+    for (size_t j = 0; j < r; j++) {
+        float *row = of_modes + j * latents;
+        memcpy(row, pod->poly + j * a->n_terms, a->n_terms * sizeof *row);
+        if (!a->depth) continue;
+        const float *readout = pod->mode_fit.average + trainer_mlp_count(a) + j * a->width;
+        for (size_t i = 0; i < a->width; i++) row[a->n_terms + i] = pod->target_scale * readout[i];
+    }
+    sdm_gemm(k, latents, r, (sdm_view){pod->modes, 1, k}, (sdm_view){of_modes, latents, 1}, false,
+             head, latents, trainer_threads(pod->t));
+    sdm_free(of_modes);
+    return SDM_OK;
+}
+
+/* factor[L][L] = Cholesky factor of the matrix of the equations with *ridge, which is raised until
+   the matrix is positive definite: hidden units can be linearly dependent. */
+static sdm_status head_factorise(size_t latents, const head_equations *e, double *ridge,
+                                 double *factor, sdm_error *err)
+{
+    const float *gram = e->gram;
+    for (;; *ridge *= 10) {
+        for (size_t i = 0; i < latents * latents; i++)
+            factor[i] = 0.5 * ((double)gram[i] + gram[i % latents * latents + i / latents]);
+        for (size_t i = 0; i < latents; i++) factor[i * latents + i] += *ridge * (double)e->maps;
+        if (!trainer_cholesky(latents, factor)) return SDM_OK;
+        if (*ridge > 1)
+            return sdm_fail(err, SDM_E_INTERNAL, "the head's least squares has no solution");
+    }
+}
+
+/* A substitution: the arguments of substitute_columns(). */
 typedef struct substitution {
     size_t latents, k;
     const double *factor;
     const float *right;
+    const float *prior; // NULL: zeros
+    double pull;        // weight of the prior
     float *head;
     atomic_bool short_of_memory;
 } substitution;
@@ -95,55 +146,36 @@ static void substitute_columns(void *user, size_t index, int member)
         return;
     }
     for (size_t i = 0; i < latents; i++)
-        for (size_t j = 0; j < n; j++) x[i * n + j] = q->right[i * k + at + j];
+        for (size_t j = 0; j < n; j++) {
+            x[i * n + j] = q->right[i * k + at + j];
+            if (q->prior) x[i * n + j] += q->pull * (double)q->prior[(at + j) * latents + i];
+        }
     trainer_cholesky_solve(latents, q->factor, n, x);
     for (size_t j = 0; j < n; j++)
         for (size_t i = 0; i < latents; i++) q->head[(at + j) * latents + i] = (float)x[i * n + j];
     sdm_free(x);
 }
 
-/* Computes head[K][L] from the factor and the right-hand sides right[L][K] = z^T y. */
-static sdm_status head_substitute(const pod_state *pod, const double *factor, const float *right,
-                                  float *head, sdm_error *err)
+sdm_status trainer_head_solve(const pod_state *pod, const head_equations *e, double ridge,
+                              const float *prior, float *head, sdm_error *err)
 {
-    substitution q = {.latents = pod->arch.n_latent,
-                      .k = pod->arch.n_coefficients,
-                      .factor = factor,
-                      .right = right,
-                      .head = head};
-    sdm_team_run(trainer_threads(pod->t), (q.k + COLUMNS - 1) / COLUMNS, substitute_columns, &q);
-    return atomic_load(&q.short_of_memory) ? sdm_fail(err, SDM_E_NOMEM, "no memory for the head")
-                                           : SDM_OK;
-}
-
-sdm_status trainer_head_solve(const pod_state *pod, const float *w, float *head, sdm_error *err)
-{
-    enum { CHUNK = 1024 };
-    const size_t n = pod->t->data.n_static + trainer_dataset_random_slots(&pod->t->data);
-    const size_t latents = pod->arch.n_latent, k = pod->arch.n_coefficients;
-    float *z = NULL, *y = NULL, *right = NULL;
+    const size_t latents = pod->arch.n_latent;
     double *factor = NULL;
-    size_t *slots = NULL;
-    sdm_status s = SDM_ALLOC(&z, n * latents, "head", err);
-    if (!s) s = SDM_ALLOC(&y, CHUNK * k, "head", err);
-    if (!s) s = SDM_ALLOC(&right, latents * k, "head", err);
-    if (!s) s = SDM_ALLOC(&factor, latents * latents, "head", err);
-    if (!s) s = trainer_dataset_first_slots(n, &slots, err);
-    if (!s) s = all_latent(pod, w, n, z, err);
-    // right-hand sides, CHUNK maps at a time
-    for (size_t at = 0; at < n && !s; at += CHUNK) {
-        const size_t rows = n - at < CHUNK ? n - at : CHUNK;
-        if ((s = trainer_coefficients_project(pod, false, slots + at, rows, y, err))) break;
-        sdm_gemm(latents, k, rows, (sdm_view){z + at * latents, 1, latents}, (sdm_view){y, k, 1},
-                 at > 0, right, k, trainer_threads(pod->t));
+    sdm_status s = SDM_ALLOC(&factor, latents * latents, "head", err);
+    if (!s) s = head_factorise(latents, e, &ridge, factor, err);
+    if (!s) {
+        substitution q = {.latents = latents,
+                          .k = pod->arch.n_coefficients,
+                          .factor = factor,
+                          .right = e->right,
+                          .prior = prior,
+                          .pull = ridge * (double)e->maps,
+                          .head = head};
+        sdm_team_run(trainer_threads(pod->t), (q.k + COLUMNS - 1) / COLUMNS, substitute_columns,
+                     &q);
+        if (atomic_load(&q.short_of_memory))
+            s = sdm_fail(err, SDM_E_NOMEM, "no memory for the head");
     }
-    // solve the normal equations
-    if (!s) s = head_factorise(pod, n, z, factor, err);
-    if (!s) s = head_substitute(pod, factor, right, head, err);
-    sdm_free(slots);
     sdm_free(factor);
-    sdm_free(right);
-    sdm_free(y);
-    sdm_free(z);
     return s;
 }

@@ -6,6 +6,7 @@
 
 #include "bases.h"
 #include "data/streams.h"
+#include "head_choice.h"
 #include "mlp.h"
 #include "mode_fit.h"
 #include "modes.h"
@@ -134,6 +135,7 @@ static sdm_status pod_run(trainer *t, bool resumed, sdm_error *err)
         if (resumed) s = trainer_checkpoint_weights(t, err);
         if (!s) s = trainer_mode_fit_run(pod, err);
         if (!s) s = trainer_refine_start(pod, false, err);
+        if (!s) s = trainer_head_choose(pod, &t->heldout_mse, err);
         if (s) return s;
         trainer_enter(t, SDM_PHASE_REFINE);
         s = trainer_refine_note(pod, pod->refine.w, 0, err);

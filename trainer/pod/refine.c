@@ -297,7 +297,6 @@ sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err)
         memcpy(pod->refine.w, pod->mode_fit.average, trainer_mlp_count(a) * sizeof *pod->refine.w);
     memcpy(pod->refine.w + pod->mean_at, pod->mean, a->n_voxels * sizeof *pod->mean);
     memcpy(pod->refine.w + pod->basis_at, pod->basis, basis_count * sizeof *pod->basis);
-    if ((s = trainer_head_solve(pod, pod->refine.w, pod->refine.w + pod->head_at, err))) return s;
     memcpy(pod->refine.average, pod->refine.w, pod->refine.n * sizeof *pod->refine.w);
     return SDM_OK;
 }

@@ -3,9 +3,8 @@
 
 #include "pod_state.h"
 
-/* Allocates the weights of the phase and, unless resumed, sets them: MLP from the mode fit, head by
-   least squares, bases and mean map as computed. resumed: trainer_checkpoint_weights() fills them.
- */
+/* Allocates the weights of the phase and, unless resumed, sets them but for the head: MLP from the
+   mode fit, bases and mean map as computed. resumed: trainer_checkpoint_weights() fills them. */
 sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err);
 
 /* Runs phase SDM_PHASE_REFINE to its end; nothing if train.refine is 0. */

@@ -141,8 +141,8 @@ static void hand_on(entrant *e, trainer *t)
 
 sdm_status trainer_race(trainer *t, sdm_config *out, sdm_error *err)
 {
-    // with an error this small near the surface, in units of the voxel, no other kind is tried
-    const double enough = t->config->grid.spacing[0] / 40;
+    // with an error this small near the surface no other kind is tried
+    const double enough = t->config->grid.spacing[0] / 500;
     entrant e[] = {{.kind = SDM_NETWORK_TEMPLATE, .name = "template"},
                    {.kind = SDM_NETWORK_POD, .name = "pod"}};
     const size_t n = sizeof e / sizeof *e;

@@ -117,6 +117,22 @@ static void tell_overrun(trainer *t, double measured)
         over, t->prepared_seconds, measured);
 }
 
+/* A template is ready as soon as its meshes are measured. Says so if `auto` has chosen it and most
+ * of the time is left. */
+static void tell_unused(trainer *t, const sdm_config *asked)
+{
+    const double left = t->config->train.minutes * 60 - trainer_seconds(t);
+    if (asked->network.kind != SDM_NETWORK_AUTO || !trainer_by_time(t) ||
+        t->config->network.kind != SDM_NETWORK_TEMPLATE ||
+        left < 0.5 * t->config->train.minutes * 60)
+        return;
+    trainer_message(t,
+                    "auto: %.0f s of train.minutes were not needed; network.kind=pod trains with "
+                    "all of them, and may reach a smaller error inside parts that overlap and far "
+                    "from the surface",
+                    left);
+}
+
 /* Measures and writes the model. If the model cannot be written, a checkpoint keeps the trained
  * weights. */
 static sdm_status train_finish(trainer *t, sdm_train_report *report, sdm_error *err)
@@ -195,6 +211,7 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     trainer_producer_stop(t.producer);
     t.producer = NULL;
     if (!s) s = train_finish(&t, report, err);
+    if (!s) tell_unused(&t, config);
     if (s) sdm_folder_remove_empty(folder, existing);
     t.kind->dispose(&t);
     trainer_dataset_dispose(&t.data);

@@ -186,8 +186,8 @@ const cli_option cli_options[] = {
      "compare the map with exact distances at 1000 voxels near the surface and print the errors; "
      "the shape must be known"},
     {"max-error", 0, CLI_REAL, "MM", NULL, 1e-12, 1e9, ON(CLI_GENERATE), AT(max_error),
-     "check the map; if its error is larger than this, use the exact engine instead, or with "
-     "--policy clamp end with exit code 4"},
+     "check the map near the surface, as --check does; if its error there is larger than this, use "
+     "the exact engine instead, or with --policy clamp end with exit code 4"},
     {"error-of", 0, CLI_CHOICE, NULL, "max|q95|rmse|mean", 0, 0, ON(CLI_GENERATE), AT(error_of),
      "the error that --max-error limits: largest (default), 95 % quantile, root mean square or "
      "mean"},

@@ -195,8 +195,8 @@ static void tell_cut(teller *t)
                  f->low[0], f->low[1], f->low[2], f->high[0], f->high[1], f->high[2], low[0],
                  low[1], low[2], high[0], high[1], high[2]);
     if (f->cut.shapes)
-        sdm_text_add(&text, "%.2g %% of the shapes",
-                     100.0 * (double)f->cut.shapes / (double)f->n_samples);
+        sdm_text_add(&text, f->cut.shapes < f->n_samples ? "%.2g %% of the shapes" : "all shapes",
+                     fmin(99, 100.0 * (double)f->cut.shapes / (double)f->n_samples));
     else
         sdm_text_add(&text, "only shapes at the corners of the ranges");
     const char *between = " (by up to ";

@@ -155,7 +155,8 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
     if (v->limit == SDM_CAUSE_ROUNDING)
         snprintf(change, sizeof change, ": set network.weights to %s",
                  c->network.weights == SDM_WEIGHT_I8 ? "f16" : "f32");
-    if (!strcmp(v->key, "grid.spacing")) snprintf(also, sizeof also, " and double grid.size");
+    if (!strcmp(v->key, "grid.spacing"))
+        snprintf(also, sizeof also, " (and double grid.size, if it is given)");
     // with `auto`, a value that is the default of `auto` would become that of the kind
     if (c->network.kind == SDM_NETWORK_TEMPLATE && !strncmp(v->key, "network.", 8))
         snprintf(also, sizeof also, " with network.kind: template");

@@ -40,14 +40,21 @@ static kernels kernels_choose(void)
     return (kernels){sdm_point_kernel_generic, sdm_point_search_generic};
 }
 
-/* Moves q into the box of the surface if x, at the distance d, lies so far away that the rounding
-   of q may be larger than the surface. */
-static void keep_in_box(const sdm_nearest *s, double d, double q[3])
+/* Sets q to the point of the triangle in this slot that is the closest to x, and *feature to where
+   it lies. d: distance. From so far away that rounding would exceed the size of the surface, x is
+   moved towards the surface first. */
+static void closest_point(const sdm_nearest *s, uint32_t slot, const double x[3], double d,
+                          double q[3], int *feature)
 {
     const sdm_bvh_node *box = &s->tree.node[0];
-    double size = 0;
+    double size = 0, nearer[3];
     for (int a = 0; a < 3; a++) size = fmax(size, box->hi[a] - box->lo[a]);
-    for (int a = 0; a < 3 && d > 1e9 * size; a++) q[a] = fmin(fmax(q[a], box->lo[a]), box->hi[a]);
+    const double scale = d > 1e10 * size ? 1e10 * size / d : 1;
+    for (int a = 0; a < 3; a++) {
+        const double middle = 0.5 * (box->lo[a] + box->hi[a]);
+        nearer[a] = scale < 1 ? middle + (x[a] - middle) * scale : x[a];
+    }
+    (void)sdm_frame_closest(&s->frames[slot], nearer, q, feature);
 }
 
 /* Stores the answer for x in element `index`: its nearest feature, the squared distance, and the
@@ -63,10 +70,7 @@ static void point_finish(const sdm_points_job *job, const double x[3], uint32_t 
     // near the surface rounding decides on which side of the feature the point lies
     const double largest = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
     if (!(d > job->seam + 16 * DBL_EPSILON * largest)) side = SDM_SIDE_UNKNOWN;
-    if (wants_point || side == SDM_SIDE_UNKNOWN) {
-        (void)sdm_frame_closest(&s->frames[slot], x, q, &feature);
-        keep_in_box(s, d, q);
-    }
+    if (wants_point || side == SDM_SIDE_UNKNOWN) closest_point(s, slot, x, d, q, &feature);
     if (side == SDM_SIDE_UNKNOWN ? sdm_sign_inside(job->sign, x, slot, q, feature)
                                  : side == SDM_SIDE_INSIDE)
         d = -d;

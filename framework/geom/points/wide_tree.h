@@ -19,9 +19,9 @@ typedef struct sdm_wide_node {
     uint32_t child[8];
 } sdm_wide_node;
 
-/* *wide = new tree over the clusters of *f, to be freed with sdm_free(). Node 0 is the root.
+/* *out = new tree over the clusters of *f, to be freed with sdm_free(). Node 0 is the root.
    SDM_E_NOMEM. */
-sdm_status sdm_wide_tree_build(const sdm_features *f, sdm_wide_node **wide, sdm_error *err);
+sdm_status sdm_wide_tree_build(const sdm_features *f, sdm_wide_node **out, sdm_error *err);
 
 /* Largest number of nodes of this tree. */
 size_t sdm_wide_tree_size(const sdm_features *f);

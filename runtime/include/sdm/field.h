@@ -66,7 +66,7 @@ SDM_API sdm_status sdm_field_points(const sdm_field *f, const double *x, size_t 
 
 /* values[nz][ny][nx] = the distances at the voxel centres of a grid; slopes[n_params][nz][ny][nx]
    may be NULL. Grids whose axes are parallel to those of the model's grid take about 1 ns a voxel,
-   turned grids 50 to 100 ns. On the model's own grid the values have the bits of
+   turned grids 50 to 200 ns. On the model's own grid the values have the bits of
    sdm_generate(). */
 SDM_API sdm_status sdm_field_grid(const sdm_field *f, const sdm_grid *grid, float *values,
                                   float *slopes, sdm_error *err);

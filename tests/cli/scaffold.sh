@@ -24,7 +24,7 @@ sed -n 's/^  //p' out >commands
 expect 0 - env PATH="$installed/bin:$PATH" bash -ec "$(grep -v 'sdmgen train' commands)" # its test trains
 has '100% tests passed, 0 tests failed out of 3'
 present mug.png
-expect 0 - sdmgen config mug/mug.yaml --plugin mug/build/mug.so
+expect 0 '^sdmgen: grid: size: ' sdmgen config mug/mug.yaml --plugin mug/build/mug.so
 
 # Against the build folder, and with faults that its test must find.
 mutant() { # mutant PATTERN SED: with this change of knob_2.c the test of the mesh fails with the message

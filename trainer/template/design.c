@@ -56,7 +56,8 @@ static void find_pivot(const motion *relative, size_t n, const double centre[3],
             }
     }
     for (int i = 0; i < 3; i++) trace += a[4 * i];
-    for (int i = 0; i < 3; i++) a[4 * i] += 1e-9 * trace + 1e-300;
+    // turns of less than about 1e-5 rad, such as rounding, have no pivot
+    for (int i = 0; i < 3; i++) a[4 * i] += 1e-9 * trace + 1e-10 * (double)n;
     m3_inverse(a, inverse);
     m3_apply(inverse, right, x);
     for (int i = 0; i < 3; i++) pivot[i] = centre[i] + (isfinite(x[i]) ? x[i] : 0);

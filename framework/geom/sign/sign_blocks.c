@@ -25,8 +25,8 @@ static void row_flip(const blocks_job *job, size_t row, uint32_t *tile, int64_t 
                 continue;
             }
             sdm_row_span_clip(&u, first, first + SDM_BLOCK_SIZE, &begin, &end);
-            float *values = &b->values[tile[i]][in_block - first];
-            for (int64_t at = begin; at < end; at++) values[at] = -values[at];
+            float *values = &b->values[tile[i]][in_block];
+            for (int64_t at = begin - first; at < end - first; at++) values[at] = -values[at];
         }
     }
 }

@@ -86,7 +86,8 @@ static void largest_part_limits(void **state)
         {"data.memory_gb=0.005", SDM_CAUSE_MAPS, 0, 0, "to 400 and data.memory_gb to 1;"},
         {NULL, SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f16"},
         {"network.weights=f16", SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f32"},
-        {NULL, SDM_CAUSE_TEMPLATE, 0, 0, "lower grid.spacing from 0.8 to 0.4 (and double grid.size, if it is given)"},
+        {NULL, SDM_CAUSE_TEMPLATE, 0, 0,
+         "lower grid.spacing from 0.8 to 0.4 (and double grid.size, if it is given)"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const sdm_verdict v =

@@ -4,61 +4,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "sdm/internal/distribution.h"
-#include "sdm/internal/rng.h"
-#include "sdm/internal/sampling.h"
-#include "shape_internal.h"
+#include "shape_family.h"
 
-enum { ALL_CORNERS_MAX = 6, RANDOM_CORNERS = 64, SEARCH_ROUNDS = 4 };
-enum { STREAM_BOX = 1, STREAM_CORNERS = 2, STREAM_ENDS = 3 };
-
-/* A family of shapes: an instance with ranges and distributions of its parameters. */
-typedef struct family {
-    const sdm_instance *shape;
-    double min[SHAPE_PARAMS_MAX], max[SHAPE_PARAMS_MAX];
-    sdm_distribution distribution[SHAPE_PARAMS_MAX];
-    uint64_t seed;
-} family;
-
-static sdm_status family_set(family *f, const sdm_instance *shape, const double (*range)[2],
-                             sdm_error *err)
-{
-    f->shape = shape;
-    for (size_t i = 0; i < shape->n_params; i++) {
-        const sdm_param *p = &shape->params[i];
-        f->min[i] = range ? range[i][0] : p->min;
-        f->max[i] = range ? range[i][1] : p->max;
-        if (!(f->min[i] >= p->min && f->min[i] <= f->max[i] && f->max[i] <= p->max))
-            return sdm_fail(err, SDM_E_RANGE,
-                            "the range %g .. %g of '%s' does not lie within %g .. %g", f->min[i],
-                            f->max[i], p->name, p->min, p->max);
-        f->distribution[i] = shape->distributions[i];
-        // a range far from the mean has almost no probability
-        if (sdm_distribution_check(&f->distribution[i], f->min[i], f->max[i], NULL))
-            f->distribution[i] = (sdm_distribution){SDM_DISTRIBUTION_UNIFORM, 0, 0};
-    }
-    return SDM_OK;
-}
-
-static void random_params(const family *f, uint64_t stream, uint64_t index, double *p)
-{
-    sdm_sample_params(f->seed, stream, index, f->min, f->max, f->distribution, f->shape->n_params,
-                      p);
-}
-
-/* p = corner number `index` of the ranges. */
-static void corner_params(const family *f, size_t index, double *p)
-{
-    const size_t n = f->shape->n_params;
-    if (n <= ALL_CORNERS_MAX) {
-        for (size_t i = 0; i < n; i++) p[i] = index >> i & 1 ? f->max[i] : f->min[i];
-        return;
-    }
-    random_params(f, STREAM_CORNERS, index, p);
-    for (size_t i = 0; i < n; i++)
-        if (f->distribution[i].kind == SDM_DISTRIBUTION_UNIFORM)
-            p[i] = sdm_rng_below(f->seed, STREAM_ENDS, index * n + i, 2) ? f->max[i] : f->min[i];
-}
+enum { SEARCH_ROUNDS = 4 };
 
 /* The box, and for each of its six sides the shape that reaches farthest: side 2 i + 1 is the upper
  * one along axis i, and its reach is the highest coordinate; that of a lower side is the negative
@@ -69,7 +17,7 @@ typedef struct shape_box {
 } shape_box;
 
 /* Extends the box by the mesh at p. */
-static sdm_status box_extend(shape_box *b, const family *f, const double *p, sdm_error *err)
+static sdm_status box_extend(shape_box *b, const shape_family *f, const double *p, sdm_error *err)
 {
     const sdm_status s = sdm_instance_mesh(f->shape, p, &b->mesh, err);
     if (s) return s;
@@ -90,7 +38,7 @@ static sdm_status box_extend(shape_box *b, const family *f, const double *p, sdm
 
 /* Pattern search (Hooke and Jeeves 1961) from the farthest shape of each side, one uniformly
  * distributed parameter at a time: an arm with joints reaches farthest within its ranges. */
-static sdm_status box_search(shape_box *b, const family *f, sdm_error *err)
+static sdm_status box_search(shape_box *b, const shape_family *f, sdm_error *err)
 {
     sdm_status s = SDM_OK;
     for (int round = 0; round < SEARCH_ROUNDS; round++) {
@@ -115,22 +63,21 @@ sdm_status sdm_shape_box(const sdm_instance *shape, const double (*range)[2], si
 {
     if (!shape || !low || !high)
         return sdm_fail(err, SDM_E_ARG, "a box needs a shape and a place for its two corners");
-    family f = {.seed = seed};
-    sdm_status s = family_set(&f, shape, range, err);
+    shape_family f;
+    sdm_status s = sdm_family_set(&f, shape, range, NULL, seed, err);
     if (s) return s;
-    const size_t n = shape->n_params,
-                 corners = n <= ALL_CORNERS_MAX ? (size_t)1 << n : RANDOM_CORNERS;
+    const size_t n = shape->n_params;
     double p[SHAPE_PARAMS_MAX];
     shape_box b = {0};
     for (int k = 0; k < 6; k++) b.reach[k] = -INFINITY;
     for (size_t i = 0; i < n; i++) p[i] = f.min[i] + 0.5 * (f.max[i] - f.min[i]);
     s = box_extend(&b, &f, p, err);
-    for (size_t k = 0; k < corners && !s; k++) {
-        corner_params(&f, k, p);
+    for (size_t k = 0; k < f.n_corners && !s; k++) {
+        sdm_family_corner(&f, k, p);
         s = box_extend(&b, &f, p, err);
     }
     for (size_t k = 0; k < samples && !s; k++) {
-        random_params(&f, STREAM_BOX, k, p);
+        sdm_family_sample(&f, k, p);
         s = box_extend(&b, &f, p, err);
     }
     if (!s) s = box_search(&b, &f, err);

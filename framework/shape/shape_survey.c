@@ -8,18 +8,13 @@
 
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
-#include "sdm/internal/distribution.h"
 #include "sdm/internal/part_audit.h"
-#include "sdm/internal/rng.h"
-#include "sdm/internal/sampling.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
-#include "survey_family.h"
+#include "survey_line.h"
 
-enum { ALL_CORNERS_MAX = 6, RANDOM_CORNERS = 64 };
 enum { LINES_PER_PARAM = 4, LINES_MAX = 64, VELOCITIES = 4, REPEATS = 8, BOX_SAMPLES = 64 };
-enum { STREAM_SAMPLES = 1, STREAM_CORNERS = 2, STREAM_ENDS = 3 };
 
 /* What is known about one shape. */
 typedef struct finding {
@@ -33,70 +28,26 @@ typedef struct finding {
 
 /* ---- parameters ---- */
 
-static sdm_status family_set(survey_family *f, const sdm_instance *shape,
-                             const sdm_survey_opts *opts, sdm_error *err)
-{
-    *f = (survey_family){.shape = shape, .opts = opts};
-    for (size_t i = 0; i < shape->n_params; i++) {
-        const sdm_param *p = &shape->params[i];
-        double *r = f->range[i];
-        r[0] = opts->range ? opts->range[i][0] : p->min;
-        r[1] = opts->range ? opts->range[i][1] : p->max;
-        if (!(r[0] >= p->min && r[0] <= r[1] && r[1] <= p->max))
-            return sdm_fail(err, SDM_E_RANGE,
-                            "the range %g .. %g of '%s' does not lie within %g .. %g", r[0], r[1],
-                            p->name, p->min, p->max);
-        f->distribution[i] = opts->distribution ? opts->distribution[i] : shape->distributions[i];
-        if (sdm_distribution_check(&f->distribution[i], r[0], r[1], NULL))
-            f->distribution[i] = (sdm_distribution){SDM_DISTRIBUTION_UNIFORM, 0, 0};
-    }
-    return SDM_OK;
-}
-
-/* p = random parameters number `index` of the stream. */
-static void draw(const survey_family *f, uint64_t stream, uint64_t index, double *p)
-{
-    double min[SHAPE_PARAMS_MAX], max[SHAPE_PARAMS_MAX];
-    for (size_t i = 0; i < f->shape->n_params; i++) {
-        min[i] = f->range[i][0];
-        max[i] = f->range[i][1];
-    }
-    sdm_sample_params(f->opts->seed, stream, index, min, max, f->distribution, f->shape->n_params,
-                      p);
-}
-
-static void corner(const survey_family *f, size_t index, double *p)
-{
-    const size_t n = f->shape->n_params;
-    const bool all = f->all_corners;
-    if (!all) draw(f, STREAM_CORNERS, index, p);
-    for (size_t i = 0; i < n; i++) {
-        const uint64_t end =
-            all ? index >> i & 1 : sdm_rng_below(f->opts->seed, STREAM_ENDS, index * n + i, 2);
-        if (all || f->distribution[i].kind == SDM_DISTRIBUTION_UNIFORM) p[i] = f->range[i][end];
-    }
-}
-
 /* Chooses the shapes. */
-static sdm_status choose(survey_family *f, sdm_shape_survey *s, sdm_error *err)
+static sdm_status choose(shape_family *f, const sdm_survey_opts *opts, sdm_shape_survey *s,
+                         sdm_error *err)
 {
     const size_t n = f->shape->n_params;
-    s->n_params = n;
-    s->n_samples = f->opts->samples;
-    s->n_corners = n <= ALL_CORNERS_MAX ? (size_t)1 << n : RANDOM_CORNERS;
-    f->all_corners = n <= ALL_CORNERS_MAX;
-    if (f->opts->brief && s->n_corners > s->n_samples) {
-        s->n_corners = s->n_samples;
+    if (opts->brief && f->n_corners > opts->samples) {
+        f->n_corners = opts->samples;
         f->all_corners = false;
     }
+    s->n_params = n;
+    s->n_samples = opts->samples;
+    s->n_corners = f->n_corners;
     s->n = 1 + s->n_corners + s->n_samples;
     const sdm_status status = SDM_ALLOC(&s->p, s->n * n, "parameters of shapes", err);
     if (status) return status;
     for (size_t i = 0; i < n; i++)
-        s->p[i] = fmin(fmax(f->shape->params[i].def, f->range[i][0]), f->range[i][1]);
-    for (size_t k = 0; k < s->n_corners; k++) corner(f, k, s->p + (1 + k) * n);
+        s->p[i] = fmin(fmax(f->shape->params[i].def, f->min[i]), f->max[i]);
+    for (size_t k = 0; k < s->n_corners; k++) sdm_family_corner(f, k, s->p + (1 + k) * n);
     for (size_t k = 0; k < s->n_samples; k++)
-        draw(f, STREAM_SAMPLES, k, s->p + (1 + s->n_corners + k) * n);
+        sdm_family_sample(f, k, s->p + (1 + s->n_corners + k) * n);
     return SDM_OK;
 }
 
@@ -125,14 +76,14 @@ static void hash(const sdm_mesh *m, finding *f)
 }
 
 /* Makes the mesh at p and looks at it. Returns only errors that end the survey. */
-static sdm_status examine(const survey_family *f, const double *p, sdm_mesh *m, finding *out,
-                          sdm_error *err)
+static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts, const double *p,
+                          sdm_mesh *m, finding *out, sdm_error *err)
 {
     sdm_part_audit audit;
-    out->status = sdm_instance_mesh(f->shape, p, m, err);
+    out->status = sdm_instance_mesh(shape, p, m, err);
     if (!out->status) {
         hash(m, out);
-        out->status = sdm_part_audit_make(m, !f->opts->brief, &audit, err);
+        out->status = sdm_part_audit_make(m, !opts->brief, &audit, err);
     }
     if (out->status == SDM_E_NOMEM) return SDM_E_NOMEM;
     if (out->status) return SDM_OK;
@@ -148,7 +99,7 @@ static sdm_status examine(const survey_family *f, const double *p, sdm_mesh *m, 
     out->area = audit.union_area;
     memcpy(out->min, audit.mesh.min, sizeof out->min);
     memcpy(out->max, audit.mesh.max, sizeof out->max);
-    if (f->opts->grid) measure_beyond(m, f->opts->grid, out->beyond);
+    if (opts->grid) measure_beyond(m, opts->grid, out->beyond);
     sdm_part_audit_dispose(&audit);
     return SDM_OK;
 }
@@ -192,7 +143,8 @@ static sdm_status run(const sdm_survey_opts *opts, int n_threads, size_t n, surv
 /* ---- all meshes ---- */
 
 typedef struct survey {
-    survey_family family;
+    shape_family family;
+    const sdm_survey_opts *opts;
     sdm_shape_survey *out;
     finding *found;        /* [n] */
     sdm_survey_jump *line; /* [n_lines] */
@@ -209,7 +161,7 @@ static const double *params_of(const survey *v, size_t i)
 static sdm_status examine_one(void *user, size_t i, sdm_mesh *mesh, sdm_error *err)
 {
     survey *v = user;
-    return examine(&v->family, params_of(v, i), mesh, &v->found[i], err);
+    return examine(v->family.shape, v->opts, params_of(v, i), mesh, &v->found[i], err);
 }
 
 static void count(sdm_survey_count *c, size_t shape, double amount)
@@ -303,7 +255,7 @@ static sdm_status follow_lines(survey *v, int n_threads, sdm_error *err)
                                                  : LINES_PER_PARAM * n;
     sdm_status status = SDM_ALLOC(&s->jump, n, "jumps of the mesh", err);
     if (!status) status = SDM_ALLOC(&v->line, v->n_lines, "lines through the ranges", err);
-    if (!status) status = run(v->family.opts, n_threads, v->n_lines, follow_one, v, err);
+    if (!status) status = run(v->opts, n_threads, v->n_lines, follow_one, v, err);
     for (size_t i = 0; i < v->n_lines && !status; i++) {
         sdm_survey_jump *worst = &s->jump[i % n];
         const sdm_survey_jump *j = &v->line[i];
@@ -335,7 +287,7 @@ static sdm_status compare_velocity(survey *v, size_t shape, sdm_error *err)
             }
         }
         // velocities that move no vertex by 1e-9 of the size are rounding errors
-        const double range = v->family.range[k][1] - v->family.range[k][0];
+        const double range = v->family.max[k] - v->family.min[k];
         if (!(largest * range > 1e-9 * v->size) || !(wrong / largest > s->velocity_error)) continue;
         s->velocity_error = wrong / largest;
         s->velocity_param = k;
@@ -393,7 +345,7 @@ static sdm_status repeat(survey *v, int n_threads, sdm_error *err)
         ms[i] = 1e3 * (sdm_clock() - start);
     }
     sdm_mesh_dispose(&mesh);
-    if (!s) s = run(v->family.opts, n_threads > 1 ? n_threads : 2, n, repeat_one, v, err);
+    if (!s) s = run(v->opts, n_threads > 1 ? n_threads : 2, n, repeat_one, v, err);
     if (s) return s;
     for (size_t i = 0; i < n; i++) v->out->unlike += v->unlike[i];
     qsort(ms, n, sizeof *ms, by_size);
@@ -407,9 +359,9 @@ static sdm_status widen_box(survey *v, sdm_error *err)
     double low[3], high[3];
     sdm_shape_survey *s = v->out;
     if (s->failed.shapes) return SDM_OK;
-    const sdm_status status = sdm_shape_box(v->family.shape, (const double(*)[2])v->family.range,
+    const sdm_status status = sdm_shape_box(v->family.shape, v->opts->range,
                                             s->n_samples < BOX_SAMPLES ? s->n_samples : BOX_SAMPLES,
-                                            v->family.opts->seed, low, high, err);
+                                            v->opts->seed, low, high, err);
     for (int a = 0; a < 3 && !status; a++) {
         s->low[a] = fmin(s->low[a], low[a]);
         s->high[a] = fmax(s->high[a], high[a]);
@@ -427,11 +379,11 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
     static const sdm_survey_opts none = {0};
     if (!opts) opts = &none;
     *out = (sdm_shape_survey){0};
-    survey v = {.out = out};
+    survey v = {.opts = opts, .out = out};
     const int n_threads = sdm_threads(opts->n_threads);
     sdm_status s = opts->grid ? sdm_grid_check(opts->grid, err) : SDM_OK;
-    if (!s) s = family_set(&v.family, shape, opts, err);
-    if (!s) s = choose(&v.family, out, err);
+    if (!s) s = sdm_family_set(&v.family, shape, opts->range, opts->distribution, opts->seed, err);
+    if (!s) s = choose(&v.family, opts, out, err);
     if (!s) s = SDM_ALLOC(&v.found, out->n, "findings of a survey", err);
     if (!s) s = run(opts, n_threads, out->n, examine_one, &v, err);
     if (!s) sum_up(&v);

@@ -1,14 +1,14 @@
 /* Follows one parameter of a shape over its range and finds where the mesh jumps. */
+#include "survey_line.h"
+
 #include <math.h>
 #include <string.h>
-
-#include "survey_family.h"
 
 enum { STEPS = 32, HALVINGS = 20 };
 
 /* Four meshes: three neighbours on the line, and a place for a further one. */
 typedef struct line {
-    const survey_family *family;
+    const shape_family *family;
     size_t param;
     double p[SHAPE_PARAMS_MAX];
     sdm_mesh mesh[4];
@@ -16,8 +16,8 @@ typedef struct line {
 
 static double line_value(const line *l, int step)
 {
-    const double *r = l->family->range[l->param];
-    return step == STEPS ? r[1] : r[0] + (r[1] - r[0]) * step / STEPS;
+    const double min = l->family->min[l->param], max = l->family->max[l->param];
+    return step == STEPS ? max : min + (max - min) * step / STEPS;
 }
 
 static sdm_status line_mesh(line *l, double value, sdm_mesh *out, sdm_error *err)
@@ -143,7 +143,7 @@ static sdm_status follow(line *l, double size, sdm_survey_jump *out, sdm_error *
     return s;
 }
 
-sdm_status sdm_survey_line(const survey_family *f, const double *p, size_t k, double size,
+sdm_status sdm_survey_line(const shape_family *f, const double *p, size_t k, double size,
                            sdm_survey_jump *out, sdm_error *err)
 {
     line l = {.family = f, .param = k};

@@ -1,5 +1,5 @@
 /* The box of a family of shapes against closed forms and against random shapes.
- * Tests: shape_box.c sampling.c */
+ * Tests: shape_box.c shape_family.c sampling.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -66,35 +66,6 @@ static sdm_status copy_mesh(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     return s ? s : sdm_mesh_copy(mesh, &e->solid, err);
 }
 
-/* Replaces the survey of the solid by a new one. low, high: state of the arena's ends before the
- * old survey, whose memory is released first. */
-static sdm_status survey_again(sdm_exact *e, sdm_arena_mark low, sdm_arena_mark high,
-                               sdm_error *err)
-{
-    sdm_arena_release(&e->arena, SDM_LOW, low);
-    sdm_arena_release(&e->arena, SDM_HIGH, high);
-    e->survey = (sdm_survey){0};
-    return sdm_survey_build(&e->solid, &e->arena, &e->survey, err);
-}
-
-/* Surveys the solid and corrects its orientation. report.audit is the audit before the
- * correction. */
-static sdm_status survey_solid(sdm_exact *e, sdm_error *err)
-{
-    const sdm_arena_mark low = e->arena.end[SDM_LOW], high = e->arena.end[SDM_HIGH];
-    sdm_status s = sdm_survey_build(&e->solid, &e->arena, &e->survey, err);
-    if (s) return s;
-    e->report.audit = e->survey.audit;
-    if (e->survey.audit.inverted) {
-        for (size_t t = 0; t < e->solid.n_tri; t++) sdm_triangle_turn(&e->solid, t);
-        e->report.turned = true;
-        s = survey_again(e, low, high, err);
-        if (s) return s;
-    }
-    s = sdm_parts_turn(&e->solid, &e->survey, &e->report.parts_turned, err);
-    return s || !e->report.parts_turned ? s : survey_again(e, low, high, err);
-}
-
 /* Makes the surface: the union hull of the solid, or a copy of the solid if nothing is removed. */
 static sdm_status make_surface(sdm_exact *e, sdm_error *err)
 {
@@ -168,7 +139,10 @@ static sdm_status prepare(sdm_exact *e, const sdm_mesh *mesh, sdm_error *err)
     e->arena.n_tri = mesh->n_tri;
     sdm_status s = copy_mesh(e, mesh, err);
     if (!s) s = sdm_arena_reserve(&e->arena, usual_bytes(mesh), err);
-    if (!s) s = survey_solid(e, err);
+    sdm_exact_report *r = &e->report;
+    if (!s)
+        s = sdm_parts_survey(&e->solid, &e->arena, &e->survey, &r->audit, &r->turned,
+                             &r->parts_turned, err);
     if (!s) s = sdm_sign_choose(&e->report.audit, e->opts.sign, &e->report.sign, err);
     if (!s) s = make_surface(e, err);
     if (!s) s = check_pseudonormal(e, err);

@@ -48,8 +48,8 @@ void sdm_family_corner(const shape_family *f, uint64_t index, double *p)
     const size_t n = f->shape->n_params;
     if (!f->all_corners) draw(f, STREAM_CORNERS, index, p);
     for (size_t i = 0; i < n; i++) {
-        const uint64_t end = f->all_corners ? index >> i & 1
-                                            : sdm_rng_below(f->seed, STREAM_ENDS, index * n + i, 2);
+        const uint64_t end =
+            f->all_corners ? index >> i & 1 : sdm_rng_below(f->seed, STREAM_ENDS, index * n + i, 2);
         if (f->all_corners || f->distribution[i].kind == SDM_DISTRIBUTION_UNIFORM)
             p[i] = end ? f->max[i] : f->min[i];
     }

@@ -23,33 +23,9 @@ typedef struct job {
     sdm_part_audit *out;
 } job;
 
-static sdm_status survey_again(job *j, sdm_error *err)
-{
-    sdm_arena_dispose(&j->arena);
-    j->survey = (sdm_survey){0};
-    return sdm_survey_build(&j->turned, &j->arena, &j->survey, err);
-}
-
 static bool same_triangle(const sdm_mesh *a, const sdm_mesh *b, size_t t)
 {
     return !memcmp(a->tri + 3 * t, b->tri + 3 * t, 3 * sizeof *a->tri);
-}
-
-/* Surveys the mesh and turns it as survey_solid() of the engine does. */
-static sdm_status turn_as_engine(job *j, sdm_error *err)
-{
-    size_t n_turned = 0;
-    sdm_status s = sdm_mesh_copy(j->given, &j->turned, err);
-    if (!s) s = survey_again(j, err);
-    if (s) return s;
-    j->out->mesh = j->survey.audit;
-    j->out->turned = j->survey.audit.inverted;
-    if (j->out->turned) {
-        for (size_t t = 0; t < j->turned.n_tri; t++) sdm_triangle_turn(&j->turned, t);
-        s = survey_again(j, err);
-    }
-    if (!s) s = sdm_parts_turn(&j->turned, &j->survey, &n_turned, err);
-    return s || !n_turned ? s : survey_again(j, err);
 }
 
 /* Numbers the parts and allocates them. */
@@ -204,7 +180,11 @@ static sdm_status measure_union(job *j, sdm_error *err)
 /* The audit without the union. */
 static sdm_status find_parts(job *j, sdm_error *err)
 {
-    sdm_status s = turn_as_engine(j, err);
+    size_t n_turned = 0;
+    sdm_status s = sdm_mesh_copy(j->given, &j->turned, err);
+    if (!s)
+        s = sdm_parts_survey(&j->turned, &j->arena, &j->survey, &j->out->mesh, &j->out->turned,
+                             &n_turned, err);
     if (!s) s = number_parts(j, err);
     if (s) return s;
     measure_parts(j);

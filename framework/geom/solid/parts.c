@@ -53,3 +53,31 @@ sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *survey, size_t *n_turne
     sdm_free(parts);
     return s;
 }
+
+/* Replaces a survey by a new one. low, high: state of the arena's ends before the old survey, whose
+ * memory is released first. */
+static sdm_status survey_again(sdm_mesh *m, sdm_arena *arena, sdm_arena_mark low,
+                               sdm_arena_mark high, sdm_survey *survey, sdm_error *err)
+{
+    sdm_arena_release(arena, SDM_LOW, low);
+    sdm_arena_release(arena, SDM_HIGH, high);
+    *survey = (sdm_survey){0};
+    return sdm_survey_build(m, arena, survey, err);
+}
+
+sdm_status sdm_parts_survey(sdm_mesh *m, sdm_arena *arena, sdm_survey *survey, sdm_audit *given,
+                            bool *turned, size_t *n_turned, sdm_error *err)
+{
+    const sdm_arena_mark low = arena->end[SDM_LOW], high = arena->end[SDM_HIGH];
+    sdm_status s = sdm_survey_build(m, arena, survey, err);
+    if (s) return s;
+    *given = survey->audit;
+    *turned = survey->audit.inverted;
+    if (*turned) {
+        for (size_t t = 0; t < m->n_tri; t++) sdm_triangle_turn(m, t);
+        s = survey_again(m, arena, low, high, survey, err);
+        if (s) return s;
+    }
+    s = sdm_parts_turn(m, survey, n_turned, err);
+    return s || !*n_turned ? s : survey_again(m, arena, low, high, survey, err);
+}

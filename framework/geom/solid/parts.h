@@ -18,3 +18,10 @@ static inline void sdm_triangle_turn(sdm_mesh *m, size_t t)
  * closed is left as it is. *n_turned: number of turned parts; if it is not 0, the survey of m is
  * out of date. SDM_E_NOMEM. */
 sdm_status sdm_parts_turn(sdm_mesh *m, const sdm_survey *survey, size_t *n_turned, sdm_error *err);
+
+/* Surveys the mesh m and corrects its orientation: all of it if its volume is negative, then parts
+ * as sdm_parts_turn() does. *survey, whose memory comes from the arena, belongs to the corrected
+ * mesh; *given = the audit before the correction; *turned: the whole mesh was turned. Errors as
+ * sdm_survey_build(). */
+sdm_status sdm_parts_survey(sdm_mesh *m, sdm_arena *arena, sdm_survey *survey, sdm_audit *given,
+                            bool *turned, size_t *n_turned, sdm_error *err);

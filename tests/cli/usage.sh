@@ -43,16 +43,32 @@ expect 2 'threads: empty value' sdmgen shapes --threads=
 expect 1 'cannot write to standard output' bash -c '"$0" shapes >/dev/full' "$program"
 
 # Texts generated from the table of options.
-expect 0 - sdmgen help --completion
+expect 0 - sdmgen help --completion bash
 cp out completion.bash
 expect 0 - bash -n completion.bash
 expect 0 - bash -c '. ./completion.bash; COMP_WORDS=(sdmgen eval --sam); COMP_CWORD=2; _sdmgen; echo "${COMPREPLY[@]}"'
 has '^--samples$'
 expect 0 - bash -c '. ./completion.bash; COMP_WORDS=(sdmgen exact --sign w); COMP_CWORD=3; _sdmgen; echo "${COMPREPLY[@]}"'
 has '^winding$'
+expect 0 - sdmgen help --completion fish
+cp out sdmgen.fish
+expect 0 - sdmgen help --completion zsh
+cp out _sdmgen
+has '^#compdef sdmgen$'
+expect 2 "completion 'csh': need one of bash\|zsh\|fish" sdmgen help --completion csh
+# in the shells themselves, where they are installed
+if command -v fish >/dev/null; then
+    expect 0 - env HOME="$PWD" fish --no-config -c 'source sdmgen.fish; complete -C "sdmgen exact --sign w"; complete -C "sdmgen exper"'
+    has '^winding'
+    has '^experiment'
+fi
+if command -v zsh >/dev/null; then expect 0 - zsh -n _sdmgen; fi
+expect 0 - sdmgen help exact --man
+has '^\.TH SDMGEN\\-EXACT 1'
+has '^\.B "\\-\\-keep\\-overlap"$'
 expect 0 - sdmgen help --man
 has '^\.TH SDMGEN 1'
-has '^\.B "\\-\\-keep\\-overlap"$'
+has '^\.BR sdmgen\\-exact \(1\)$'
 
 # The reference in the documentation equals the generated text.
 expect 0 - sdmgen help --markdown

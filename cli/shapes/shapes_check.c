@@ -19,7 +19,7 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
-enum { SAMPLES = 128, DRAWN = 9, TITLE_MAX = 36 };
+enum { SAMPLES = 128, DRAWN = 9, TITLE_MAX = 200 };
 
 typedef struct check {
     const cli_args *args;
@@ -221,7 +221,7 @@ static sdm_status print_json(const check *c, sdm_error *err)
     return s;
 }
 
-/* Writes the first parameters of shape `index`, as many as fit over a picture. */
+/* Writes the first parameters of shape `index`, as many as there is room for. */
 static const char *title_of(const check *c, size_t index, char title[TITLE_MAX])
 {
     const sdm_shape_survey *f = &c->survey.found;

@@ -116,7 +116,7 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
                          args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples, false, &e,
                          err);
     if (!s && !known)
-        cli_notice("shape '%s' is unknown (--plugin FILE loads it): the accuracy was not measured",
+        cli_warn("shape '%s' is unknown (--plugin FILE loads it): the accuracy was not measured",
                    info->shape);
     if (!s) s = report_model(args, path, info, &e, err);
     cli_eval_dispose(&e);

@@ -148,7 +148,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                    "level set; no sign changed",
                    path, (long long)report.adjusted_voxels, report.adjusted_mm);
     if (!s && report.cut)
-        cli_notice("%s: the surface leaves the grid and is cut at its border", path);
+        cli_warn("%s: the surface leaves the grid and is cut at its border", path);
     else if (!s && report.estimated_voxels > 0)
         cli_notice("%s: the band leaves the grid; the distances of %lld voxels beyond it are "
                    "estimated from those at its border: a larger grid or a narrower --band avoids "
@@ -170,7 +170,7 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
     if (!s && surface.n_tri == 0)
         s = sdm_fail(err, SDM_E_MESH, "%s: the map has no zero surface", path);
     if (!s) s = sdm_mesh_write(path, &surface, err);
-    if (!s && cut) cli_notice("%s: the surface leaves the grid and is open at its border", path);
+    if (!s && cut) cli_warn("%s: the surface leaves the grid and is open at its border", path);
     sdm_mesh_dispose(&surface);
     return s;
 }

@@ -12,6 +12,7 @@
 #include "inputs/setup.h"
 #include "report/files.h"
 #include "report/json_values.h"
+#include "report/report_audit.h"
 #include "report/report_survey.h"
 #include "report/terminal.h"
 #include "sdm/internal/shape_box.h"
@@ -106,7 +107,7 @@ static sdm_status open_shape(check *c, sdm_error *err)
 
 static const char *weight_name(sdm_status weight)
 {
-    return weight == SDM_E_MESH ? "broken" : weight == SDM_E_QUALITY ? "warning" : "note";
+    return weight ? cli_verdict_name(weight) : "note";
 }
 
 static void print_line(void *user, sdm_status weight, const char *line)
@@ -192,7 +193,7 @@ static sdm_status print_json(const check *c, sdm_error *err)
     sdm_json j = {0};
     sdm_json_open(&j, NULL, '{');
     sdm_json_text(&j, "shape", sdm_instance_shape(c->survey.shape)->name);
-    sdm_json_text(&j, "verdict", verdict ? weight_name(verdict) : "fine");
+    sdm_json_text(&j, "verdict", cli_verdict_name(verdict));
     sdm_json_int(&j, "shapes", (int64_t)f->n);
     sdm_json_int(&j, "corners", (int64_t)f->n_corners);
     sdm_json_int(&j, "samples", (int64_t)f->n_samples);

@@ -71,8 +71,9 @@ static sdm_status open_mesh(job *j, sdm_error *err)
                         args->method);
     if (args->columns && !args->points)
         return sdm_fail(err, SDM_E_ARG, "exact: --columns belongs to --points FILE");
-    sdm_status s =
-        args->points ? cli_points_check(args, &j->points, err) : cli_layers_check(args, err);
+    sdm_status s = cli_check_vdb_options(args, err);
+    if (!s)
+        s = args->points ? cli_points_check(args, &j->points, err) : cli_layers_check(args, err);
     if (s) return s;
     s = args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : make_shape_mesh(j, err);
     return s || !args->turn_parts ? s : cli_turn_parts(&j->mesh, err);
@@ -218,7 +219,7 @@ static void notice_mesh(const job *j)
     float min, max;
     if (j->values) find_range(j, &min, &max, &inside);
     if (!inside)
-        cli_warn("no voxel of the grid is inside the surface: does the grid cover the shape?");
+        cli_notice("no voxel of the grid is inside the surface: does the grid cover the shape?");
     if (j->report.turned) cli_notice("the mesh was inside out; its orientation has been reversed");
     if (j->report.parts_turned)
         cli_notice("%zu parts were inside out; their orientation has been reversed",

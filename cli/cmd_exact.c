@@ -226,8 +226,7 @@ static void notice_mesh(const job *j)
                    j->report.parts_turned);
     cli_warn_audit(a);
     // a single part that meets no other cannot be inside out after the engine has turned it
-    if (a->components > 1)
-        cli_warn_parts(&j->mesh, j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
+    if (a->components > 1) cli_warn_parts(&j->mesh, j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
                    "triangles (error at most %.2g mm)",

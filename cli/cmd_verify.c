@@ -125,7 +125,7 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
     if (!s && known) s = cli_time_two(model, shape, &times, err);
     if (!s && !known)
         cli_warn("shape '%s' is unknown (--plugin FILE loads it): the accuracy was not measured",
-                   info->shape);
+                 info->shape);
     if (!s) s = report_model(args, path, info, &e, &times, err);
     cli_eval_dispose(&e);
     sdm_model_free(model);

@@ -450,7 +450,8 @@ const cli_option cli_options[] = {
      AT(seed), "seed of the random numbers (default 1; train, config: the configuration's)"},
     {"json", 0, CLI_FLAG, NULL, NULL, 0, 0, REPORTS, AT(json),
      "print the result as one line of JSON"},
-    {"quiet", 'q', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(quiet), "print no progress and no notices; warnings and errors remain"},
+    {"quiet", 'q', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(quiet),
+     "print no progress and no notices; warnings and errors remain"},
     {"help", 'h', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(help), "print this text"},
 };
 const size_t cli_n_options = sizeof cli_options / sizeof *cli_options;

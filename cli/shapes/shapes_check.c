@@ -260,7 +260,7 @@ static sdm_status draw(const check *c, const char *path, sdm_error *err)
             sdm_instance_mesh(c->survey.shape, f->p + shape * f->n_params, &mesh[n], NULL))
             continue;
         if (colour) s = SDM_ALLOC(&beyond[n], mesh[n].n_vert, "distances beyond the grid", err);
-        if (!s && colour) 
+        if (!s && colour)
             for (size_t v = 0; v < mesh[n].n_vert; v++)
                 beyond[n][v] = sdm_grid_beyond(c->survey.grid, mesh[n].vert + 3 * v, NULL);
         surface[n] = (sdm_picture_surface){title_of(c, shape, title[n]), &mesh[n], beyond[n]};

@@ -97,8 +97,8 @@ typedef struct cli_timing {
 sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t seed, bool fastest,
                          size_t n_naive, cli_timing *out, sdm_error *err);
 
-/* Measures ms_network and ms_exact only, as medians, within a few seconds; the other members of *out
- * are 0 or NaN. */
+/* Measures ms_network and ms_exact only, as medians, within a few seconds; the other members of
+ * *out are 0 or NaN. */
 sdm_status cli_time_two(const sdm_model *m, const sdm_instance *shape, cli_timing *out,
                         sdm_error *err);
 

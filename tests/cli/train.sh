@@ -104,7 +104,7 @@ cp "$tiny" other.yaml
 expect 0 - sdmgen train other.yaml --out other --quiet
 cmp -s run/model.sdm other/model.sdm || bad 'the bits of a model depend on the name of its folder'
 cmp -s run/config.yaml other/config.yaml || bad 'config.yaml depends on the name of its folder'
-expect 0 'the grid covers .* and cuts 12 % of the shapes' sdmgen config run/config.yaml
+expect 0 - sdmgen config run/config.yaml
 
 # The script ./run asks before it replaces a model of another configuration.
 mkdir -p clone/.ci clone/configs clone/build/release/cli clone/runs

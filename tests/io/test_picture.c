@@ -334,7 +334,8 @@ static void test_text_is_aligned(void **state)
     sdm_canvas *c;
     assert_int_equal(sdm_canvas_create("test_picture_t.png", 4, 4, &c, NULL), SDM_OK);
     const double width = sdm_canvas_text_width(c, 20, false, "HHHHH");
-    assert_true(sdm_canvas_text_width(c, 10, false, "mm\xC2\xB2") > sdm_canvas_text_width(c, 10, false, "mm"));
+    assert_true(sdm_canvas_text_width(c, 10, false, "mm\xC2\xB2") >
+                sdm_canvas_text_width(c, 10, false, "mm"));
     assert_true(fabs(sdm_canvas_text_width(c, 10, false, "HHHHH") - width / 2) < 0.01);
     sdm_canvas_discard(c);
 

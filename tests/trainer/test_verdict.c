@@ -401,16 +401,11 @@ int main(int argc, char **argv)
     const struct CMUnitTest slow[] = {cmocka_unit_test(advice_helps)};
     if (argc > 1) return cmocka_run_group_tests(slow, set_up, tear_down);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(largest_part_limits),
-        cmocka_unit_test(length_of_the_training),
-        cmocka_unit_test(grid_limits),
-        cmocka_unit_test(grades),
-        cmocka_unit_test(grid_cuts),
-        cmocka_unit_test(error_falls_in_the_last_third),
-        cmocka_unit_test(evaluations_are_due),
-        cmocka_unit_test(surface_of_a_sphere),
-        cmocka_unit_test(parts_add_up),
-        cmocka_unit_test(progress_is_true),
+        cmocka_unit_test(largest_part_limits), cmocka_unit_test(length_of_the_training),
+        cmocka_unit_test(grid_limits),         cmocka_unit_test(grades),
+        cmocka_unit_test(grid_cuts),           cmocka_unit_test(error_falls_in_the_last_third),
+        cmocka_unit_test(evaluations_are_due), cmocka_unit_test(surface_of_a_sphere),
+        cmocka_unit_test(parts_add_up),        cmocka_unit_test(progress_is_true),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

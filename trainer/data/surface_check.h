@@ -16,7 +16,8 @@ typedef struct surface_check {
     double cut;
 } surface_check;
 
-/* Compares a few held-out shapes at random points of their surfaces that lie inside the grid; rms_mm
-   and thin are NaN if there is no such point. `cut` is of all held-out shapes. [n_threads threads; the same bits for any number] */
+/* Compares a few held-out shapes at random points of their surfaces that lie inside the grid;
+   rms_mm and thin are NaN if there is no such point. `cut` is of all held-out shapes. [n_threads
+   threads; the same bits for any number] */
 sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check *out,
                                  sdm_error *err);

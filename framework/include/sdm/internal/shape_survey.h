@@ -16,7 +16,7 @@ typedef struct sdm_survey_opts {
     const double (*range)[2];
     /* [n_params] distribution of each parameter within its range; NULL: the shape's own */
     const sdm_distribution *distribution;
-    size_t samples;                       /* random shapes: Sobol' points of the distributions */
+    size_t samples; /* random shapes: Sobol' points of the distributions */
     uint64_t seed;
     const sdm_grid *grid; /* NULL: nothing is compared with a grid */
     bool brief;           /* only meshes and their audits: no lines, velocities and repetitions */

@@ -108,7 +108,7 @@ expect 2 'max-error' sdmgen generate $model --max-error nan -o never.npy
 # A model whose shape is a plug-in that is not loaded: it gives maps, but they cannot be checked.
 plugin=../../plugins/good/octahedron.so
 if [ -e $plugin ]; then
-    expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=octahedron train.steps=2 --plugin $plugin --out away --quiet
+    expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=octahedron 'shape.ranges={radius: [1, 4]}' train.steps=2 --plugin $plugin --out away --quiet
     expect 0 - sdmgen generate away/model.sdm -o o.npy
     expect 3 "^sdmgen: error: --check needs the exact shape: .*'octahedron', which is not known here; load its plug-in" \
         sdmgen generate away/model.sdm --check

@@ -4,7 +4,7 @@
 . "$(dirname "$0")/common.sh"
 cat >base.yaml <<'END'
 shape: {name: capsule}
-grid: {size: [14, 12, 10], spacing: 1.2}
+grid: {size: [12, 12, 14], spacing: 1.2}
 data: {static: 2, online: 16, start: 24, holdout: 4}
 train: {steps: 20, batch: 4}
 END

@@ -41,13 +41,15 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      ".obj .off, mm). A surface that overlaps itself stands for the union of the volumes it\n"
      "encloses. Without grid options the grid is fitted to the bounding box of the mesh, with\n"
      "a margin of a tenth of its longest edge on every side: 64 voxels along that edge,\n"
-     "margins included. With --points FILE, distances at points in any order.",
+     "margins included. With --points FILE, distances at points in any order. A mesh that is\n"
+     "not closed, or parts that are inside out, give a warning.",
      "sdmgen exact --shape cochlea -p a=4.2 --size 60,50,50 --spacing 0.2 -o cochlea.nrrd", 0, 0},
     {"mesh", "--shape NAME [-p name=value ...] | --mesh FILE [-o FILE]",
      "write the surface mesh of a shape, or audit and mend a mesh",
      "Makes the mesh of a shape or reads a mesh file (.ply .stl .obj .off, mm), and warns of\n"
-     "parts that are inside out. --audit prints the state of every part and the volume of the\n"
-     "union. --turn-parts turns the parts that are inside out.",
+     "defects. --audit prints the state of every part and the volume of the union. Exit code\n"
+     "of --audit and --json 3: the mesh is not closed; 4: parts are inside out, or it encloses\n"
+     "no volume; files are written all the same. --turn-parts turns parts that are inside out.",
      "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0},
     {"eval", "MODEL", "measure a network on new random shapes",
      "Draws random shapes that the training did not use and compares the network with the\n"
@@ -211,8 +213,8 @@ const cli_option cli_options[] = {
     {"keep-overlap", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXACT), AT(keep_overlap),
      "measure to all triangles, also to those inside the union"},
     {"certify", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXACT), AT(certify),
-     "compute the sign of every voxel again along other axes and report differences (method "
-     "exact)"},
+     "compute the sign of every voxel again along other axes; exit code 4 when signs differ, or "
+     "voxels lie in a part that is inside out (method exact)"},
 
     /* the output */
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(outputs),
@@ -448,7 +450,8 @@ const cli_option cli_options[] = {
      AT(seed), "seed of the random numbers (default 1; train, config: the configuration's)"},
     {"json", 0, CLI_FLAG, NULL, NULL, 0, 0, REPORTS, AT(json),
      "print the result as one line of JSON"},
-    {"quiet", 'q', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(quiet), "print no progress and no notices"},
+    {"quiet", 'q', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(quiet),
+     "print no progress and no notices; warnings and errors remain"},
     {"help", 'h', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(help), "print this text"},
 };
 const size_t cli_n_options = sizeof cli_options / sizeof *cli_options;

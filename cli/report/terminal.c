@@ -81,14 +81,27 @@ int cli_report(const sdm_error *err)
     return exit_code_of(err->status);
 }
 
+static void print_line(const char *begin, const char *fmt, va_list args)
+{
+    fputs(begin, stderr);
+    vfprintf(stderr, fmt, args);
+    fputc('\n', stderr);
+}
+
 void cli_notice(const char *fmt, ...)
 {
     if (quiet_wanted) return;
     va_list args;
     va_start(args, fmt);
-    fputs("sdmgen: ", stderr);
-    vfprintf(stderr, fmt, args);
-    fputc('\n', stderr);
+    print_line("sdmgen: ", fmt, args);
+    va_end(args);
+}
+
+void cli_warn(const char *fmt, ...)
+{
+    va_list args;
+    va_start(args, fmt);
+    print_line("sdmgen: warning: ", fmt, args);
     va_end(args);
 }
 

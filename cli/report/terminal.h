@@ -17,7 +17,7 @@ enum {
     CLI_EXIT_INTERRUPTED = 130
 };
 
-/* true: no notices and no progress from now on. */
+/* true: no notices and no progress from now on; warnings remain. */
 void cli_set_quiet(bool quiet);
 bool cli_is_quiet(void);
 
@@ -26,8 +26,12 @@ bool cli_is_quiet(void);
    exit code. */
 int cli_report(const sdm_error *err);
 
-/* Prints "sdmgen: text" on stderr, unless quiet. */
+/* Prints "sdmgen: text" on stderr, unless quiet: good to know. */
 void cli_notice(const char *fmt, ...) SDM_PRINTF(1, 2);
+
+/* Prints "sdmgen: warning: text" on stderr, quiet or not: the input has a fault, or the result is
+   probably not what the user wants. */
+void cli_warn(const char *fmt, ...) SDM_PRINTF(1, 2);
 
 /* True when stderr is a terminal that can redraw a line: TERM is set and not "dumb". */
 bool cli_has_terminal(void);

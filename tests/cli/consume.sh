@@ -23,8 +23,8 @@ expect 1 '^consume: .*missing\.sdm' by-cmake/consume missing.sdm
 pc=$(dirname "$(find prefix -name sdmgen.pc)")
 # shellcheck disable=SC2046 # flags are words
 PKG_CONFIG_PATH=$pc cc -std=c11 -Wall -Wextra -Werror -o by-pkg-config "$source_folder/examples/consume/consume.c" \
-    $(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs sdmgen) 2>log || bad "pkg-config: $(cat log)"
-expect 0 - env LD_LIBRARY_PATH="$(dirname "$pc")" ./by-pkg-config $model
+    $(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs sdmgen) "-Wl,-rpath,$(PKG_CONFIG_PATH=$pc pkg-config --variable=libdir sdmgen)" 2>log || bad "pkg-config: $(cat log)"
+expect 0 - ./by-pkg-config $model
 
 # The command that examples/statistical/README.md shows.
 cp "$source_folder/examples/statistical/make_labyrinth.c" .

@@ -34,7 +34,7 @@ fi
 
 say "using the packages in a bare system"
 mkdir "$work/repository"
-cp "$work"/first/*.deb examples/consume/* tests/cli/tiny.yaml .ci/packages_user.sh "$work/repository"
+(cd "$work/first" && cp ./*.deb sdmgen/examples/consume/* sdmgen/tests/cli/tiny.yaml sdmgen/.ci/packages_user.sh "$work/repository")
 mmdebstrap --quiet --variant=apt --include=gcc,libc6-dev,cmake,make \
     --customize-hook="copy-in $work/repository /opt" --customize-hook='chroot "$1" bash /opt/repository/packages_user.sh' \
     bookworm /dev/null

@@ -450,6 +450,12 @@ const cli_option cli_options[] = {
      AT(seed), "seed of the random numbers (default 1; train, config: the configuration's)"},
     {"json", 0, CLI_FLAG, NULL, NULL, 0, 0, REPORTS, AT(json),
      "print the result as one line of JSON"},
+    {"progress", 0, CLI_CHOICE, NULL, "auto|plain|json|slicer", 0, 0,
+     ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_EVAL) | ON(CLI_VERIFY) |
+         ON(CLI_EXPERIMENT) | ON(CLI_FIT),
+     AT(progress),
+     "form of the progress: a bar on a terminal, plain lines elsewhere (auto, default); plain "
+     "lines; every line on stderr as JSON; or the elements on stdout that 3D Slicer reads"},
     {"quiet", 'q', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(quiet),
      "print no progress and no notices; warnings and errors remain"},
     {"help", 'h', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(help), "print this text"},

@@ -110,6 +110,7 @@ struct cli_args {
     cli_list files; /* positional arguments */
     cli_list plugins, params, options, outputs;
     bool quiet, json, help;
+    const char *progress; /* train, generate, exact, eval, verify, experiment, fit */
     int64_t threads, seed;
     bool resume;                     /* train */
     bool force;                      /* train, experiment, fit */

@@ -185,7 +185,7 @@ static sdm_status run_method(job *j, sdm_error *err)
     sdm_method_report report;
     cli_progress_start(&w.bar);
     s = method->map(&j->mesh, &j->grid, &opts, j->values, &report, err);
-    cli_progress_clear(&w.bar);
+    cli_progress_end(&w.bar, !s);
     if (s) return s;
     // the report
     j->report = report.exact;

@@ -461,7 +461,7 @@ static sdm_status run_maps(job *j, sdm_error *err)
         if (!s && i + 1 < j->n_rows) s = cli_check_interrupt(err);
         cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j->n_rows, NULL);
     }
-    cli_progress_clear(&progress);
+    cli_progress_end(&progress, !s);
     return !s && j->args->json ? print_json(j, err) : s;
 }
 

@@ -125,7 +125,7 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     if (!args->resume) cli_notice_survey(config, shape);
     cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
-    cli_progress_clear(&progress);
+    cli_progress_end(&progress, !s);
     if (s) return s;
     cli_timing times;
     s = look_at_model(report.model_path, shape, folder, &times, err);

@@ -130,8 +130,8 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "sdmgen fit runs/cochlea/model.sdm ct.nii.gz --start-centre 4,-2,7 --start-axis 0,0,1 -o "
      "fit.stl -o fit.png",
      1, 2},
-    {"help", "[COMMAND]", "print this text, the manual page or the bash completion", NULL,
-     "sdmgen help --completion > ~/.local/share/bash-completion/completions/sdmgen", 0, 1},
+    {"help", "[COMMAND]", "print help, manual pages or completion scripts", NULL,
+     "sdmgen help --completion bash > ~/.local/share/bash-completion/completions/sdmgen", 0, 1},
 };
 
 const cli_option cli_options[] = {
@@ -433,9 +433,9 @@ const cli_option cli_options[] = {
     {"markdown", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG) | ON(CLI_EXPERIMENT) | ON(CLI_HELP),
      AT(markdown), "print Markdown"},
     {"man", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_HELP), AT(man),
-     "print the manual page, for man(1)"},
-    {"completion", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_HELP), AT(completion),
-     "print the completion script for bash"},
+     "print the manual page of sdmgen or of COMMAND, for man(1)"},
+    {"completion", 0, CLI_CHOICE, NULL, "bash|zsh|fish", 0, 0, ON(CLI_HELP), AT(completion),
+     "print the completion script for this shell"},
 
     /* all commands */
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
@@ -450,6 +450,12 @@ const cli_option cli_options[] = {
      AT(seed), "seed of the random numbers (default 1; train, config: the configuration's)"},
     {"json", 0, CLI_FLAG, NULL, NULL, 0, 0, REPORTS, AT(json),
      "print the result as one line of JSON"},
+    {"progress", 0, CLI_CHOICE, NULL, "auto|plain|json|slicer", 0, 0,
+     ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_EVAL) | ON(CLI_VERIFY) |
+         ON(CLI_EXPERIMENT) | ON(CLI_FIT),
+     AT(progress),
+     "form of the progress: a bar on a terminal, plain lines elsewhere (auto, default); plain "
+     "lines; every line on stderr as JSON; or the elements on stdout that 3D Slicer reads"},
     {"quiet", 'q', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(quiet),
      "print no progress and no notices; warnings and errors remain"},
     {"help", 'h', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(help), "print this text"},

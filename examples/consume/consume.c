@@ -1,6 +1,6 @@
-/* Example of the C interface: opens a model, computes a signed distance map with default parameters,
- * and prints the value of the central voxel and the distance half a voxel from it. Usage: consume
- * MODEL */
+/* Example of the C interface: opens a model, computes a signed distance map with default
+ * parameters, and prints the value of the central voxel and the distance half a voxel from it.
+ * Usage: consume MODEL */
 #include <stdio.h>
 
 #include "sdm/field.h"

@@ -6,7 +6,11 @@ build=$3
 model=../files-of-train/run/model.sdm
 
 cmake --install "$build" --prefix "$PWD/prefix" >log 2>&1 || bad "install: $(tail -n 3 log)"
-present prefix/bin/sdmgen prefix/share/man/man1/sdmgen.1 prefix/share/bash-completion/completions/sdmgen
+present prefix/bin/sdmgen prefix/share/man/man1/sdmgen.1 prefix/share/bash-completion/completions/sdmgen \
+    prefix/share/zsh/site-functions/_sdmgen prefix/share/fish/vendor_completions.d/sdmgen.fish prefix/share/doc/sdmgen/sdmgen.spdx
+for command in $("$program" --help | sed -n '/^commands:/,/^$/s/^  \([a-z]*\) .*/\1/p'); do
+    present "prefix/share/man/man1/sdmgen-$command.1"
+done
 expect 0 - prefix/bin/sdmgen shapes
 expect 0 - prefix/bin/sdmgen info $model
 

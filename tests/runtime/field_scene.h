@@ -17,7 +17,10 @@ enum { SEED = 5 };
 
 static const double params[2] = {1.31, 0.4};
 
-static inline double ripple(const double x[3]) { return 1 + 0.4 * sin(3 * x[0]) * cos(2 * x[1] + x[2]); }
+static inline double ripple(const double x[3])
+{
+    return 1 + 0.4 * sin(3 * x[0]) * cos(2 * x[1] + x[2]);
+}
 
 /* A turned orthonormal matrix. */
 static inline void turn(double angle, double dir[9])
@@ -183,7 +186,8 @@ static inline int close_scene(void **state)
     return 0;
 }
 
-static inline sdm_field *open_field(const sdm_model *m, const sdm_generate_opts *opts, bool derivatives)
+static inline sdm_field *open_field(const sdm_model *m, const sdm_generate_opts *opts,
+                                    bool derivatives)
 {
     sdm_field *f;
     sdm_error err;
@@ -202,14 +206,17 @@ static inline void random_point(const sdm_grid *g, uint64_t i, double x[3])
     sdm_grid_world(g, index, x);
 }
 
-static inline bool same(const float *a, const float *b, size_t n) { return !memcmp(a, b, n * sizeof *a); }
+static inline bool same(const float *a, const float *b, size_t n)
+{
+    return !memcmp(a, b, n * sizeof *a);
+}
 
 // ---- grids in the box
 
 /* A grid inside the box of the model: its axes `order` of the model's grid, mirrored where the
    spacing is negative, voxel (0, 0, 0) at index `first`; turned by `angle` about it in addition. */
 static inline sdm_grid inner_grid(const sdm_grid *m, const int order[3], const double first[3],
-                           const double spacing[3], const int64_t n[3], double angle)
+                                  const double spacing[3], const int64_t n[3], double angle)
 {
     sdm_grid g = {.n = {n[0], n[1], n[2]}};
     double rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};

@@ -178,10 +178,8 @@ static void test_exact_outside(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_bound_outside),
-        cmocka_unit_test(test_bound_is_below_the_distance),
-        cmocka_unit_test(test_refused_outside),
-        cmocka_unit_test(test_band_with_bound),
+        cmocka_unit_test(test_bound_outside),   cmocka_unit_test(test_bound_is_below_the_distance),
+        cmocka_unit_test(test_refused_outside), cmocka_unit_test(test_band_with_bound),
         cmocka_unit_test(test_exact_outside),
     };
     return cmocka_run_group_tests(tests, open_scene, close_scene);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen shapes check, and what mesh, exact, config and train say about a shape with faults (tests/shape/faulty_shape.h): one line each.
-# Tests: report_survey.c report_audit.c shapes_check.c cmd_mesh.c
+# Tests: report_survey.c report_audit.c shapes_check.c cmd_mesh.c crash_guard.c callback.c
 . "$(dirname "$0")/common.sh"
 plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
 

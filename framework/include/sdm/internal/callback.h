@@ -1,8 +1,11 @@
 /* The callback of a shape that a thread is in: whoever ends the process there can name it. */
 #pragma once
 
-#include "sdm/internal/shared.h"
 #include "sdm/shape.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 typedef struct sdm_callback {
     const char *shape;       /* name of the shape */
@@ -14,4 +17,8 @@ typedef struct sdm_callback {
 
 /* The callback that the calling thread is in; NULL: none. Valid until the callback returns; may be
  * called in a signal handler. */
-SDM_INTERNAL_API const sdm_callback *sdm_callback_running(void);
+const sdm_callback *sdm_callback_running(void);
+
+#ifdef __cplusplus
+}
+#endif

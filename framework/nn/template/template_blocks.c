@@ -84,18 +84,11 @@ static void affine_centres(template_work *w, size_t c, size_t y, size_t z)
     const part_state *part = &w->part[c];
     const template_row *r = &w->row;
     const size_t n_parts = w->k->n_parts, n = w->blocks[0];
-    const double half = 0.5 * (BLOCK - 1),
-                 first[3] = {half, half + (double)(BLOCK * y), half + (double)(BLOCK * z)};
-    float by[3][3]; // change of the point (mm) by a voxel along each axis
-    for (int i = 0; i < 3; i++) {
-        double u = part->from[i];
-        for (int a = 0; a < 3; a++) {
-            u += part->by[a][i] * first[a];
-            by[a][i] = (float)(w->k->parts[c].near.spacing * part->by[a][i]);
-        }
-        for (size_t x = 0; x < n; x++)
-            r->u[i][x] = (float)(u + part->by[0][i] * (double)(BLOCK * x));
-    }
+    const double half = 0.5 * (BLOCK - 1);
+    float by[3][3];
+    sdm_template_row_points(
+        w, c, (const double[]){half, half + (double)(BLOCK * y), half + (double)(BLOCK * z)}, n,
+        by);
     sdm_template_lookup(w, c, n);
     if (!part->rigid) {
         float metric[6];

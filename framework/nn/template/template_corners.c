@@ -30,24 +30,17 @@ static void forget_outside(const template_work *w, size_t c, float *corner)
 
 static void rigid_row(const template_work *w, size_t c, size_t y, size_t z, float *corner)
 {
-    const part_state *part = &w->part[c];
     const template_row *r = &w->row;
     const size_t n = w->blocks[0] + 1;
-    float by[3][3]; // change of the point (mm) by a block along each axis
-    for (int i = 0; i < 3; i++) {
-        const double u = part->from[i] + part->by[1][i] * (double)(BLOCK * y) +
-                         part->by[2][i] * (double)(BLOCK * z);
-        for (size_t x = 0; x < n; x++)
-            r->u[i][x] = (float)(u + part->by[0][i] * (double)(BLOCK * x));
-        for (int a = 0; a < 3; a++)
-            by[a][i] = (float)(BLOCK * w->k->parts[c].near.spacing * part->by[a][i]);
-    }
+    float by[3][3];
+    sdm_template_row_points(w, c, (const double[]){0, (double)(BLOCK * y), (double)(BLOCK * z)}, n,
+                            by);
     sdm_template_lookup(w, c, n);
     for (size_t x = 0; x < n; x++) {
         corner[4 * x] = r->f[x];
         for (int a = 0; a < 3; a++)
             corner[4 * x + 1 + (size_t)a] =
-                by[a][0] * r->g[0][x] + by[a][1] * r->g[1][x] + by[a][2] * r->g[2][x];
+                BLOCK * (by[a][0] * r->g[0][x] + by[a][1] * r->g[1][x] + by[a][2] * r->g[2][x]);
     }
     const float first[3] = {r->u[0][0], r->u[1][0], r->u[2][0]},
                 last[3] = {r->u[0][n - 1], r->u[1][n - 1], r->u[2][n - 1]};

@@ -115,6 +115,21 @@ template_place sdm_template_place(const template_work *w, size_t c, const templa
 
 /* Parts. */
 
+void sdm_template_row_points(const template_work *w, size_t c, const double first[3], size_t n,
+                             float by[3][3])
+{
+    const part_state *part = &w->part[c];
+    for (int i = 0; i < 3; i++) {
+        double u = part->from[i];
+        for (int a = 0; a < 3; a++) {
+            u += part->by[a][i] * first[a];
+            by[a][i] = (float)(w->k->parts[c].near.spacing * part->by[a][i]);
+        }
+        for (size_t x = 0; x < n; x++)
+            w->row.u[i][x] = (float)(u + part->by[0][i] * (double)(BLOCK * x));
+    }
+}
+
 static void affine_points(const template_work *w, size_t c, const template_block *b)
 {
     const part_state *part = &w->part[c];

@@ -94,6 +94,12 @@ template_block sdm_template_block(const template_work *w, size_t number);
 void sdm_template_expand(const template_network *k, const template_block *b, warp_lines *l,
                          size_t n_c, float *const *c);
 
+/* row.u[n] = the indices of part c, which has no warp, at n points of the grid a block apart along
+   x, from the voxel index first[3]; by[a] = how the point of the template (mm) changes by a voxel
+   along axis a. */
+void sdm_template_row_points(const template_work *w, size_t c, const double first[3], size_t n,
+                             float by[3][3]);
+
 /* Distance and gradient of the template of part c at row.u[n], in row.f and row.g: from the lattice
    `near`, and from `far` for points outside of it. */
 void sdm_template_lookup(const template_work *w, size_t c, size_t n);

@@ -2,8 +2,8 @@
  * culling, grids of all kinds, the same bits for all instruction sets.
  * Tests: template_build.c template_carry.c template_forward.c template_kernels_avx2.c
  * template_kernels_avx512.c template_kernels_generic.c template_native.c template_pose.c
- * template_begin.c template_blocks.c template_corners.c template_run.c template_warp.c
- * template_work.c */
+ * template_begin.c template_blocks.c template_corners.c template_far.c template_run.c
+ * template_warp.c template_work.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -48,9 +48,11 @@ static void random_params(uint64_t i, double p[P])
     p[1] = 2 + 4 * sdm_rng_uniform(5, 1, i);
 }
 
-// Voxels at a distance of at least `from` differ from the reference by at most tolerance (1 + d).
+// Voxels at a distance of at least `from` differ from the reference by at most tolerance (1 + d);
+// three voxels away from the surface, where blocks are interpolated, by twice as much.
 static void check_map_from(toy *t, int first_mode, double from, double tolerance)
 {
+    const double *edge = t->info.grid.spacing, far = 3 * fmax(edge[0], fmax(edge[1], edge[2]));
     sdm_model *m = toy_open(t);
     const size_t n = sdm_grid_count(&t->info.grid);
     for (uint64_t i = 0; i < 3; i++) {
@@ -59,7 +61,8 @@ static void check_map_from(toy *t, int first_mode, double from, double tolerance
         float *map = toy_map(m, p, 1);
         for (size_t v = 0; v < n; v++) {
             const double truth = toy_reference(t, p, first_mode, v);
-            if (truth >= from && !(fabs((double)map[v] - truth) <= tolerance * (1 + fabs(truth))))
+            const double allowed = tolerance * (1 + fabs(truth)) * (fabs(truth) > far ? 2 : 1);
+            if (truth >= from && !(fabs((double)map[v] - truth) <= allowed))
                 fail_msg("voxel %zu: %g instead of %g", v, (double)map[v], truth);
         }
         sdm_free(map);
@@ -165,9 +168,12 @@ static void affine_warp_is_affine_frame(void **state)
         sdm_model *a = toy_open(&frame), *b = toy_open(&field);
         const double p[P] = {1.7, 4};
         float *x = toy_map(a, p, 1), *y = toy_map(b, p, 1);
-        for (size_t v = 0; v < sdm_grid_count(&grid); v++)
-            if (!(fabsf(x[v] - y[v]) < 2e-5f * (1 + fabsf(x[v]))))
+        for (size_t v = 0; v < sdm_grid_count(&grid); v++) {
+            // the warp is interpolated three voxels away from the surface
+            const float tolerance = fabsf(x[v]) < 3 * 0.5f ? 2e-5f : 2e-2f;
+            if (!(fabsf(x[v] - y[v]) < tolerance * (1 + fabsf(x[v]))))
                 fail_msg("voxel %zu: %g and %g", v, (double)x[v], (double)y[v]);
+        }
         sdm_free(x), sdm_free(y);
         sdm_model_free(a), sdm_model_free(b);
         toy_dispose(&frame), toy_dispose(&field);

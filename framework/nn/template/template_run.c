@@ -27,8 +27,8 @@ void sdm_template_expand(const template_network *k, const template_block *b, war
     const size_t nx = k->stations[0], n = nx * k->stations[1], plane = 12 * n, line = 12 * nx;
     if (l->plane_of != b->at[2]) {
         for (size_t z = 0; z < BLOCK; z++)
-            combine(&k->expansion, l->points + 4 * n * b->at[2],
-                    l->metric + 8 * n * (b->at[2] + 1), n, z, l->plane + z * plane);
+            combine(&k->expansion, l->points + 4 * n * b->at[2], l->metric + 8 * n * (b->at[2] + 1),
+                    n, z, l->plane + z * plane);
         l->plane_of = b->at[2];
         l->line_of = SIZE_MAX;
     }

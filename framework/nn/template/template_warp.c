@@ -266,5 +266,4 @@ void sdm_template_invert_slope(const template_network *k, const sdm_template_par
                 sdm_template_metric_slope(b, c2, metric + 8 * at);
                 metric[8 * at + 6] = metric[8 * at + 7] = 0;
             }
-    sdm_template_prefilter(k, points);
 }

@@ -32,6 +32,10 @@ typedef struct warp_lines {
     size_t plane_of, line_of;     /* the layer and the row of blocks to which they belong */
 } warp_lines;
 
+/* A sample of a part with a warp at a station: template f, its gradient g, factor s of the metric,
+   correction r. */
+enum { SAMPLE_F = 0, SAMPLE_G = 1, SAMPLE_S = 4, SAMPLE_R = 5, SAMPLE_SIZE = 8 };
+
 /* A part in the current map. */
 typedef struct part_state {
     bool warped;
@@ -59,13 +63,9 @@ typedef struct template_work {
        voxel of each block and of those that would follow the last ones, and its gradient by blocks;
        NAN where it is not known. Not of affine parts. */
     float *corner;
-    /* [n_parts][corners] on which sides of the lattice `near` a corner lies, a bit for each side;
-       parts with a warp only. */
-    uint8_t *side;
     /* [blocks][n_parts][4] the distance to each part at the centre of the block, and its gradient
        by voxels (not of parts with a warp); networks of several parts only. */
     float *centre;
-    float *sample;     /* [stations][8] template, gradient, factor, correction; parts with a warp */
     float *value;      /* [64] values of a block */
     size_t loaded;     /* the part of which `row` holds u, metric, f and g in the current block */
     float *offset[3];  /* [64] voxel indices of a block, relative to its first voxel */
@@ -119,9 +119,39 @@ void sdm_template_store(const template_work *w, const template_block *b, const f
 /* True if distances are carried along unchanged: part c only rotates and moves. */
 bool sdm_template_is_rigid(const template_network *k, size_t c);
 
-/* template_corners.c. The corners of the blocks for part c: corner (and side). Before the stations
-   of a warp become coefficients of B-splines. */
+/* template_corners.c. The corners of the blocks for part c. Before the stations of a warp become
+   coefficients of B-splines. */
 void sdm_template_corners(template_work *w, size_t c);
+
+/* template_far.c. Rigid parts are interpolated in the blocks that do not lie within the lattice
+   `near`; parts with a warp wherever the interpolated distance is at least SDM_TEMPLATE_FAR_VOXELS
+   + 1 voxels. From SDM_TEMPLATE_FAR_VOXELS on the share of the interpolation grows from 0 to 1, so
+   that maps are continuous in space and in the parameters. */
+#define SDM_TEMPLATE_FAR_VOXELS 3.0f
+typedef enum template_way { TEMPLATE_EXACT, TEMPLATE_BLENDED, TEMPLATE_INTERPOLATED } template_way;
+
+/* Index in w->corner / 4 of the first corner of a block for part c; of its corner i = 0 .. 7
+   relative to the first. */
+size_t sdm_template_corner_at(const template_work *w, size_t c, const template_block *b);
+size_t sdm_template_corner_step(const template_work *w, size_t i);
+
+/* value[64] = a function in a block, from its values and slopes at the corners of all blocks;
+   corner: the first corner of the block. */
+void sdm_template_interpolate(const template_work *w, const float *corner, float *value);
+
+/* How the distances to part c in a block are computed; unless exactly, value[64] = the interpolated
+   ones. */
+template_way sdm_template_far(const template_work *w, size_t c, const template_block *b,
+                              float *value);
+
+/* value[64] = the distances in a block that is blended, from the interpolated and the exact ones;
+   value may be `exact`. */
+void sdm_template_blend(const template_work *w, const float *far, const float *exact, float *value);
+
+/* slope[64] = a derivative of these distances, from those of the interpolated distances and of the
+   exact ones, which it holds before. */
+void sdm_template_blend_slope(const template_work *w, const float *far, const float *exact,
+                              const float *far_slope, float *slope);
 
 /* template_blocks.c. The centres of all blocks, and the bounds for the culling. */
 void sdm_template_centres(template_work *w);

@@ -85,13 +85,13 @@ static void affine_centres(template_work *w, size_t c, size_t y, size_t z)
 // The same for a part with a warp: the mean of the corners.
 static void warped_centres(template_work *w, size_t c)
 {
-    for (size_t i = 0; i < w->n_blocks; i++) {
-        const template_block b = sdm_template_block(w, i);
+    template_block b = sdm_template_first_block(w);
+    do {
         const float *corner = w->corner + 4 * sdm_template_corner_at(w, c, &b);
         float sum = 0;
         for (size_t k = 0; k < 8; k++) sum += corner[4 * sdm_template_corner_step(w, k)];
-        w->centre[4 * (i * w->k->n_parts + c)] = sum / 8;
-    }
+        w->centre[4 * (b.number * w->k->n_parts + c)] = sum / 8;
+    } while (sdm_template_next_block(w, &b));
 }
 
 void sdm_template_centres(template_work *w)

@@ -258,13 +258,13 @@ static void block_slopes(slopes_work *s, size_t c, const template_block *b, floa
 static void fill_slopes(slopes_work *s, float *values, float *const *out)
 {
     template_work *w = &s->w;
-    for (size_t i = 0; i < w->n_blocks; i++) {
-        const template_block b = sdm_template_block(w, i);
+    template_block b = sdm_template_first_block(w);
+    do {
         sdm_template_values(w, &b, s->value, s->nearest);
         sdm_template_store(w, &b, s->value, values);
         for (size_t c = 0; c < w->k->n_parts; c++)
             if (memchr(s->nearest, (int)c, VOXELS)) block_slopes(s, c, &b, out);
-    }
+    } while (sdm_template_next_block(w, &b));
 }
 
 // Bytes of scratch memory of the correction's Jacobian, or of its product with one direction.

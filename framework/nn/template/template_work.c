@@ -94,16 +94,32 @@ bool sdm_template_is_rigid(const template_network *k, size_t c)
     return true;
 }
 
-template_block sdm_template_block(const template_work *w, size_t number)
+// Places block *b at `at` along an axis.
+static void place(const template_work *w, int axis, size_t at, template_block *b)
 {
-    template_block b = {.number = number};
-    for (int a = 0; a < 3; a++) {
-        b.at[a] = number % w->blocks[a];
-        number /= w->blocks[a];
-        const size_t left = (size_t)w->grid->n[a] - BLOCK * b.at[a];
-        b.n[a] = left < BLOCK ? left : BLOCK;
-    }
+    const size_t left = (size_t)w->grid->n[axis] - BLOCK * at;
+    b->at[axis] = at;
+    b->n[axis] = left < BLOCK ? left : BLOCK;
+}
+
+template_block sdm_template_first_block(const template_work *w)
+{
+    template_block b = {.number = 0};
+    for (int a = 0; a < 3; a++) place(w, a, 0, &b);
     return b;
+}
+
+bool sdm_template_next_block(const template_work *w, template_block *b)
+{
+    b->number++;
+    for (int a = 0; a < 3; a++) {
+        if (b->at[a] + 1 < w->blocks[a]) {
+            place(w, a, b->at[a] + 1, b);
+            return true;
+        }
+        place(w, a, 0, b);
+    }
+    return false;
 }
 
 void sdm_template_store(const template_work *w, const template_block *b, const float *value,

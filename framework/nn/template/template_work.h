@@ -87,8 +87,10 @@ void sdm_template_take_lines(const template_network *k, void *memory, size_t *at
 size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_maps,
                           size_t correction_scratch, void *memory, template_work *w);
 
-/* The block of the given number. Blocks are to be evaluated in the order of their numbers. */
-template_block sdm_template_block(const template_work *w, size_t number);
+/* The first block, and the one after *b: false if *b was the last one. Blocks are evaluated in the
+   order of their numbers. */
+template_block sdm_template_first_block(const template_work *w);
+bool sdm_template_next_block(const template_work *w, template_block *b);
 
 /* c[n_c][64] = the stations' values in the voxels of a block: u and metric (n_c = 9), or u (3). */
 void sdm_template_expand(const template_network *k, const template_block *b, warp_lines *l,

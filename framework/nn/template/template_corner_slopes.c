@@ -49,7 +49,8 @@ static void corner_slope(const template_work *w, size_t c, const point_slope *at
                          const station_motion *m, const float *sample, size_t i,
                          const size_t stride[3], float corner[4])
 {
-    const float *all = w->warp[c].sample, *s = all + SAMPLE_SIZE * i, *ds = sample + SAMPLE_SIZE * i;
+    const float *all = w->warp[c].sample, *s = all + SAMPLE_SIZE * i,
+                *ds = sample + SAMPLE_SIZE * i;
     const float half = 0.5f, h = (float)w->k->parts[c].near.spacing;
     corner[0] = ds[SAMPLE_F] * s[SAMPLE_S] + s[SAMPLE_F] * ds[SAMPLE_S] + ds[SAMPLE_R];
     for (size_t a = 0; a < 3; a++) {
@@ -78,6 +79,6 @@ void sdm_template_corner_slopes(const template_work *w, size_t c, const point_sl
     for (size_t z = 0; z <= w->blocks[2]; z++)
         for (size_t y = 0; y <= w->blocks[1]; y++)
             for (size_t x = 0; x <= w->blocks[0]; x++, corner += 4)
-                corner_slope(w, c, at, m, sample,
-                             1 + x + stride[1] * (1 + y) + stride[2] * (1 + z), stride, corner);
+                corner_slope(w, c, at, m, sample, 1 + x + stride[1] * (1 + y) + stride[2] * (1 + z),
+                             stride, corner);
 }

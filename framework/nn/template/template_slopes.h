@@ -18,8 +18,9 @@ void sdm_template_point_slope(const template_work *w, size_t c, const float u[3]
 
 /* A direction in which the stations of a part with a warp move. */
 typedef struct station_motion {
-    const float *points, *metric; /* derivatives of the indices [stations][4], metric [stations][8] */
-    template_correction change;   /* derivative of the correction; map NULL: none */
+    const float *points,
+        *metric;                /* derivatives of the indices [stations][4], metric [stations][8] */
+    template_correction change; /* derivative of the correction; map NULL: none */
 } station_motion;
 
 /* template_corner_slopes.c. at[stations] = the slopes at the stations of part c, which has a warp,

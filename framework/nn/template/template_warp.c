@@ -235,62 +235,81 @@ void sdm_template_prefilter(const template_network *k, float *points)
     spline_prefilter(points, nz, plane, plane);
 }
 
-// y[3] = a start for the station (i, j, k), in index units: what its seven neighbours before it
-// give if the mixed third difference vanishes; at the beginning of lines, planes and the grid the
-// change along the frame.
-static void predict(const float *points, size_t at, const size_t stride[3], double y[3])
+// y[3] = a start for the station `at`, from the lines of stations before it along y and z: what
+// makes its second differences along y and z together vanish. It does not wait for the station
+// before it on the same line.
+static void predict(const warp_scratch *w, const sdm_lattice *near, size_t at, size_t line,
+                    size_t plane, double y[3])
 {
-    const float *p = points + 4 * at;
-    const size_t x = 4 * stride[0], j = 4 * stride[1], z = 4 * stride[2];
-    for (size_t c = 0; c < 3; c++, p++) {
-        const double first = (double)(*(p - x)) + (double)(*(p - j)) + (double)(*(p - z)),
-                     second =
-                         (double)(*(p - x - j)) + (double)(*(p - x - z)) + (double)(*(p - j - z));
-        y[c] = first - second + (double)(*(p - x - j - z));
+    const float *p = w->points + 4 * at;
+    for (size_t c = 0; c < 3; c++) {
+        double before[3]; // along z, combined along y
+        for (size_t k = 0; k < 3; k++) {
+            const float *from = p + c - 4 * k * plane;
+            before[k] = 2 * (double)*(from - 4 * line) - (double)*(from - 8 * line);
+            if (k > 0) before[k] -= (double)*from;
+        }
+        y[c] = (before[0] - 2 * before[1] + before[2]) * near->spacing + near->origin[c];
     }
+}
+
+// Stores a station.
+static void set_station(const part_pose *pose, const sdm_lattice *near, const warp_scratch *w,
+                        size_t at, const double y[3], const double inverse[9])
+{
+    const double per_index = 1 / near->spacing;
+    double b[9];
+    for (int c = 0; c < 3; c++)
+        w->points[4 * at + (size_t)c] = (float)((y[c] - near->origin[c]) * per_index);
+    w->points[4 * at + 3] = 0;
+    m3_product(inverse, pose->inverse, b);
+    sdm_template_metric(b, w->metric + 8 * at);
+    w->metric[8 * at + 6] = w->metric[8 * at + 7] = 0;
+    if (!w->station) return;
+    memcpy(w->station[at].y, y, 3 * sizeof *y);
+    memcpy(w->station[at].inverse, inverse, 9 * sizeof *inverse);
+}
+
+// q[3] = the point of the frame, without the warp, of a station.
+static void station_in_frame(const part_pose *pose, const sdm_grid *grid, size_t x, size_t y,
+                             size_t z, double q[3])
+{
+    double world[3];
+    station_world(grid, x, y, z, world);
+    for (int c = 0; c < 3; c++) world[c] -= pose->b[c];
+    m3_apply(pose->inverse, world, q);
 }
 
 void sdm_template_invert(const template_network *k, const sdm_template_part *part,
                          const part_pose *pose, const sdm_grid *grid, const warp_scratch *w)
 {
-    const size_t *n = k->stations, stride[3] = {1, n[0], n[0] * n[1]};
-    const double spacing = part->near.spacing, per_index = 1 / spacing;
+    const size_t *n = k->stations, line = n[0], plane = n[0] * n[1];
+    static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     size_t at = 0;
-    double y[3] = {0}, last[3] = {0}, inverse[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-    double row[3] = {0}, row_q[3] = {0};
+    double row[3] = {0}, row_q[3] = {0}; // the first station of the line before
     for (size_t z = 0; z < n[2]; z++)
         for (size_t j = 0; j < n[1]; j++) {
+            double first[3], second[3], y[3], inverse[9];
+            station_in_frame(pose, grid, 0, j, z, first);
+            station_in_frame(pose, grid, 1, j, z, second);
+            memcpy(inverse, unit, sizeof unit);
             for (size_t i = 0; i < n[0]; i++, at++) {
-                double x[3], q[3], b[9];
-                station_world(grid, i, j, z, x);
-                for (int c = 0; c < 3; c++) x[c] -= pose->b[c];
-                m3_apply(pose->inverse, x, q);
-                if (i && j && z) {
-                    predict(w->points, at, stride, y);
-                    for (int c = 0; c < 3; c++) y[c] = y[c] * spacing + part->near.origin[c];
+                double q[3], step[3], move[3];
+                for (int c = 0; c < 3; c++) {
+                    step[c] = second[c] - first[c];
+                    q[c] = first[c] + step[c] * (double)i;
+                }
+                if (j > 1 && z > 1) {
+                    predict(w, &part->near, at, line, plane, y);
+                } else if (i > 0) { // the station before it, moved to first order
+                    m3_apply(inverse, step, move);
+                    for (int c = 0; c < 3; c++) y[c] += move[c];
                 } else {
-                    // the station before it, moved to first order
-                    double move[3], dy[3];
-                    if (i == 0)
-                        memcpy(inverse, (double[9]){1, 0, 0, 0, 1, 0, 0, 0, 1}, sizeof inverse);
-                    for (int c = 0; c < 3; c++) move[c] = q[c] - (i ? last[c] : row_q[c]);
-                    m3_apply(inverse, move, dy);
-                    for (int c = 0; c < 3; c++) y[c] = at == 0 ? q[c] : (i ? y[c] : row[c]) + dy[c];
+                    for (int c = 0; c < 3; c++) y[c] = q[c] + (row[c] - row_q[c]);
                 }
                 newton(&part->warp, w->control, q, y, inverse);
-                memcpy(last, q, sizeof q);
                 if (i == 0) memcpy(row, y, sizeof y), memcpy(row_q, q, sizeof q);
-
-                for (int c = 0; c < 3; c++)
-                    w->points[4 * at + (size_t)c] =
-                        (float)((y[c] - part->near.origin[c]) * per_index);
-                w->points[4 * at + 3] = 0;
-                m3_product(inverse, pose->inverse, b);
-                sdm_template_metric(b, w->metric + 8 * at);
-                w->metric[8 * at + 6] = w->metric[8 * at + 7] = 0;
-                if (!w->station) continue;
-                memcpy(w->station[at].y, y, sizeof y);
-                memcpy(w->station[at].inverse, inverse, sizeof inverse);
+                set_station(pose, &part->near, w, at, y, inverse);
             }
         }
 }

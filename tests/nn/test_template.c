@@ -255,6 +255,68 @@ static void blocks_far_away_are_interpolated(void **state)
     }
 }
 
+// A capsule with a warp on a grid; the amplitudes depend on the parameters.
+static toy warped_capsule(const sdm_grid *grid, double radius)
+{
+    toy t = toy_new(grid);
+    const body o = {CAPSULE, {-1.4, 0.1, 0}, {1.5, -0.2, 0.3}, radius};
+    const sdm_lattice near = lattice(ORIGIN, 4, 0.1), far = lattice(ORIGIN, 12, 0.4),
+                      warp = lattice(ORIGIN, 20, 2);
+    toy_add(&t, &o, -1, SDM_FRAME_RIGID, &near, &far);
+    toy_warp(&t, 0, 0, MODES, &warp);
+    for (size_t m = 0; m < MODES; m++) t.numbers[6 + m] = (number){0.1, {0.1, -0.1}, {0}};
+    return t;
+}
+
+// A rod thinner than two voxels passes between the corners of blocks: within three voxels of its
+// surface no voxel is interpolated.
+static void thin_parts_are_not_interpolated(void **state)
+{
+    (void)state;
+    const sdm_grid grid = sdm_grid_centred((const int64_t[]){24, 22, 20}, 0.2, ORIGIN);
+    toy t = warped_capsule(&grid, 0.15);
+    sdm_model *m = toy_open(&t);
+    for (uint64_t i = 0; i < 4; i++) {
+        double p[P];
+        random_params(i, p);
+        float *map = toy_map(m, p, 1);
+        for (size_t v = 0; v < sdm_grid_count(&grid); v++) {
+            const double truth = toy_reference(&t, p, 0, v);
+            // the axis of the rod is an edge of the map
+            if (!(truth > -0.05 && truth < 2.5 * 0.2)) continue;
+            if (!(fabs((double)map[v] - truth) < 0.012))
+                fail_msg("voxel %zu: %g instead of %g", v, (double)map[v], truth);
+        }
+        sdm_free(map);
+    }
+    sdm_model_free(m);
+    toy_dispose(&t);
+}
+
+// While blocks become interpolated, values change in proportion to the parameters.
+static void interpolation_begins_without_a_jump(void **state)
+{
+    (void)state;
+    const sdm_grid grid = sdm_grid_centred((const int64_t[]){24, 22, 20}, 0.2, ORIGIN);
+    toy t = warped_capsule(&grid, 0.5);
+    for (size_t a = 0; a < 3; a++) t.numbers[3 + a] = (number){0, {0.6, 0}, {0}};
+    sdm_model *m = toy_open(&t);
+    const double step = 1e-3, first[P] = {0.1, 4};
+    float *before = toy_map(m, first, 1);
+    for (int i = 1; i <= 200; i++) {
+        float *after = toy_map(m, (const double[P]){first[0] + step * i, first[1]}, 1);
+        for (size_t v = 0; v < sdm_grid_count(&grid); v++)
+            if (!(fabs((double)(after[v] - before[v])) < 1.2 * step))
+                fail_msg("step %d, voxel %zu: %g after %g", i, v, (double)after[v],
+                         (double)before[v]);
+        sdm_free(before);
+        before = after;
+    }
+    sdm_free(before);
+    sdm_model_free(m);
+    toy_dispose(&t);
+}
+
 // Points are carried forward by the same frame and warp.
 static void carry_is_inverse_of_map(void **state)
 {
@@ -436,6 +498,8 @@ int main(void)
                                        cmocka_unit_test(warp_of_long_grid),
                                        cmocka_unit_test(warp_beside_rigid_parts),
                                        cmocka_unit_test(blocks_far_away_are_interpolated),
+                                       cmocka_unit_test(thin_parts_are_not_interpolated),
+                                       cmocka_unit_test(interpolation_begins_without_a_jump),
                                        cmocka_unit_test(carry_is_inverse_of_map),
                                        cmocka_unit_test(template_ends_at_far),
                                        cmocka_unit_test(culling_keeps_all_bits),

@@ -25,8 +25,8 @@ static void set_numbers(toy *t, size_t first, size_t n, double scale)
    turns; 3: the same beside two planes, which it carries. Templates without an error of
    interpolation have derivatives without jumps. */
 enum { TOYS = 4 };
-// The inverse of a warp stops at about the square of a fiftieth of the spacing of its lattice.
-static const double TOLERANCE[TOYS] = {1e-3, 1e-3, 4e-3, 4e-3};
+// The metric of a warp belongs to a point up to a two-hundredth of the spacing of its lattice away.
+static const double TOLERANCE[TOYS] = {1e-3, 1e-3, 2e-3, 2e-3};
 
 static toy make(int which, const sdm_grid *grid)
 {

@@ -25,14 +25,14 @@ static double cull_slack(const template_work *w) { return 0.1 * w->grid->spacing
 static void part_values(template_work *w, size_t c, const template_block *b, float *value)
 {
     float far[VOXELS];
-    const template_way way = sdm_template_far(w, c, b, far);
-    if (way == TEMPLATE_INTERPOLATED) {
+    const float share = sdm_template_far(w, c, b, far);
+    if (share == 1) {
         memcpy(value, far, sizeof far);
         return;
     }
     sdm_template_run(w, c, b);
-    if (way == TEMPLATE_BLENDED) {
-        sdm_template_blend(w, far, w->row.value, value);
+    if (share > 0) {
+        sdm_template_blend(share, far, w->row.value, value);
         if (value == w->row.value) w->loaded = SIZE_MAX;
     } else if (value != w->row.value) {
         memcpy(value, w->row.value, sizeof far);

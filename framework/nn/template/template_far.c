@@ -23,14 +23,6 @@ void sdm_template_interpolate(const template_work *w, const float *corner, float
     sdm_template_kernels()->block(corner, line, plane, value);
 }
 
-// Share of the interpolated distance in a voxel for which it is `value`; voxels: 1 / (edge of a
-// voxel, mm).
-static float share_of(float value, float voxels)
-{
-    const float share = fabsf(value) * voxels - SDM_TEMPLATE_FAR_VOXELS;
-    return share > 0 ? share < 1 ? share : 1 : 0;
-}
-
 // 1 / (longest edge of a voxel, mm)
 static float voxels_per_mm(const template_work *w)
 {
@@ -38,40 +30,43 @@ static float voxels_per_mm(const template_work *w)
     return (float)(1 / fmax(s[0], fmax(s[1], s[2])));
 }
 
-template_way sdm_template_far(const template_work *w, size_t c, const template_block *b,
-                              float *value)
+// The voxel of a block in which a distance is smallest.
+static size_t least_voxel(const float *value)
+{
+    size_t least = 0;
+    for (size_t v = 1; v < VOXELS; v++)
+        if (fabsf(value[v]) < fabsf(value[least])) least = v;
+    return least;
+}
+
+float sdm_template_far(const template_work *w, size_t c, const template_block *b, float *value)
 {
     const part_state *part = &w->part[c];
-    if (!part->warped && !(part->rigid && sdm_template_place(w, c, b) != TEMPLATE_WITHIN))
-        return TEMPLATE_EXACT;
+    if (!part->warped && !(part->rigid && sdm_template_place(w, c, b) != TEMPLATE_WITHIN)) return 0;
     sdm_template_interpolate(w, w->corner + 4 * sdm_template_corner_at(w, c, b), value);
-    if (isnan(value[0])) return TEMPLATE_EXACT; // every value is a sum with terms of all corners
-    if (part->rigid) return TEMPLATE_INTERPOLATED;
+    if (isnan(value[0])) return 0; // every value is a sum with terms of all corners
+    if (part->rigid) return 1;
     const float voxels = voxels_per_mm(w), from = SDM_TEMPLATE_FAR_VOXELS, to = from + 1;
-    int32_t begun = 0, full = 0; // of the type of the comparisons, so that the loop is vectorised
+    int32_t near = 0, far = 0; // of the type of the comparisons, so that the loop is vectorised
     for (size_t v = 0; v < VOXELS; v++) {
         const float distance = fabsf(value[v]) * voxels;
-        begun += distance > from;
-        full += distance >= to;
+        near += distance <= from;
+        far += distance >= to;
     }
-    return full == VOXELS ? TEMPLATE_INTERPOLATED : begun ? TEMPLATE_BLENDED : TEMPLATE_EXACT;
+    if (near) return 0;
+    return far == VOXELS ? 1 : fabsf(value[least_voxel(value)]) * voxels - from;
 }
 
-void sdm_template_blend(const template_work *w, const float *far, const float *exact, float *value)
+void sdm_template_blend(float share, const float *far, const float *exact, float *value)
 {
-    const float voxels = voxels_per_mm(w);
+    for (size_t v = 0; v < VOXELS; v++) value[v] = exact[v] + share * (far[v] - exact[v]);
+}
+
+void sdm_template_blend_slope(const template_work *w, float share, const float *far,
+                              const float *exact, const float *far_slope, float *slope)
+{
+    const size_t least = least_voxel(far);
+    const float share_slope = copysignf(voxels_per_mm(w), far[least]) * far_slope[least];
     for (size_t v = 0; v < VOXELS; v++)
-        value[v] = exact[v] + share_of(far[v], voxels) * (far[v] - exact[v]);
-}
-
-void sdm_template_blend_slope(const template_work *w, const float *far, const float *exact,
-                              const float *far_slope, float *slope)
-{
-    const float voxels = voxels_per_mm(w);
-    for (size_t v = 0; v < VOXELS; v++) {
-        const float share = share_of(far[v], voxels), change = far_slope[v] - slope[v];
-        slope[v] += share * change;
-        if (share > 0 && share < 1)
-            slope[v] += copysignf(voxels, far[v]) * far_slope[v] * (far[v] - exact[v]);
-    }
+        slope[v] += share * (far_slope[v] - slope[v]) + share_slope * (far[v] - exact[v]);
 }

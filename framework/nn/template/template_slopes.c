@@ -234,18 +234,18 @@ static void block_slopes(slopes_work *s, size_t c, const template_block *b, floa
 {
     template_work *w = &s->w;
     float far[VOXELS], change[VOXELS];
-    const template_way way = w->part[c].warped ? sdm_template_far(w, c, b, far) : TEMPLATE_EXACT;
-    if (way != TEMPLATE_INTERPOLATED) prepare_slopes(s, c, b);
+    const float share = w->part[c].warped ? sdm_template_far(w, c, b, far) : 0;
+    if (share < 1) prepare_slopes(s, c, b);
     const size_t nx = (size_t)w->grid->n[0], ny = (size_t)w->grid->n[1],
                  first = BLOCK * ((b->at[2] * ny + b->at[1]) * nx + b->at[0]);
     for (size_t d = 0; d < s->n; d++) {
-        if (way == TEMPLATE_INTERPOLATED)
+        if (share == 1)
             far_slope(s, c, d, b, s->value);
         else
             exact_slope(s, c, d, b);
-        if (way == TEMPLATE_BLENDED) {
+        if (share > 0 && share < 1) {
             far_slope(s, c, d, b, change);
-            sdm_template_blend_slope(w, far, w->row.value, change, s->value);
+            sdm_template_blend_slope(w, share, far, w->row.value, change, s->value);
         }
         for (size_t z = 0; z < b->n[2]; z++)
             for (size_t y = 0; y < b->n[1]; y++)

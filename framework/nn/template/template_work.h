@@ -126,11 +126,10 @@ bool sdm_template_is_rigid(const template_network *k, size_t c);
 void sdm_template_corners(template_work *w, size_t c);
 
 /* template_far.c. Rigid parts are interpolated in the blocks that do not lie within the lattice
-   `near`; parts with a warp wherever the interpolated distance is at least SDM_TEMPLATE_FAR_VOXELS
-   + 1 voxels. From SDM_TEMPLATE_FAR_VOXELS on the share of the interpolation grows from 0 to 1, so
-   that maps are continuous in space and in the parameters. */
+   `near`; parts with a warp in the blocks in which the smallest interpolated distance is at least
+   SDM_TEMPLATE_FAR_VOXELS + 1 voxels. From SDM_TEMPLATE_FAR_VOXELS on the share of the
+   interpolation grows from 0 to 1, so that maps do not jump as the parameters change. */
 #define SDM_TEMPLATE_FAR_VOXELS 3.0f
-typedef enum template_way { TEMPLATE_EXACT, TEMPLATE_BLENDED, TEMPLATE_INTERPOLATED } template_way;
 
 /* Index in w->corner / 4 of the first corner of a block for part c; of its corner i = 0 .. 7
    relative to the first. */
@@ -141,19 +140,18 @@ size_t sdm_template_corner_step(const template_work *w, size_t i);
    corner: the first corner of the block. */
 void sdm_template_interpolate(const template_work *w, const float *corner, float *value);
 
-/* How the distances to part c in a block are computed; unless exactly, value[64] = the interpolated
-   ones. */
-template_way sdm_template_far(const template_work *w, size_t c, const template_block *b,
-                              float *value);
+/* The share of the interpolated distances to part c in a block: 0 exact, 1 interpolated, between
+   them blended. Unless it is 0, value[64] = the interpolated distances. */
+float sdm_template_far(const template_work *w, size_t c, const template_block *b, float *value);
 
 /* value[64] = the distances in a block that is blended, from the interpolated and the exact ones;
    value may be `exact`. */
-void sdm_template_blend(const template_work *w, const float *far, const float *exact, float *value);
+void sdm_template_blend(float share, const float *far, const float *exact, float *value);
 
 /* slope[64] = a derivative of these distances, from those of the interpolated distances and of the
    exact ones, which it holds before. */
-void sdm_template_blend_slope(const template_work *w, const float *far, const float *exact,
-                              const float *far_slope, float *slope);
+void sdm_template_blend_slope(const template_work *w, float share, const float *far,
+                              const float *exact, const float *far_slope, float *slope);
 
 /* template_blocks.c. The centres of all blocks, and the bounds for the culling. */
 void sdm_template_centres(template_work *w);

@@ -1,6 +1,6 @@
 /* Derivatives of the distances at the corners of the blocks, for parts with a warp: the derivatives
    of the formulas in template_corners.c. */
-#include "template_slopes.h"
+#include "template_derivative.h"
 
 void sdm_template_station_slopes(const template_work *w, size_t c, point_slope *at)
 {

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "template_slopes.h"
+#include "template_derivative.h"
 
 typedef float quad __attribute__((vector_size(16)));
 

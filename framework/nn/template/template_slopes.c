@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "template_slopes.h"
+#include "template_derivative.h"
 
 enum { BLOCK = SDM_TEMPLATE_STEP, VOXELS = SDM_TEMPLATE_BLOCK_VOXELS };
 

@@ -19,10 +19,10 @@ static const double ENOUGH = 1.0 / 500;
 /* Training improves the score of `pod` over that of its trial by a factor of at most 7 in all
    families measured (docs/notes/network.md): where its trial is worse than the template by more
    than this, it is not trained. */
-static const double HOPELESS = 15;
+static const double HOPELESS = 10;
 
 /* Part of the budget for a template that is trained before `pod`. */
-static const double TEMPLATE_SHARE = 0.5;
+static const double TEMPLATE_SHARE = 1.0 / 3;
 
 /* A kind of network in the race. */
 typedef struct entrant {
@@ -130,7 +130,7 @@ static sdm_status try_kind(trainer *t, sdm_config *config, entrant *e, sdm_error
 /* Decides which kinds are trained; returns the reason. */
 static const char *decide(const entrant *carried, const entrant *pod, training_turns *out)
 {
-    *out = (training_turns){.n = 1, .kind = {SDM_NETWORK_TEMPLATE}, .share = 1};
+    *out = (training_turns){.n = 1, .kind = {SDM_NETWORK_TEMPLATE}, .chosen = true, .share = 1};
     if (!carried->finished) {
         out->kind[0] = SDM_NETWORK_POD;
         return "the only kind left";
@@ -144,8 +144,9 @@ static const char *decide(const entrant *carried, const entrant *pod, training_t
     }
     out->n = 2, out->kind[1] = SDM_NETWORK_POD;
     out->share = carried->ready ? 1 : TEMPLATE_SHARE;
-    return carried->ready ? "ready, then pod is trained, and the better one is kept"
-                          : "trained with half of the budget, then pod, and the better one is kept";
+    return carried->ready
+               ? "ready, then pod is trained, and the better one is kept"
+               : "trained with a third of the budget, then pod, and the better one is kept";
 }
 
 /* Hands the design and the maps of the entrant on to the training. */

@@ -1,4 +1,5 @@
-/* The training of one kind of network from beginning to end: maps, network, training, model file. */
+/* The training of one kind of network from beginning to end: maps, network, training, model file.
+ */
 #include "training.h"
 
 #include <math.h>
@@ -67,7 +68,9 @@ static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_er
     if (!s) s = trainer_samples_start(t, err);
     if (!s && resumed) s = trainer_samples_retake(t, n_taken, err);
     if (s == SDM_E_CANCELLED && is_second(t))
-        s = sdm_fail(err, s, "stopped on request before the training of pod began: %s holds the model of kind template",
+        s = sdm_fail(err, s,
+                     "stopped on request before the training of pod began: %s holds the model of "
+                     "kind template",
                      t->folder);
     else if (s == SDM_E_CANCELLED)
         s = sdm_fail(err, s, "stopped on request before the training began: %s is as it was",
@@ -77,8 +80,8 @@ static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_er
 
 /* Runs all steps from set-up to trained weights. config: the open temporary file of config.yaml. It
    is committed, and the files of an older run are removed, only after all checks of the
-   configuration: until then the folder stays as it was. The second training of a run leaves the files
-   of the first alone. */
+   configuration: until then the folder stays as it was. The second training of a run leaves the
+   files of the first alone. */
 static sdm_status train_run(trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
 {
     bool found = false;

@@ -320,6 +320,7 @@ sdm_status trainer_checkpoint_turns(const trainer *t, training_turns *out, bool 
         s = SDM_ALLOC(&config, 1, "configuration", err);
         if (!s) s = sdm_config_parse("checkpoint", text->data, text->size, NULL, 0, config, err);
         if (!s) *out = (training_turns){.n = 1, .kind = {config->network.kind}, .share = 1};
+        out->chosen = true;
     }
     sdm_free(config);
     sdm_free(o.bytes);

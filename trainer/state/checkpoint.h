@@ -16,7 +16,7 @@ sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err);
 sdm_status trainer_checkpoint_if_due(trainer *t, double now, sdm_error *err);
 
 /* *out = the kinds that the run trains whose checkpoint is in the folder of t, and where it was.
-   *found: false if there is no checkpoint. SDM_E_FORMAT: it is damaged. */
+ *found: false if there is no checkpoint. SDM_E_FORMAT: it is damaged. */
 sdm_status trainer_checkpoint_turns(const trainer *t, training_turns *out, bool *found,
                                     sdm_error *err);
 

@@ -53,6 +53,7 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     const double voxel = trainer_dataset_voxel(d);
     const float near_mm = (float)sdm_grid_near(d->grid);
     double square = 0, absolute = 0, near = 0, largest = 0, at_surface = 0, dice = 0, dice_min = 1;
+    double shallow = 0, deep = 0;
     size_t n_near = 0, n_at_surface = 0;
     // sum the errors over maps and voxels
     for (size_t i = 0; i < n && !s; i++) {
@@ -72,6 +73,8 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
             const double e = (double)values[v] - truth[v];
             here += e * e;
             absolute += fabs(e);
+            if (truth[v] < 0 && e > 0) shallow += e * e;
+            if (truth[v] < 0 && e < 0) deep += e * e;
             if (fabs(e) > largest) largest = fabs(e);
             if (fabsf(truth[v]) <= near_mm) near += e * e, n_near++;
             if (fabs((double)truth[v]) <= voxel) at_surface += e * e, n_at_surface++;
@@ -101,7 +104,9 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
         *more = (model_errors){.rmse_voxel_mm =
                                    n_at_surface ? sqrt(at_surface / (double)n_at_surface) : 0,
                                .dice = dice / (double)n,
-                               .dice_min = dice_min};
+                               .dice_min = dice_min,
+                               .shallow_mm2 = shallow / voxels,
+                               .deep_mm2 = deep / voxels};
     }
     trainer_workbench_dispose(&w);
     sdm_free(each);

@@ -23,10 +23,9 @@ void trainer_turn_config(const training_turns *r, const sdm_config *asked, sdm_c
 {
     *out = *asked;
     sdm_config_choose_kind(out, r->kind[r->at]);
-    const double all = budget_of(asked),
-                 mine = r->at   ? all - used_of(r, asked)
-                        : r->n > 1 ? all * r->share
-                                   : all;
+    const double all = budget_of(asked), mine = r->at      ? all - used_of(r, asked)
+                                                : r->n > 1 ? all * r->share
+                                                           : all;
     if (asked->train.minutes > 0)
         out->train.minutes = mine;
     else if (asked->train.steps > 0)

@@ -7,6 +7,7 @@
 typedef struct training_turns {
     int n, at;                /* number of kinds to train, 1 or 2; the one in training */
     sdm_network_kind kind[2]; /* in the order of training */
+    bool chosen;              /* by network.kind: auto */
     double share;             /* part of the budget that the first of two may use, 0 .. 1 */
     sdm_train_report first;   /* result of the first, while the second trains */
 } training_turns;
@@ -34,8 +35,8 @@ typedef struct turn_figures {
     const sdm_accuracy *accuracy;
 } turn_figures;
 
-/* Appends a line with phase "auto" to *metrics: `kind` is trained next, or kept; then: the kind to be
-   trained after it, NULL: none; e[n]: the errors of the kinds so far. Writes no file. */
+/* Appends a line with phase "auto" to *metrics: `kind` is trained next, or kept; then: the kind to
+   be trained after it, NULL: none; e[n]: the errors of the kinds so far. Writes no file. */
 sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
                                 const sdm_network_kind *then, const turn_figures *e, size_t n,
                                 sdm_error *err);

@@ -141,10 +141,10 @@ static void budget_is_shared(void **state)
     assert_int_equal(stored.train.steps, first ? 50 : 100);
 }
 
-/* A place at which a run is stopped: `after` calls of cancelled() after a message with these words.
- */
+/* A place at which a run is stopped: `after` calls of cancelled() after a message with the first
+   words and, if there are second ones, a later message with those. */
 typedef struct stop_place {
-    const char *words; /* NULL: from the beginning */
+    const char *first, *second;
     int after;
     bool model, checkpoint; /* the files that the folder has then */
 } stop_place;
@@ -152,7 +152,9 @@ typedef struct stop_place {
 static bool stop(void *user)
 {
     stop_place *p = user;
-    return (!p->words || strstr(said, p->words)) && --p->after < 0;
+    const char *at = strstr(said, p->first);
+    if (at && p->second) at = strstr(at, p->second);
+    return at && --p->after < 0;
 }
 
 // A run may be stopped in either training: it goes on where it was, and ends with the same bits.
@@ -160,12 +162,13 @@ static void resume_is_bit_exact(void **state)
 {
     (void)state;
     static const char *const few[] = {FEW_MAPS};
-    static const stop_place places[2][3] = {{{NULL, 30, false, false},
-                                             {"pod is trained with", 5, true, false},
-                                             {"a decoder of", 4, true, true}},
-                                            {{"trained with a third", 3, false, false},
-                                             {"a decoder of", 20, false, true},
-                                             {"pod is trained with", 110, true, true}}};
+    static const stop_place places[2][3] = {
+        {{"", NULL, 30, false, false},
+         {"pod is trained with", NULL, 5, true, false},
+         {"pod is trained with", "a decoder of", 4, true, true}},
+        {{"trained with a third", NULL, 3, false, false},
+         {"a decoder of", NULL, 20, false, true},
+         {"pod is trained with", "a decoder of", 70, true, true}}};
     for (int which = 0; which < 3; which++) {
         sdm_config c = config_of(which == 2 ? ring_text : link_text, few, which == 1 ? 4 : 0);
         c.threads = 1;

@@ -9,6 +9,7 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 #include "state/checkpoint.h"
+#include "state/export_model.h"
 #include "state/progress.h"
 #include "training.h"
 
@@ -48,6 +49,8 @@ static sdm_status settle(run *r, trainer *t, sdm_error *err)
     if (r->asked->network.kind != SDM_NETWORK_AUTO) return SDM_OK;
     bool found = false;
     const sdm_status s = r->resume ? trainer_checkpoint_turns(t, &r->turns, &found, err) : SDM_OK;
+    // the folder may have been moved
+    trainer_export_path(t, r->turns.first.model_path);
     return s || found ? s : trainer_race(t, r->settled, &r->turns, r->gain, err);
 }
 

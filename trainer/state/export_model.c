@@ -323,7 +323,7 @@ sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err)
     return s;
 }
 
-static void model_path(const trainer *t, char path[SDM_PATH_TEXT_MAX])
+void trainer_export_path(const trainer *t, char path[SDM_PATH_TEXT_MAX])
 {
     snprintf(path, SDM_PATH_TEXT_MAX, "%.*s/model.sdm", SDM_PATH_TEXT_MAX - 16, t->folder);
 }
@@ -334,7 +334,7 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
     sdm_model *model = NULL;
     model_errors more;
     *report = (sdm_train_report){0};
-    model_path(t, report->model_path);
+    trainer_export_path(t, report->model_path);
     sdm_status s = description_create(t, &d, err);
     if (!s) s = model_open(t, report->model_path, d, &model, err);
     if (!s) s = measure_model(t, model, t->data.n_holdout, &t->accuracy, &more, err);
@@ -363,7 +363,7 @@ sdm_status trainer_export_model(const trainer *t, sdm_error *err)
     uint8_t *bytes = NULL;
     size_t size = 0;
     char path[SDM_PATH_TEXT_MAX];
-    model_path(t, path);
+    trainer_export_path(t, path);
     sdm_status s = description_create(t, &d, err);
     if (!s) {
         d->info.accuracy = t->accuracy;

@@ -1,6 +1,8 @@
 /* sdmgen: parses the command line, runs one command and turns its status into an exit code. */
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -73,8 +75,20 @@ static void keep_memory(void)
 #endif
 }
 
+/* Opens /dev/null for each of stdin, stdout and stderr that is closed: otherwise the first file
+ * that is opened would get its number, and messages would go into that file. It is opened the other
+ * way round, so that a result that cannot be printed remains an error. */
+static void open_standard_files(void)
+{
+    for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++)
+        if (fcntl(fd, F_GETFD) < 0 &&
+            open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY) != fd)
+            _exit(CLI_EXIT_FAILED);
+}
+
 int main(int argc, char **argv)
 {
+    open_standard_files();
     keep_memory();
     if (argc == 2 && !strcmp(argv[1], "--version")) {
         puts("sdmgen " SDM_VERSION_TEXT);
@@ -86,6 +100,7 @@ int main(int argc, char **argv)
     cli_args args;
     sdm_error err = {0};
     const sdm_status s = cli_parse(argc, argv, &args, &err);
+    cli_set_form(args.progress);
     int code;
     if (s)
         code = cli_report(&err);

@@ -16,10 +16,10 @@ enum { HOLDOUT = 32, MAPS = 384, MAPS_MAX = 1024 };
 /* With an error of this part of a voxel no other kind is tried. */
 static const double ENOUGH = 1.0 / 500;
 
-/* Training improves the score of `pod` over that of its trial by a factor of at most 7 in all
+/* Training improves the score of `pod` over that of its trial by a factor of at most 11 in all
    families measured (docs/notes/network.md): where its trial is worse than the template by more
    than this, it is not trained. */
-static const double HOPELESS = 10;
+static const double HOPELESS = 15;
 
 /* Part of the budget for a template that is trained before `pod`. */
 static const double TEMPLATE_SHARE = 1.0 / 3;

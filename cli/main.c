@@ -12,6 +12,7 @@
 
 #include "args/help.h"
 #include "commands.h"
+#include "report/crash_guard.h"
 #include "report/terminal.h"
 
 /* The functions of the commands, by index into cli_commands. */
@@ -57,6 +58,7 @@ static int run_command(const cli_args *args)
     if (args->threads > 0) omp_set_num_threads((int)args->threads);
 #endif
     cli_catch_interrupts();
+    cli_guard_callbacks();
     sdm_error err = {0};
     const sdm_status s = functions[args->command - cli_commands](args, &err);
     if (!s) return CLI_EXIT_DONE;

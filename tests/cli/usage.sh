@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The command line itself: help, unknown words, bad values, texts generated from the table of options.
-# Tests: cmd_help.c command_line.c help.c main.c option_table.c terminal.c
+# Tests: cmd_help.c command_line.c help.c help_completion.c help_man.c main.c option_table.c terminal.c
 . "$(dirname "$0")/common.sh"
 
 expect 0 - sdmgen --version

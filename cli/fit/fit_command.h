@@ -36,6 +36,7 @@ typedef struct cli_fit {
     sdm_volume image;
     float *mask;    /* [nz][ny][nx] labels, 1 inside, 0 outside; NULL: the target is no label map */
     double *points; /* [n_points][3] mm; NULL: the target is a volume */
+    bool of_surface; /* the points were spread over the surface of a mesh */
     sdm_fit_target target;
 
     sdm_fit_opts opts;

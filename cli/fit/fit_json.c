@@ -75,6 +75,7 @@ static void add_target(sdm_json *j, const cli_fit *f)
     sdm_json_real(j, "model_error_mm", r->model_error_mm);
     sdm_json_real(j, "log_likelihood", r->log_likelihood);
     if (f->target.kind == SDM_FIT_POINTS) sdm_json_real(j, "point_sd_mm", r->point_sd);
+    if (f->target.kind == SDM_FIT_POINTS) sdm_json_real(j, "outliers", r->outliers);
     if (f->target.kind != SDM_FIT_IMAGE) return;
     sdm_json_text(j, "image_model", f->args->fit.image_model);
     sdm_json_real(j, "evidence", r->evidence);

@@ -84,13 +84,21 @@ static void print_coarse(const cli_fit *f)
            voxel, beside, f->source.model ? "--exact " : "", fine);
 }
 
+/* Least share of outliers that is printed. */
+#define OUTLIERS_SHOWN 0.005
+
 /* Prints the number of voxels or points used, the values of the tissues and the evidence. */
 static void print_target(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
     if (f->target.kind == SDM_FIT_POINTS) {
-        printf("points: %zu, standard deviation %.3g mm about the surface\n", r->n_used,
-               r->point_sd);
+        printf(
+            "points: %zu%s, as good as %.3g independent ones, standard deviation %.3g mm about the "
+            "surface",
+            r->n_used, f->of_surface ? " on the surface of the mesh" : "",
+            (double)r->n_used / fmax(r->noise_factor, 1), r->point_sd);
+        if (r->outliers >= OUTLIERS_SHOWN) printf(", %.0f %% outliers", 100 * r->outliers);
+        printf("\n");
         print_coarse(f);
         return;
     }

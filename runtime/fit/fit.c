@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "fit/data/blur.h"
@@ -40,6 +41,8 @@
 // number of flat steps (of negligible predicted gain) in a row that ends the iterations with a
 // network's maps
 #define FLAT_MAX 6
+// share of outliers among points at the start
+#define OUTLIERS_FIRST 0.1
 // a parameter is determined by its prior alone if its sd exceeds this share of the prior's sd
 #define BY_PRIOR 0.9
 // Largest number of times that the priors are reweighted. Without a limit a prior that contradicts
@@ -176,6 +179,7 @@ static sdm_status problem_start(fit_problem *p, sdm_fit_result *out, sdm_error *
     p->state.blur = fmax(o->blur, p->maps.min_blur);
     p->state.l_ref = o->l_ref;
     p->state.point_sd = o->point_sd;
+    p->state.outliers = o->keep_appearance ? 0 : OUTLIERS_FIRST;
     p->prior = p->state;
     s = sdm_fit_blur_check(&p->maps.grid, share ? "blur" : "l_ref", share ? o->blur : o->l_ref,
                            sdm_fit_field_blur(p), err);
@@ -188,6 +192,7 @@ static sdm_status problem_start(fit_problem *p, sdm_fit_result *out, sdm_error *
     if (!s) s = sdm_fit_extent(&p->maps, &p->extent, err);
     memcpy(p->maps_params, p->state.params, sizeof p->maps_params);
     p->maps_blur = NAN;
+    p->state.outlier_density = 0.5 / fmax(p->extent.reach, o->point_sd);
     return s;
 }
 
@@ -298,10 +303,34 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
     return maximise_settled(p, newton, end, err);
 }
 
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Points, after the search: an sd that holds half of the points. It shrinks while the shape comes
+ * nearer; with a small sd from the beginning, all points of a shape that is a little off would pass
+ * for outliers. */
+static sdm_status points_start(fit_problem *p, sdm_error *err)
+{
+    if (p->target->kind != SDM_FIT_POINTS || p->opts->keep_appearance) return SDM_OK;
+    double *distance = NULL;
+    sdm_status s = sdm_fit_evaluate(p, err);
+    if (!s) s = SDM_ALLOC(&distance, p->samples.n, "points of the fit", err);
+    if (s) return s;
+    for (size_t i = 0; i < p->samples.n; i++) distance[i] = fabs(p->samples.field[i]);
+    qsort(distance, p->samples.n, sizeof *distance, ascending);
+    p->state.point_sd = fmax(p->state.point_sd, distance[p->samples.n / 2]);
+    sdm_free(distance);
+    return SDM_OK;
+}
+
 static sdm_status start_find(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const double from = sdm_clock();
-    const sdm_status s = sdm_fit_start_search(p, &out->turn, err);
+    sdm_status s = sdm_fit_start_search(p, &out->turn, err);
+    if (!s) s = points_start(p, err);
     out->seconds_search = sdm_clock() - from;
     return s;
 }
@@ -359,6 +388,7 @@ static void report(fit_problem *p, sdm_fit_result *out)
     out->blur = p->maps.share ? s->blur : 0;
     out->appearance = s->appearance;
     out->point_sd = p->target->kind == SDM_FIT_POINTS ? s->point_sd : 0;
+    out->outliers = p->target->kind == SDM_FIT_POINTS ? s->outliers : 0;
     out->n_network = p->maps.n_network;
     out->n_exact = p->maps.n_exact;
     out->seconds_network = p->maps.seconds_network;

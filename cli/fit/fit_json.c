@@ -41,6 +41,7 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
                   "vector (axis times angle); sd of the rotation: of a small turn after it about "
                   "the axes of the world");
     sdm_json_close(j, '}');
+    sdm_json_text(j, "not_determined_motions", r->open_motions);
     // correlation and covariance
     sdm_json_open(j, "unknowns", '[');
     for (size_t i = 0; i < f->n_params; i++) sdm_json_text(j, NULL, f->params[i].name);

@@ -13,6 +13,7 @@
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
+#include "fit/solver/open_motions.h"
 #include "fit/solver/prior.h"
 #include "fit/solver/tissue_field.h"
 #include "fit/solver/tissues.h"
@@ -254,6 +255,7 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
                             "the shape has left the image: no voxel near it is left");
         if (!s && changed) s = sdm_fit_evaluate(p, err); // evaluate the new samples
         if (!s && changed) s = sdm_fit_tissue_field_update(p, err);
+        if (!s) sdm_fit_open_motions_find(p);
         if (!s && round < weighings) s = priors_reweight(p, &change, err);
         // flat steps cannot resolve small changes of region and weights
         const bool last = end->flat ? change < WEIGHT_ROUGH : !changed && !(change > 0);
@@ -389,6 +391,7 @@ static void report(fit_problem *p, sdm_fit_result *out)
     out->appearance = s->appearance;
     out->point_sd = p->target->kind == SDM_FIT_POINTS ? s->point_sd : 0;
     out->outliers = p->target->kind == SDM_FIT_POINTS ? s->outliers : 0;
+    sdm_fit_open_motions_describe(p, out->open_motions, sizeof out->open_motions);
     out->n_network = p->maps.n_network;
     out->n_exact = p->maps.n_exact;
     out->seconds_network = p->maps.seconds_network;

@@ -9,6 +9,7 @@
 #include "anderson.h"
 #include "averaged_gradient.h"
 #include "objective.h"
+#include "open_motions.h"
 #include "prior.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
@@ -108,6 +109,7 @@ static bool step_find(const fit_problem *p, const fit_newton_opts *opts, double 
     memcpy(a, observed ? p->information.observed : p->information.complete, n * n * sizeof *a);
     (void)sdm_fit_prior(p, &p->state, gradient, a, NULL);
     sdm_fit_add_weak_prior(p, a);
+    sdm_fit_open_motions_stop(p, a);
     fit_limits limits;
     limits_set(p, opts, &limits);
     if (!sdm_fit_bounded_step(n, a, gradient, damping, &limits, step, work + n * n)) return false;

@@ -42,6 +42,12 @@ typedef struct fit_problem {
     /* where the start shape lies on its map */
     fit_extent extent;
 
+    /* rigid motions that the data do not determine: rotation vector (rad), then translation at the
+     * origin of the shape (mm); and the largest eigenvalue of the information of the pose, with
+     * translations in units of the reach, see open_motions.h */
+    size_t n_motions;
+    double motion[6][6], pose_information;
+
     /* maps of the shape and their derivatives */
     fit_maps maps;
     /* parameters [n_params] and blur (mm) of `maps`; maps_params[0] = NaN: `maps` is out of date */

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "fit/solver/open_motions.h"
 #include "fit/solver/prior.h"
 #include "fit/solver/solve.h"
 #include "score_covariance.h"
@@ -55,6 +56,7 @@ static bool influence_compute(const fit_problem *p, bool with_priors, double *in
                n * n * sizeof *information);
         if (with_priors) (void)sdm_fit_prior(p, &p->state, NULL, information, NULL);
         sdm_fit_add_weak_prior(p, information);
+        sdm_fit_open_motions_stop(p, information);
         submatrix(n, information, m, list, small);
         if (!sdm_fit_cholesky(m, small, factor, scale)) continue;
         for (size_t j = 0; j < m; j++) {
@@ -149,6 +151,7 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
             const double c = sandwich(n, influence, spread, i, j);
             out->covariance[i * size + j] = out->covariance[j * size + i] = c;
         }
+    sdm_fit_open_motions_spread(p, out->covariance);
     for (size_t i = 0; i < size; i++) {
         const double variance = out->covariance[i * (size + 1)];
         // NaN, since 0 would mean that the unknown is known exactly

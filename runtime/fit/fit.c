@@ -39,6 +39,11 @@
 // the iterations
 #define WEIGHT_EPS 1e-3
 #define WEIGHT_ROUGH 0.05
+// plain steps up to this size are followed by steps with the averaged gradient, in units of
+// sdm_fit_opts.eps
+#define STEP_NEAR 1e-2
+// an unknown has converged when it moves by no more than this share of its sd
+#define UNREST_MAX 0.1
 // number of flat steps (of negligible predicted gain) in a row that ends the iterations with a
 // network's maps
 #define FLAT_MAX 6
@@ -296,7 +301,9 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
     newton->eps = average ? o->eps : eps;
     newton->max_flat = !average ? 0 : exact ? 1 : FLAT_MAX;
     sdm_status s = maximise_settled(p, newton, end, err);
-    if (s || !end->converged || !average || !(exact || end->flat)) return s;
+    // where kinks keep plain steps from converging, averaged ones may
+    const bool near = end->converged || end->step <= STEP_NEAR;
+    if (s || !near || !average || !(exact || end->flat)) return s;
     // averaged gradient
     newton->averaged = true;
     newton->max_iterations = max_iterations;
@@ -407,6 +414,57 @@ static double main_mean(const sdm_fit_law *law, size_t n)
     return law[most].mean;
 }
 
+// the unknown that moves most in the last iterations, in its standard deviations (*most)
+static size_t most_restless(const fit_problem *p, const sdm_fit_result *r, double *most)
+{
+    size_t worst = 0;
+    *most = 0;
+    for (size_t i = 0; i < p->n_params + 6; i++) {
+        const bool kept = i < p->n_params ? p->opts->keep_params : p->opts->keep_pose;
+        if (kept) continue;
+        const double unrest = sdm_fit_unrest(p, i) / r->sd[i];
+        if (!(unrest <= *most)) *most = unrest, worst = i;
+    }
+    return worst;
+}
+
+/* A fit whose last steps are small beside the standard deviations counts as converged, though they
+ * are larger than eps: kinks of exact distances may keep them so. */
+static void accept_small_steps(const fit_problem *p, sdm_fit_result *out)
+{
+    double most;
+    if (out->converged) return;
+    (void)most_restless(p, out, &most);
+    if (!(most <= UNREST_MAX)) return;
+    out->converged = true;
+    snprintf(out->reason, sizeof out->reason,
+             "the last steps move every unknown by at most %.2g of its standard deviation", most);
+}
+
+static sdm_status not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
+{
+    static const char *const pose[6] = {"rotation about x",   "rotation about y",
+                                        "rotation about z",   "translation along x",
+                                        "translation along y", "translation along z"};
+    double most, low, high;
+    const char *name;
+    const size_t worst = most_restless(p, r, &most);
+    if (worst < p->n_params)
+        sdm_fit_bounds(p->source, worst, &low, &high, &name);
+    else
+        name = pose[worst - p->n_params];
+    char moves[200] = "";
+    if (isfinite(most))
+        snprintf(moves, sizeof moves,
+                 "; %.100s still moves by %.2g of its standard deviation, need %.2g", name, most,
+                 UNREST_MAX);
+    return sdm_fail(err, SDM_E_QUALITY,
+                    "not converged after %zu iterations (%s%s): allow more iterations "
+                    "(max_iterations), give a nearer start, or a prior of what the data hardly "
+                    "determine",
+                    r->n_iterations, r->reason, moves);
+}
+
 // returns SDM_E_QUALITY with the first reason to distrust the fit; the most basic reasons come
 // first
 static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
@@ -444,11 +502,7 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
         return sdm_fail(err, SDM_E_QUALITY,
                         "only %.0f %% of the shape lies in the image, need %.0f %% (least_inside)",
                         100 * r->inside_share, 100 * o->least_inside);
-    if (!r->converged)
-        return sdm_fail(
-            err, SDM_E_QUALITY,
-            "not converged after %zu iterations (%s); allow more of them, or give a nearer start",
-            r->n_iterations, r->reason);
+    if (!r->converged) return not_converged(p, r, err);
     return SDM_OK;
 }
 
@@ -538,6 +592,7 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     // 6. covariance and evidence; 7. report the result, also of a fit that failed with
     // SDM_E_QUALITY
     if (!s) s = assess(&p, out, err);
+    if (!s) accept_small_steps(&p, out);
     if (out->n_params && (!s || s == SDM_E_QUALITY)) report(&p, out);
     if (!s) s = judge(&p, out, err);
     if (s && err && !*out->reason) snprintf(out->reason, sizeof out->reason, "%.255s", err->text);

@@ -42,6 +42,10 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
                   "the axes of the world");
     sdm_json_close(j, '}');
     sdm_json_text(j, "not_determined_motions", r->open_motions);
+    if (f->opts.keep_pose) {
+        sdm_json_real(j, "kept_pose_motion_mm", r->kept_pose_motion);
+        sdm_json_real(j, "kept_pose_gain", r->kept_pose_gain);
+    }
     // correlation and covariance
     sdm_json_open(j, "unknowns", '[');
     for (size_t i = 0; i < f->n_params; i++) sdm_json_text(j, NULL, f->params[i].name);

@@ -19,6 +19,7 @@
 #include "fit/solver/tissues.h"
 #include "fit/start/start_search.h"
 #include "fit/trust/evidence.h"
+#include "fit/trust/kept_pose.h"
 #include "fit/trust/posterior.h"
 #include "fit_check.h"
 #include "sdm/internal/clock.h"
@@ -44,6 +45,10 @@
 #define STEP_NEAR 1e-2
 // an unknown has converged when it moves by no more than this share of its sd
 #define UNREST_MAX 0.1
+// a kept pose is refused if a free one gains more than this (the true one exceeds it once in a
+// million times), and moves the surface by more than this part of a voxel of the map
+#define KEPT_POSE_GAIN 20.0
+#define KEPT_POSE_VOXELS 0.5
 // number of flat steps (of negligible predicted gain) in a row that ends the iterations with a
 // network's maps
 #define FLAT_MAX 6
@@ -55,6 +60,11 @@
 // the image could reinforce itself: a worse fit has more correlated residuals, which strengthen the
 // prior.
 #define WEIGHINGS_MAX 4
+
+static double longest_edge(const sdm_grid *g)
+{
+    return fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
+}
 
 sdm_fit_opts sdm_fit_defaults(void)
 {
@@ -503,6 +513,13 @@ static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error
                         "only %.0f %% of the shape lies in the image, need %.0f %% (least_inside)",
                         100 * r->inside_share, 100 * o->least_inside);
     if (!r->converged) return not_converged(p, r, err);
+    const double voxel = longest_edge(&p->maps.grid);
+    if (r->kept_pose_gain > KEPT_POSE_GAIN && r->kept_pose_motion > KEPT_POSE_VOXELS * voxel)
+        return sdm_fail(err, SDM_E_QUALITY,
+                        "the kept pose does not match the data: free, it moves the surface by %.2g "
+                        "mm and explains the data better by %.3g (log-likelihood of independent "
+                        "samples); correct the pose, or do not keep it",
+                        r->kept_pose_motion, r->kept_pose_gain);
     return SDM_OK;
 }
 
@@ -524,12 +541,9 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         out->evidence = (p->information.log_likelihood - out->log_likelihood_without) / factor -
                         0.5 * unknowns * log(n);
     }
+    if (!s && p->opts->keep_pose)
+        s = sdm_fit_kept_pose_test(p, &out->kept_pose_gain, &out->kept_pose_motion, err);
     return s;
-}
-
-static double longest_edge(const sdm_grid *g)
-{
-    return fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
 }
 
 /* Presents a label map as an image with the value 1 inside and 0 outside, with fixed tissues, seen

@@ -85,8 +85,7 @@ static double slope_squared(const fit_problem *p, size_t sample)
     return sum;
 }
 
-// rms motion of the surface (mm) along its normal between the evaluated state and another pose
-static double motion_to(const fit_problem *p, const fit_state *to)
+double sdm_fit_surface_motion(const fit_problem *p, const fit_state *to)
 {
     const fit_field f = sdm_fit_maps_field(&p->maps);
     double square = 0, slope = 0;
@@ -94,22 +93,6 @@ static double motion_to(const fit_problem *p, const fit_state *to)
         if (p->samples.row[i] == SIZE_MAX) continue;
         const double change =
             sdm_fit_field_at(&f, to, p->samples.world + 3 * i) - p->samples.field[i];
-        square += change * change;
-        slope += slope_squared(p, i);
-    }
-    return slope > 0 ? sqrt(square / slope) : 0;
-}
-
-double sdm_fit_surface_motion(const fit_problem *p, const double step[6])
-{
-    const fit_samples *s = &p->samples;
-    double square = 0, slope = 0;
-    for (size_t i = 0; i < s->n; i++) {
-        if (s->row[i] == SIZE_MAX) continue;
-        const float *column =
-            s->jacobian + s->row[i] * s->n_columns + fit_at_rotation(p->n_params);
-        double change = 0;
-        for (size_t k = 0; k < 6; k++) change += (double)column[k] * step[k];
         square += change * change;
         slope += slope_squared(p, i);
     }
@@ -124,7 +107,7 @@ static bool is_open(const fit_problem *p, const double m[6])
         for (int sign = -1; sign <= 1; sign += 2) {
             fit_state to;
             move_along(&p->state, m, sign * ANGLES[a], &to);
-            if (!(motion_to(p, &to) < MOTION_MIN * voxel)) return false;
+            if (!(sdm_fit_surface_motion(p, &to) < MOTION_MIN * voxel)) return false;
         }
     return true;
 }

@@ -23,9 +23,9 @@ void sdm_fit_open_motions_spread(const fit_problem *p, double *c);
    text: there are none. */
 void sdm_fit_open_motions_describe(const fit_problem *p, char *text, size_t size);
 
-/* rms motion (mm) of the surface at the samples, along its normal, by this step of the pose
- * (rotation, rad, then translation, mm), to first order. */
-double sdm_fit_surface_motion(const fit_problem *p, const double step[6]);
+/* rms motion (mm) of the surface at the samples, along its normal, from the evaluated state to the
+ * pose of another. */
+double sdm_fit_surface_motion(const fit_problem *p, const fit_state *to);
 
 /* Eigenvalues, in increasing order, and orthonormal eigenvectors (rows of vector[n][n]) of the
    symmetric matrix a[n][n], n <= 6, which is changed (Jacobi 1846). */

@@ -331,6 +331,10 @@ typedef struct sdm_fit_result {
        leaves the pose where the search has it along these, and the covariance holds an angle that
        may be any. With a prior of the rotation (translation) the prior decides */
     char open_motions[512];
+    /* keep_pose: what a fit from here with a free pose does: rms motion of the surface along its
+       normal, mm, and gain in log posterior density, as of independent samples (about 3 for the
+       true pose). 0 where the pose is estimated */
+    double kept_pose_motion, kept_pose_gain;
 } sdm_fit_result;
 
 /* Fits the shape of source to target. Errors: SDM_E_ARG: source, options or start, or no voxel near

@@ -134,6 +134,7 @@ void cli_fit_json(const cli_fit *f, sdm_json *j)
     sdm_json_text(j, "shape", f->shape_name);
     if (f->model_path) sdm_json_text(j, "model", f->model_path);
     sdm_json_text(j, "image", f->path);
+    cli_fit_json_repeat(f, j);
     sdm_json_text(j, "kind", cli_fit_kind(f));
     sdm_json_bool(j, "trusted", !f->doubt.status);
     if (f->doubt.status) sdm_json_text(j, "doubt", f->doubt.text);

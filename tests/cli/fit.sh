@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: a phantom is recovered, every kind of target and output, fits that must fail, mistakes.
-# Tests: cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_options.c fit_picture.c fit_report.c fit_result.c
+# Tests: cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_options.c fit_picture.c fit_repeat.c fit_report.c fit_result.c
 # fit_start.c fit_target.c progress_bar.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
@@ -42,6 +42,13 @@ is_json out
 is_json fit.json
 cmp -s out fit.json || bad 'stdout and -o fit.json must agree'
 [ "$(json trusted)" = true ] && [ "$(json converged)" = true ] || bad "not trusted: $(cat out)"
+# the command of the JSON repeats the fit; the checksum is that of the file
+mkdir again && (cd again && ln -s ../ct.nii.gz ../label.nrrd . && sed -n 's/.*"command": "sdmgen \([^"]*\)", "inputs".*/\1/p' ../out >command)
+expect 0 - eval "(cd again && \"$program\" $(cat again/command) >out 2>err)"
+[ "$(sed -n 's/.*\("parameters": {[^}]*}\).*/\1/p' again/out)" = "$(sed -n 's/.*\("parameters": {[^}]*}\).*/\1/p' first.json)" ] ||
+    bad "the command does not repeat the fit: $(cat again/command again/err)"
+cp first.json out
+has '"file": "ct.nii.gz", "crc64": "[0-9a-f]{16}"'
 within rx 3.5 4
 within ry 2.5 4
 within rz 2 4

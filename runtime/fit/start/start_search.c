@@ -86,7 +86,14 @@ static sdm_status samples_near_choose(fit_problem *p, double wanted, sdm_error *
         while (box / pow((double)p->stride, 3) > 2 * wanted) p->stride++;
     }
     bool changed;
-    return sdm_fit_samples_choose(p->target, o, &region, p->stride, &p->samples, &changed, err);
+    sdm_status s =
+        sdm_fit_samples_choose(p->target, o, &region, p->stride, &p->samples, &changed, err);
+    // NaN in every second slice, for example, may meet the stride
+    while (!s && p->samples.n < p->samples.n_nan && p->stride > 1) {
+        p->stride--;
+        s = sdm_fit_samples_choose(p->target, o, &region, p->stride, &p->samples, &changed, err);
+    }
+    return s;
 }
 
 // error: no sample near the start

@@ -50,12 +50,26 @@ static sdm_status use_labels(cli_fit *f, sdm_error *err)
     return s;
 }
 
+/* A notice where the two frames of a file contradict each other. */
+static void notice_frames(const cli_fit *f)
+{
+    const sdm_volume *v = &f->image;
+    if (v->frames_mirrored)
+        cli_notice("%s: sform and qform are mirror images of each other: one of them shows the "
+                   "wrong side; sform is used",
+                   f->path);
+    else if (v->frames_differ_mm > 0)
+        cli_notice("%s: sform and qform place voxels up to %.3g mm apart; sform is used", f->path,
+                   v->frames_differ_mm);
+}
+
 static sdm_status read_volume(cli_fit *f, sdm_error *err)
 {
     sdm_status s = sdm_volume_read(f->path, &f->image, err);
     if (s) return s;
     if (!f->image.placed)
         cli_notice("%s states no frame: the default axes of its format are assumed", f->path);
+    notice_frames(f);
     f->target.grid = f->image.grid;
     return f->args->fit.labels.n ? use_labels(f, err) : use_image(f, err);
 }

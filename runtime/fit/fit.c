@@ -208,6 +208,12 @@ static sdm_status problem_start(fit_problem *p, sdm_fit_result *out, sdm_error *
     if (!s) s = sdm_fit_extent(&p->maps, &p->extent, err);
     memcpy(p->maps_params, p->state.params, sizeof p->maps_params);
     p->maps_blur = NAN;
+    const double voxel = longest_edge(&p->target->grid);
+    if (!s && p->target->kind != SDM_FIT_POINTS && voxel > p->extent.reach)
+        return sdm_fail(err, SDM_E_ARG,
+                        "voxels of %.4g mm are larger than the shape, which reaches %.3g mm from "
+                        "its middle: is the image in mm?",
+                        voxel, p->extent.reach);
     p->state.outlier_density = 0.5 / fmax(p->extent.reach, o->point_sd);
     return s;
 }
@@ -592,7 +598,7 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
         p.target = &as_image, p.opts = &with_labels, p.given_labels = true;
     }
     if (!s && target->kind == SDM_FIT_IMAGE && opts->cavity > 0) {
-        s = sdm_fit_mask_cavities(target, opts, &values, &out->n_cavity, err);
+        s = sdm_fit_mask_cavities(target, opts, &values, &out->n_cavity, &out->widest_space, err);
         as_image = *target, as_image.values = values;
         p.target = &as_image;
     }

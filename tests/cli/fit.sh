@@ -81,9 +81,9 @@ fi
 inside=$(values fit.npy | awk '$1 < 0 { n++ } END { print n }')
 near "$inside" "$(sed -n 's/.*"inside_voxels": \([0-9]*\).*/\1/p' truth.json)" 40
 
-# Any number of threads gives the same output, except for times and the number of threads.
+# Any number of threads gives the same output, except for times, the number of threads and the command.
 expect 0 - sdmgen fit $fit --exact ct.nii.gz $near_truth --reference label.nrrd --json --threads 2
-strip() { sed -E 's/"(seconds[a-z_]*|threads)": [^,}]*//g' "$1"; }
+strip() { sed -E 's/"command": "[^"]*"//; s/"(seconds[a-z_]*|threads)": [^,}]*//g' "$1"; }
 [ "$(strip out)" = "$(strip first.json)" ] || bad 'two threads must give the same result'
 
 # The report as text.
@@ -271,6 +271,9 @@ expect 2 'label applies to volumes' sdmgen fit $fit fit.stl --label 1
 expect 2 'no voxel of the image lies near the shape' sdmgen fit $fit ct.nii.gz --rotation 0,0,0 --start-centre 90,0,0 -o no.stl
 expect 2 'no voxel of the image lies near .*its middle at 90, ' sdmgen fit --shape cochlea ct.nii.gz --rotation 0,0,0 --start-centre 90,0,0 -o no.stl
 expect 2 'all [0-9]+ voxels of the image near the shape .*cavity' sdmgen fit $fit ct.nii.gz $near_truth --inside 600,2000 --outside 9000,10 --cavity 0.5 -o no.stl
+expect 0 '--cavity 4 left nothing out: the widest space like the inside holds a ball of [0-9.]+ mm$' sdmgen fit $fit ct.nii.gz $near_truth --cavity 4
+gzip -dc ct.nii.gz >moved.nii && printf '\0\0\240\101' | dd of=moved.nii bs=1 seek=268 conv=notrunc 2>err # x of qform: 20 mm
+expect 0 'moved.nii: sform and qform place voxels up to [0-9.]+ mm apart; sform is used$' sdmgen fit $fit moved.nii $near_truth
 expect 2 "did you mean 'rx'" sdmgen fit $fit ct.nii.gz -p rc=3
 expect 5 "parameter 'rx' = 9 mm, allowed [0-9.]+ \.\. [0-9.]+ mm\$" sdmgen fit $fit ct.nii.gz -p rx=9 -o no.stl
 expect 0 'start parameters were clamped to their range' sdmgen fit $fit ct.nii.gz $near_truth -p rx=9 --policy clamp --json

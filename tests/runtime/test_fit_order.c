@@ -1,6 +1,7 @@
 /* The figures of a fit do not depend on how the image is stored: another order of its axes in
- * memory, or a smaller field of view around the shape, gives the same evidence and noise.
- * Tests: evidence.c neighbours.c */
+ * memory, or a smaller field of view around the shape, gives the same evidence and noise. Images
+ * with empty slices and with wrong units.
+ * Tests: evidence.c neighbours.c start_search.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -70,8 +71,44 @@ static void test_order_and_field_of_view(void **state)
     free(v);
 }
 
+// Every second slice is empty: a search that looks at every second voxel must not look there only.
+static void test_empty_slices(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 9);
+    const sdm_fit_target t = image_of(v);
+    for (int64_t i = 0; i < (int64_t)sdm_grid_count(&t.grid); i++)
+        if (i / (t.grid.n[0] * t.grid.n[1]) % 2 == 0) v[i] = NAN;
+    sdm_fit_opts o = near_start();
+    o.turns = SDM_FIT_TURNS_AXIS;
+    o.n_turns = 2;
+    sdm_fit_result r = fit(&t, &o);
+    assert_true(r.n_nan > 0);
+    for (int k = 0; k < 3; k++) assert_true(fabs(r.params[k] - TRUTH[k]) < 5 * r.sd[k]);
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
+// An image whose unit is not mm: its voxels are larger than the shape.
+static void test_voxels_larger_than_the_shape(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 9);
+    sdm_fit_target t = image_of(v);
+    for (int k = 0; k < 3; k++) t.grid.spacing[k] *= 1000;
+    const sdm_fit_source source = exact_source();
+    const sdm_fit_opts o = near_start();
+    sdm_fit_result r;
+    sdm_error err = {0};
+    assert_int_equal(sdm_fit(&source, &t, &o, &r, &err), SDM_E_ARG);
+    assert_non_null(strstr(err.text, "voxels of 280 mm are larger than the shape"));
+    free(v);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_order_and_field_of_view)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_order_and_field_of_view),
+                                       cmocka_unit_test(test_empty_slices),
+                                       cmocka_unit_test(test_voxels_larger_than_the_shape)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

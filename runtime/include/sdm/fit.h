@@ -335,6 +335,9 @@ typedef struct sdm_fit_result {
        normal, mm, and gain in log posterior density, as of independent samples (about 3 for the
        true pose). 0 where the pose is estimated */
     double kept_pose_motion, kept_pose_gain;
+    /* with sdm_fit_opts.cavity: radius (mm) of the widest ball in a space of the image that looks
+       like the inside; else 0. A smaller cavity leaves out such spaces */
+    double widest_space;
 } sdm_fit_result;
 
 /* Fits the shape of source to target. Errors: SDM_E_ARG: source, options or start, or no voxel near

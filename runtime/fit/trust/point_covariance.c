@@ -189,7 +189,8 @@ static sdm_status products_add(const fit_problem *p, const subset *t, const doub
 }
 
 sdm_status sdm_fit_point_covariance(const fit_problem *p, double model_mm, bool rough,
-                                    fit_score_covariance *out, sdm_error *err)
+                                    double *noise, double *model, double *noise_factor,
+                                    sdm_error *err)
 {
     const size_t n = p->information.n_unknowns;
     const double *h = p->maps.grid.spacing, width = fmax(h[0], fmax(h[1], h[2]));
@@ -204,13 +205,13 @@ sdm_status sdm_fit_point_covariance(const fit_problem *p, double model_mm, bool 
             pairs_count(p, &t, width, &bins);
             c = kernel_fit(&bins, width, variance);
         }
-        s = products_add(p, &t, t.root, &c, out->noise, &out->noise_factor, err);
-        for (size_t i = 0; i < n * n; i++) out->noise[i] *= variance;
+        s = products_add(p, &t, t.root, &c, noise, noise_factor, err);
+        for (size_t i = 0; i < n * n; i++) noise[i] *= variance;
     }
     if (!s && model_mm > 0) {
         const kernel of_map = {.c0 = 1, .radius = KERNEL_OVER_CUBE * model_mm};
         double ignored;
-        s = products_add(p, &t, t.model, &of_map, out->model, &ignored, err);
+        s = products_add(p, &t, t.model, &of_map, model, &ignored, err);
     }
     subset_dispose(&t);
     return s;

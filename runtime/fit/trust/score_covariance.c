@@ -179,7 +179,8 @@ sdm_status sdm_fit_score_covariance_create(const fit_problem *p, double model_mm
     sdm_status s = SDM_ALLOC(&out->noise, n * n, "covariance of the score", err);
     if (!s) s = SDM_ALLOC(&out->model, n * n, "covariance of the score", err);
     if (!s && p->target->kind == SDM_FIT_POINTS)
-        s = sdm_fit_point_covariance(p, model_mm, !influence, out, err);
+        s = sdm_fit_point_covariance(p, model_mm, !influence, out->noise, out->model,
+                                     &out->noise_factor, err);
     else if (!s && sdm_fit_inner_band_count(p))
         s = voxels_covariance(p, model_mm, influence, out, err);
     if (s) sdm_fit_score_covariance_dispose(out);

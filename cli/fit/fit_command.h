@@ -127,8 +127,8 @@ void cli_fit_print(const cli_fit *f);
 /* Adds the result as one JSON object. */
 void cli_fit_json(const cli_fit *f, sdm_json *json);
 
-/* Adds the members "command", the command line that repeats the fit, and "inputs", the files that it
- * read with their checksums (CRC-64/XZ). */
+/* Adds the members "command", the command line that repeats the fit, and "inputs", the files that
+ * it read with their checksums (CRC-64/XZ). */
 void cli_fit_json_repeat(const cli_fit *f, sdm_json *json);
 
 void cli_fit_dispose(cli_fit *f);

@@ -459,8 +459,8 @@ static void accept_small_steps(const fit_problem *p, sdm_fit_result *out)
 
 static sdm_status not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
 {
-    static const char *const pose[6] = {"rotation about x",   "rotation about y",
-                                        "rotation about z",   "translation along x",
+    static const char *const pose[6] = {"rotation about x",    "rotation about y",
+                                        "rotation about z",    "translation along x",
                                         "translation along y", "translation along z"};
     double most, low, high;
     const char *name;

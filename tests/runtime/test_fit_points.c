@@ -66,9 +66,8 @@ static void test_no_point_is_buried(void **state)
     for (size_t i = 0; i < MANY; i++) {
         const double *p = x + 3 * i, e = 1e-9;
         const bool first = p[0] > e && p[0] < 2 - e && p[1] > e && p[1] < 2 - e && p[2] > e &&
-                           p[2] < 2 - e,
-                   second = p[0] > 1 + e && p[0] < 3 - e && p[1] > 0.5 + e && p[1] < 1.5 - e &&
-                            p[2] > 0.5 + e && p[2] < 1.5 - e;
+                           p[2]<2 - e, second = p[0]> 1 + e && p[0] < 3 - e && p[1] > 0.5 + e &&
+                           p[1] < 1.5 - e && p[2] > 0.5 + e && p[2] < 1.5 - e;
         assert_false(first || second);
         beyond += p[0] > 2 + e;
     }
@@ -136,10 +135,9 @@ static void test_shapes_are_found(void **state)
     for (size_t c = 0; c < 3; c++) {
         sdm_instance *shape = NULL;
         sdm_named_text edge = {"edge", "0.1"};
-        assert_int_equal(
-            sdm_instance_create(sdm_registry_find(registry, cases[c].name, NULL), &edge, 1, NULL,
-                                &shape, NULL),
-            SDM_OK);
+        assert_int_equal(sdm_instance_create(sdm_registry_find(registry, cases[c].name, NULL),
+                                             &edge, 1, NULL, &shape, NULL),
+                         SDM_OK);
         double *x = points_of(shape, cases[c].p, 0, N);
         // a quarter of the points lies anywhere in a box around the shape
         for (size_t i = 0; i < N; i += 4)
@@ -158,8 +156,8 @@ static void test_shapes_are_found(void **state)
     }
 }
 
-/* On a surface that the shape does not match, more points tell no more: the standard deviations stay
- * the same. Points with independent errors do: four times as many halve them. */
+/* On a surface that the shape does not match, more points tell no more: the standard deviations
+ * stay the same. Points with independent errors do: four times as many halve them. */
 static void test_deviations_count_independent_points(void **state)
 {
     (void)state;

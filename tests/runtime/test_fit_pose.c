@@ -39,9 +39,9 @@ static sdm_fit_result fit_surface(const char *name, const double *p)
     sdm_instance *shape = NULL;
     sdm_mesh m = {0};
     double x[3 * N];
-    assert_int_equal(sdm_instance_create(sdm_registry_find(registry, name, NULL), &edge, 1, NULL,
-                                         &shape, NULL),
-                     SDM_OK);
+    assert_int_equal(
+        sdm_instance_create(sdm_registry_find(registry, name, NULL), &edge, 1, NULL, &shape, NULL),
+        SDM_OK);
     assert_int_equal(sdm_instance_mesh(shape, p, &m, NULL), SDM_OK);
     assert_int_equal(sdm_fit_surface_points(&m, N, 2, x, NULL), SDM_OK);
     for (size_t i = 0; i < N; i++) {

@@ -304,8 +304,7 @@ static void iteration_remember(fit_problem *p, const double *step, const double 
     const size_t n = p->n_params + 6, now = p->n_recent % FIT_RECENT,
                  before = (p->n_recent + FIT_RECENT - 1) % FIT_RECENT;
     for (size_t i = 0; i < n; i++) {
-        p->recent_position[now][i] =
-            (p->n_recent ? p->recent_position[before][i] : 0) + step[i];
+        p->recent_position[now][i] = (p->n_recent ? p->recent_position[before][i] : 0) + step[i];
         p->recent_step[now][i] = plain ? plain[i] : INFINITY;
     }
     p->n_recent++;
@@ -378,7 +377,8 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
         if (opts->averaged)
             s = averaged_step(p, opts, &acceleration, step, plain, work, &size, &taken, err);
         else if (out->step <= ACCELERATED_BELOW)
-            s = accelerated_step(p, opts, &acceleration, &damping, step, plain, work, &size, &taken, err);
+            s = accelerated_step(p, opts, &acceleration, &damping, step, plain, work, &size, &taken,
+                                 err);
         if (!s && !taken && !opts->averaged) {
             acceleration.anderson.count = 0;
             s = damped_step(p, opts, &damping, step, work, &taken, err);

@@ -30,8 +30,7 @@ void sdm_fit_eigen(size_t n, double *a, double *value, double *vector)
             for (size_t j = i + 1; j < n; j++) {
                 // the rotation of rows and columns i, j that makes a[i][j] zero
                 if (!(fabs(a[i * n + j]) > 0)) continue;
-                const double angle =
-                    0.5 * atan2(2 * a[i * n + j], a[j * n + j] - a[i * n + i]),
+                const double angle = 0.5 * atan2(2 * a[i * n + j], a[j * n + j] - a[i * n + i]),
                              c = cos(angle), s = sin(angle);
                 for (size_t k = 0; k < n; k++) {
                     const double x = a[i * n + k], y = a[j * n + k];
@@ -148,8 +147,8 @@ void sdm_fit_open_motions_stop(const fit_problem *p, double *a)
         if (!is_free(p, m)) continue;
         for (size_t i = 0; i < 6; i++)
             for (size_t j = 0; j < 6; j++)
-                a[(at + i) * n + at + j] += STOP * p->pose_information * m[i] /
-                                            pow(unit(p, i), 2) * m[j] / pow(unit(p, j), 2);
+                a[(at + i) * n + at + j] += STOP * p->pose_information * m[i] / pow(unit(p, i), 2) *
+                                            m[j] / pow(unit(p, j), 2);
     }
 }
 
@@ -193,10 +192,9 @@ void sdm_fit_open_motions_describe(const fit_problem *p, char *text, size_t size
         const bool turn = v3_norm(m) >= v3_norm(m + 3) / p->extent.reach;
         double axis[3], shift[3], arm[3], x[3];
         direction(turn ? m : m + 3, axis);
-        used += (size_t)snprintf(text + used, size - used, "%s%s (%.3g, %.3g, %.3g)",
-                                 used ? ", " : "",
-                                 turn ? "rotation about the axis" : "translation along", axis[0],
-                                 axis[1], axis[2]);
+        used += (size_t)snprintf(
+            text + used, size - used, "%s%s (%.3g, %.3g, %.3g)", used ? ", " : "",
+            turn ? "rotation about the axis" : "translation along", axis[0], axis[1], axis[2]);
         if (!turn || used >= size) continue;
         // the point of the axis next to the middle of the shape
         v3_cross(m, m + 3, shift);

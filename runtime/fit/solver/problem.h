@@ -72,8 +72,8 @@ typedef struct fit_problem {
     /* [n_iterations] log-posterior density after each iteration, except those of the search */
     double *objective;
     size_t n_iterations, objective_capacity;
-    /* ring of the last n_recent iterations: sum of the steps of each unknown [n_params + 6], and the
-     * undamped step, see sdm_fit_unrest() */
+    /* ring of the last n_recent iterations: sum of the steps of each unknown [n_params + 6], and
+     * the undamped step, see sdm_fit_unrest() */
     double recent_position[FIT_RECENT][FIT_PARAMS_MAX + 6];
     double recent_step[FIT_RECENT][FIT_PARAMS_MAX + 6];
     size_t n_recent;

@@ -1,5 +1,5 @@
-/* Test of a pose that was kept: likelihood ratio against a pose that is free. The free fit gives the
- * noise, since in a wrong pose the residuals are correlated and large. */
+/* Test of a pose that was kept: likelihood ratio against a pose that is free. The free fit gives
+ * the noise, since in a wrong pose the residuals are correlated and large. */
 #include "kept_pose.h"
 
 #include <math.h>

@@ -24,8 +24,8 @@
 #define BINS 24
 // a correlation counts while it exceeds this and twice its standard error
 #define CORRELATION_MIN 0.02
-// support of the kernel of the error of the maps, in edges of a cube: the kernel has the integral of
-// a square of that edge over a surface
+// support of the kernel of the error of the maps, in edges of a cube: the kernel has the integral
+// of a square of that edge over a surface
 #define KERNEL_OVER_CUBE 1.38
 
 /* The subset of the points. */

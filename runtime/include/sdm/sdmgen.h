@@ -27,8 +27,10 @@
  *                         sdm/phantom.h         test images of a shape
  *                         sdm/fit.h             fits a shape to an image, labels or points
  *
+ *   training              sdm/training.h        a model from a configuration [sdmgen::training]
+ *
  * In brackets: the CMake target of the library with the functions; all others are in
- * sdmgen::sdmgen. sdm/vdb.h is included where it is installed.
+ * sdmgen::sdmgen. sdm/vdb.h and sdm/training.h are included where they are installed.
  *
  * The map of a trained network at its default parameters:
  *
@@ -70,6 +72,9 @@
 #include "sdm/volume.h"
 
 #if defined(__has_include)
+#if __has_include("sdm/training.h")
+#include "sdm/training.h"
+#endif
 #if __has_include("sdm/vdb.h")
 #include "sdm/vdb.h"
 #endif

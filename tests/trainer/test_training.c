@@ -1,5 +1,6 @@
 /* The training of the library: the model of a configuration file, settings that replace keys,
- * mistakes, and a stop on request. Tests: training.c train_shape.c */
+ * mistakes, and a stop on request. Tests: training.c
+ * train_folder.c train_shape.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -78,6 +79,16 @@ static void trains_as_the_internal_function(void **state)
     assert_int_equal(r.maps, 40);
     assert_true(r.accuracy.samples == 8 && r.accuracy.rmse_mm > 0 && r.accuracy.rmse_mm < 1);
     assert_true(!strcmp(r.grade, "good") || !strcmp(r.grade, "usable") || !strcmp(r.grade, "poor"));
+    // a folder with a model is in use, without a checkpoint there is nothing to continue
+    sdm_training_opts again = opts;
+    assert_int_equal(sdm_training_run(path, registry, &again, NULL, &e), SDM_E_ARG);
+    assert_non_null(strstr(e.text, "holds a trained model"));
+    again.resume = true;
+    assert_int_equal(sdm_training_run(path, registry, &again, NULL, &e), SDM_E_ARG);
+    assert_non_null(strstr(e.text, "no checkpoint"));
+    assert_true(hash == hash_of("model.sdm"));
+    again.resume = false, again.force = true;
+    assert_int_equal(sdm_training_run(path, registry, &again, NULL, NULL), SDM_OK);
     remove(path);
 }
 

@@ -30,10 +30,12 @@ typedef struct sdm_training_opts {
      * "network.depth=4", "shape.ranges.a=[2,3]" */
     const char *const *settings;
     size_t n_settings;
-    /* folder of the run; NULL: output.folder of the configuration. Files of an older run in it are
-     * replaced as soon as the new run has passed all its checks */
+    /* folder of the run; NULL: output.folder of the configuration. If it holds a model or a
+     * checkpoint, either of the two flags must be set */
     const char *folder;
     bool resume; /* continue from the checkpoint in the folder */
+    bool force;  /* start again; the files of the older run are replaced as soon as the new run has
+                    passed all its checks */
     /* Called in the thread that called the library, about 10 times a second at most. May be NULL.
      */
     void (*progress)(void *user, const sdm_training_progress *p);
@@ -59,7 +61,7 @@ typedef struct sdm_training_result {
  * the caller's own) and trains. The folder of the run then holds model.sdm and the other files of
  * docs/formats.md. Relative paths in the options of the shape start from the folder of the file.
  * opts and result may be NULL. SDM_E_CONFIG with one line "file:line:column: ..." for each mistake;
- * SDM_E_IO, SDM_E_NOMEM, SDM_E_PLUGIN, SDM_E_CANCELLED; SDM_E_QUALITY: the network gives numbers
+ * SDM_E_ARG (the folder), SDM_E_IO, SDM_E_NOMEM, SDM_E_PLUGIN, SDM_E_CANCELLED; SDM_E_QUALITY: the network gives numbers
  * that are not finite. [any thread; one run at a time in a folder] */
 SDM_API sdm_status sdm_training_run(const char *path, const sdm_registry *registry,
                                     const sdm_training_opts *opts, sdm_training_result *result,

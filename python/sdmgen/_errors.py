@@ -35,7 +35,7 @@ class FileError(Error, OSError):
     """A file cannot be opened, read or written."""
 
     def __new__(cls, status: str, text: str) -> FileError:
-        return OSError.__new__(cls, text)
+        return OSError.__new__(cls, text)  # type: ignore[call-arg]
 
 
 class FormatError(Error, ValueError):

@@ -14,7 +14,7 @@ from . import _abi
 from ._arrays import address, copied, number, path_bytes
 from ._errors import UnsupportedError, argument_error
 from ._grid import Grid
-from ._library import Callbacks, call, function, make
+from ._library import Callbacks, array, call, function, make
 from ._map import Band, Image, Map, Segment
 from ._mesh import Mesh
 from ._model import Model
@@ -38,12 +38,12 @@ def read(path: Any) -> Union[Image, Mesh, Model, NDArray[Any]]:
     if _ends(path, (".sdm",)):
         return Model(path)
     if _ends(path, (".npy",)):
-        return _read_array(path)
+        return read_array(path)
     known = " ".join((*IMAGES, *MESHES, ".sdm", ".npy"))
     raise UnsupportedError("unsupported", f"{os.fspath(path)!r}: the name must end in one of {known}")
 
 
-def _read_array(path: Any) -> NDArray[Any]:
+def read_array(path: Any) -> NDArray[Any]:
     values, shape, dims = ctypes.c_void_p(), (ctypes.c_size_t * 4)(), ctypes.c_int()
     call("sdm_npy_read", path_bytes(path), byref(values), shape, byref(dims))
     try:
@@ -112,7 +112,7 @@ def _write_image(path: Any, image: Image, text: Optional[str]) -> None:
 
 def _write_vdb(path: Any, what: Any, band: Optional[float], dense: bool, half: bool, metadata: Mapping[str, str]) -> None:
     words = [(key.encode(), str(value).encode()) for key, value in metadata.items()]
-    named = (_abi.structs["sdm_named_value"] * len(words))(*words)
+    named = array("sdm_named_value", words)
     callbacks = Callbacks()
     opts = make(
         "sdm_vdb_opts",

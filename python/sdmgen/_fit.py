@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from . import _abi
 from ._arrays import Float32, Float64, Triple, address, choice, copied, finite, float32, float64, number, triple, whole
 from ._errors import FormatError, QualityError, argument_error
-from ._files import IMAGES, MESHES, _ends, read_image
+from ._files import IMAGES, MESHES, _ends, read_array, read_image
 from ._grid import Grid, Pose, grid_around
 from ._library import Callbacks, call, function, make
 from ._map import Image, Map, MapInfo
@@ -208,7 +208,7 @@ def _open_target(target: Target) -> Union[Image, Float64]:
     if isinstance(target, (str, bytes)) or hasattr(target, "__fspath__"):
         if _ends(target, IMAGES):
             return read_image(target)
-        target = Mesh.read(target) if _ends(target, MESHES) else np.load(target)
+        target = Mesh.read(target) if _ends(target, MESHES) else read_array(target)
     if isinstance(target, Mesh):
         step = 1 + max(len(target.vertices) - 1, 0) // _POINTS_MAX
         target = target.vertices[::step]
@@ -459,7 +459,7 @@ def fit(
     opts.n_threads = whole(threads, "threads", 0)
     opts.start_params = address(start_params)
     if region is not None:
-        corners = float64(region, (2, 3), "region")
+        corners = float64(np.stack([triple(corner, "region") for corner in region]), (2, 3), "region")
         opts.use_box = True
         opts.box_min[:] = [float(x) for x in corners.min(axis=0)]
         opts.box_max[:] = [float(x) for x in corners.max(axis=0)]

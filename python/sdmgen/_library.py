@@ -7,7 +7,7 @@ import ctypes.util
 import os
 import threading
 from pathlib import Path
-from typing import Any, Callable, Optional
+from typing import Any, Callable, Optional, Sequence
 
 from . import _abi
 from ._errors import UnsupportedError, error_of
@@ -74,6 +74,12 @@ def function(name: str) -> Any:
 def make(struct: str, /, **members: Any) -> Any:
     """A new structure, zero but for the given members."""
     return _abi.structs[struct](**members)
+
+
+def array(struct: str, items: Sequence[Any]) -> Any:
+    """An array of structures, from structures or tuples of their members."""
+    made: Any = _abi.structs[struct] * len(items)
+    return made(*items)
 
 
 def _error_here() -> Any:

@@ -45,6 +45,11 @@ class Audit:
     inverted: bool
 
 
+def _corner(c: Any) -> tuple[float, float, float]:
+    x, y, z = c
+    return (x, y, z)
+
+
 def _audit_of(c: Any) -> Audit:
     return Audit(
         vertices=c.n_vert,
@@ -58,8 +63,8 @@ def _audit_of(c: Any) -> Audit:
         self_intersections=c.self_intersections,
         volume=c.volume,
         area=c.area,
-        low=tuple(getattr(c, "min")),
-        high=tuple(getattr(c, "max")),
+        low=_corner(getattr(c, "min")),
+        high=_corner(getattr(c, "max")),
         closed=c.closed,
         manifold=c.manifold,
         inverted=c.inverted,

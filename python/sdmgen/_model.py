@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from ctypes import byref, string_at
+from ctypes import byref
 from dataclasses import dataclass
 from typing import Any, Mapping, Optional, Sequence, Union
 
@@ -320,7 +320,7 @@ class Model:
 
     def check(self, params: Params = None, *, threads: int = 0, **named: float) -> Check:
         """The error of the network's map near the surface, mm, against exact distances."""
-        info = self(params, check=True, threads=threads, **named).info
+        info = self(self.values(params, **named), check=True, threads=threads).info
         assert info.check is not None
         return info.check
 
@@ -358,7 +358,9 @@ class Model:
         **named: float,
     ) -> Samples:
         """Signed distances (mm, NEGATIVE INSIDE) at points [n, 3], LPS mm, and their derivatives."""
-        field = self.field(params, derivatives=slopes, policy=policy, outside=outside, threads=threads, **named)
+        field = self.field(
+            self.values(params, **named), derivatives=slopes, policy=policy, outside=outside, threads=threads
+        )
         return field.sample(points, gradient=gradient, slopes=slopes)
 
     def band(
@@ -379,7 +381,7 @@ class Model:
         """The narrow band of half width `width` (mm) in blocks of 8 x 8 x 8 voxels; distances NEGATIVE
         INSIDE."""
         on = self._grid(grid, size, spacing, origin, direction)
-        return self.field(params, policy=policy, outside=outside, threads=threads, **named).band(width, on)
+        return self.field(self.values(params, **named), policy=policy, outside=outside, threads=threads).band(width, on)
 
     def __repr__(self) -> str:
         names = ", ".join(p.name for p in self.params)
@@ -407,7 +409,7 @@ def _texts(at: int, n: int) -> list[str]:
 
     if not n:
         return []
-    return [string_at(text).decode() for text in (ctypes.c_void_p * n).from_address(at)]
+    return [(text or b"").decode() for text in (ctypes.c_char_p * n).from_address(at)]
 
 
 class Field:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from . import _abi
 from ._arrays import Float64, address, float64, indices, named_values, number, path_bytes
 from ._errors import Error, ShapeError, argument_error
-from ._library import Callbacks, Handle, call, function, make
+from ._library import Callbacks, Handle, array, call, function, make
 from ._mesh import Mesh, taken_mesh
 
 Params = Union[None, ArrayLike, Mapping[str, float]]
@@ -108,6 +108,7 @@ class Shape:
     ) -> None:
         self._registry = Registry(plugin)
         self._python: Optional[_PythonShape] = None
+        self.name: str
         if isinstance(shape, str):
             if params is not None or velocity is not None or name is not None:
                 raise argument_error("params, name and velocity belong to shapes written in Python")
@@ -121,7 +122,7 @@ class Shape:
         else:
             raise argument_error("shape: need the name of a shape, or a function that returns vertices and triangles")
         words = [(key.encode(), str(value).encode()) for key, value in options.items()]
-        named = (_abi.structs["sdm_named_text"] * len(words))(*words)
+        named = array("sdm_named_text", words)
         self._instance = Handle("sdm_instance_free")
         folder = None if base_dir is None else path_bytes(base_dir, "base_dir")
         call("sdm_instance_create", self._registry.find(self.name), named, len(words), folder, self._instance.out())
@@ -209,7 +210,7 @@ class _PythonShape:
         summary: str,
         velocity: Optional[Callable[..., Any]],
     ) -> None:
-        self.name = name or getattr(mesh, "__name__", "")
+        self.name = str(name or getattr(mesh, "__name__", ""))
         if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
             raise argument_error(f"name: '{self.name}' must consist of small letters, digits and _, and begin with a letter")
         self._mesh, self._velocity = mesh, velocity
@@ -219,7 +220,7 @@ class _PythonShape:
         self._lock = threading.RLock()
         self._callbacks = Callbacks()
         self._failed: dict[str, Exception] = {}
-        self._table_params = (_abi.structs["sdm_param"] * len(self._params))(*self._params)
+        self._table_params = array("sdm_param", self._params)
         self.table = make(
             "sdm_shape",
             abi=_abi.constants["SDM_SHAPE_ABI"],
@@ -271,8 +272,8 @@ class _PythonShape:
     def _make_velocity(self, _host_at: int, p: int, n: int, out: int) -> int:
         assert self._velocity is not None
         result = self._velocity(*self._values(p))
-        array = float64(result, (len(self._params), n, 3), "velocity")
-        ctypes.memmove(out, array.ctypes.data, array.nbytes)
+        slopes = float64(result, (len(self._params), n, 3), "velocity")
+        ctypes.memmove(out, slopes.ctypes.data, slopes.nbytes)
         return 0
 
     def _distributions(self, _self: Any, out: int) -> None:

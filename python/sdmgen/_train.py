@@ -70,7 +70,7 @@ def train(
     if shape is not None and plugin is not None:
         raise argument_error("train: give a shape or a plug-in, not both")
     lines = [f"{k}={v}" for k, v in settings.items()] if isinstance(settings, Mapping) else [str(s) for s in settings]
-    texts = (ctypes.c_char_p * len(lines))(*(line.encode() for line in lines))
+    texts = (ctypes.c_char_p * len(lines))(*[line.encode() for line in lines])
     callbacks, messages = Callbacks(), list[str]()
 
     def show(_user: Any, at: int) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Mapping, Optional, Sequence, Union
+from typing import Any, Mapping, Optional, Sequence, TypeVar, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,7 @@ from ._errors import argument_error
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Shape = Sequence[Optional[int]]
+T = TypeVar("T")
 #: one number for each of the axes x, y, z
 Triple = Union[Sequence[float], NDArray[Any]]
 
@@ -25,7 +26,8 @@ def _array(value: ArrayLike, name: str, kinds: str, what: str) -> NDArray[Any]:
         array = np.asarray(value)
     except Exception as reason:
         raise argument_error(f"{name}: not an array: {reason}") from None
-    if array.dtype.kind not in kinds and array.size:
+    empty_list = array.size == 0 and array.dtype == np.float64
+    if array.dtype.kind not in kinds and not empty_list:
         raise argument_error(f"{name}: need {what}, not values of type {array.dtype}")
     return array
 
@@ -129,11 +131,48 @@ def named_values(
     return result
 
 
+def words(value: Any, names: Sequence[str], name: str) -> list[str]:
+    """A list of allowed words."""
+    if isinstance(value, (str, np.ndarray)) or not isinstance(value, (list, tuple, set, frozenset)):
+        raise argument_error(f"{name}: need a list of words out of {', '.join(map(repr, names))}, not {value!r}")
+    for word in value:
+        choice(word, names, name)
+    return list(value)
+
+
+def flag(value: Any, name: str) -> bool:
+    """True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise argument_error(f"{name}: need True or False, not {value!r}")
+    return bool(value)
+
+
+def text_bytes(value: Any, name: str) -> bytes:
+    """A text for the library."""
+    try:
+        result = str(value).encode()
+    except UnicodeEncodeError:
+        raise argument_error(f"{name}: {value!r} is not a valid text") from None
+    if b"\0" in result:
+        raise argument_error(f"{name}: a text must not contain a zero")
+    return result
+
+
+def instance(value: Any, kind: type[T], name: str) -> T:
+    """The value, which must be an object of this class."""
+    if not isinstance(value, kind):
+        raise argument_error(f"{name}: need an sdmgen.{kind.__name__}, not {type(value).__name__}")
+    return value
+
+
 def path_bytes(path: Any, name: str = "path") -> bytes:
     """A file name for the library."""
     import os
 
     try:
-        return os.fsencode(path)
-    except TypeError:
-        raise argument_error(f"{name}: need the name of a file, not {path!r}") from None
+        result = os.fsencode(path)
+    except (TypeError, UnicodeError):
+        result = b"\0"
+    if b"\0" in result:
+        raise argument_error(f"{name}: need the name of a file, not {path!r}")
+    return result

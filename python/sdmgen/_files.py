@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _abi
-from ._arrays import address, copied, number, path_bytes
+from ._arrays import address, copied, flag, number, path_bytes, text_bytes
 from ._errors import UnsupportedError, argument_error
 from ._grid import Grid
 from ._library import Callbacks, array, call, function, make
@@ -102,7 +102,7 @@ def write(
 def _write_image(path: Any, image: Image, text: Optional[str]) -> None:
     if image.values.ndim != 3:
         raise argument_error("write: an image of several layers cannot be written")
-    line = (text if text is not None else image.text).encode() or None
+    line = text_bytes(image.text if text is None else text, "text") or None
     if image.values.dtype == np.float32:
         call("sdm_image_write", path_bytes(path), image.grid, address(image.values), line)
     else:
@@ -111,14 +111,14 @@ def _write_image(path: Any, image: Image, text: Optional[str]) -> None:
 
 
 def _write_vdb(path: Any, what: Any, band: Optional[float], dense: bool, half: bool, metadata: Mapping[str, str]) -> None:
-    words = [(key.encode(), str(value).encode()) for key, value in metadata.items()]
+    words = [(text_bytes(key, "metadata"), text_bytes(value, f"metadata {key}")) for key, value in metadata.items()]
     named = array("sdm_named_value", words)
     callbacks = Callbacks()
     opts = make(
         "sdm_vdb_opts",
         band_voxels=0.0 if band is None else number(band, "band"),
-        dense=bool(dense),
-        half=bool(half),
+        dense=flag(dense, "dense"),
+        half=flag(half, "half"),
         metadata=ctypes.addressof(named),
         n_metadata=len(words),
         cancelled=callbacks.wrap("sdm_vdb_opts", "cancelled", callbacks.stopped, True),

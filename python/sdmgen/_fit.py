@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _abi
-from ._arrays import Float32, Float64, Triple, address, choice, copied, finite, float32, float64, number, triple, whole
+from ._arrays import Float32, Float64, Triple, address, choice, copied, finite, flag, float32, float64, instance, number, triple, whole, words
 from ._errors import FormatError, QualityError, argument_error
 from ._files import IMAGES, MESHES, _ends, read_array, read_image
 from ._grid import Grid, Pose, grid_around
@@ -153,7 +153,7 @@ class _Source:
             call(name, *arguments)
 
     def map(self, params: Float64, pose: Pose, grid: Optional[Grid], threads: int) -> Map:
-        on = grid
+        on = None if grid is None else instance(grid, Grid, "grid")
         if on is None:
             own = self.map_grid()
             start = pose.apply(own.origin[None])[0]
@@ -168,7 +168,7 @@ class _Source:
 def close_labels(labels: Image, radius: float, threads: int = 0) -> Image:
     """The morphological closing of a label map by a ball of this radius, mm: walls between labelled
     compartments that are thinner than about twice the radius become inside. 1 inside, 0 outside."""
-    values = float32(labels.values, labels.grid.shape, "labels").copy()
+    values = float32(instance(labels, Image, "labels").values, labels.grid.shape, "labels").copy()
     n = whole(threads, "threads", 0)
     call("sdm_fit_close_labels", labels.grid, number(radius, "radius"), n, address(values))
     return Image(values, labels.grid)
@@ -198,7 +198,11 @@ def _mask(image: Image, labels: Sequence[Label], close: Optional[float], threads
 def _labels(value: Union[None, Label, Sequence[Label]]) -> list[Label]:
     if value is None:
         return []
-    return [value] if isinstance(value, (int, str, np.integer)) else list(value)
+    if isinstance(value, (int, str, np.integer)):
+        return [value]
+    if not isinstance(value, (list, tuple)) or not all(isinstance(v, (int, str, np.integer)) for v in value):
+        raise argument_error(f"label: need a whole number, the name of a segment, or a list of them, not {value!r}")
+    return list(value)
 
 
 def _open_target(target: Target) -> Union[Image, Float64]:
@@ -222,6 +226,7 @@ def _open_source(
     source: Union[Model, Shape], params: Any, exact: bool, polish: bool, policy: str, spacing: Any
 ) -> tuple[_Source, Float64, bool]:
     """The source, the start parameters, and whether these were moved into their range."""
+    exact, polish = flag(exact, "exact"), flag(polish, "polish")
     rule = choice(policy, POLICIES, "policy")
     if not isinstance(source, (Model, Shape)):
         raise argument_error("fit: need a Model or a Shape, and what to fit it to")
@@ -413,12 +418,12 @@ def fit(
     start = _Start(rotation, translation, start_centre, start_axis, start_points, turns, turns_sphere)
     start.check()
     opened = _open_target(target)
-    words = _labels(label)
-    if words and not isinstance(opened, Image):
+    chosen_labels = _labels(label)
+    if chosen_labels and not isinstance(opened, Image):
         raise argument_error("label: it applies to images")
-    if label_close is not None and not words and reference is None:
+    if label_close is not None and not chosen_labels and reference is None:
         raise argument_error("label_close: it needs labels: give label or reference")
-    mask = _mask(opened, words, label_close, threads) if words and isinstance(opened, Image) else None
+    mask = _mask(opened, chosen_labels, label_close, threads) if chosen_labels and isinstance(opened, Image) else None
 
     # the target
     c_target = make("sdm_fit_target")
@@ -464,8 +469,7 @@ def fit(
         opts.box_min[:] = [float(x) for x in corners.min(axis=0)]
         opts.box_max[:] = [float(x) for x in corners.max(axis=0)]
     _set_tissues(opts.appearance, inside, outside, air)
-    for word in [keep] if isinstance(keep, str) else keep:
-        choice(word, _KEEP, "keep")
+    for word in words([keep] if isinstance(keep, str) else keep, _KEEP, "keep"):
         setattr(opts, "keep_params" if word == "parameters" else f"keep_{word}", True)
     if opts.keep_params and opts.keep_pose:
         raise argument_error("keep: parameters and pose together leave nothing to fit")

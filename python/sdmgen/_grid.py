@@ -140,12 +140,12 @@ def grid_around(
 ) -> Grid:
     """The grid that `sdmgen exact` makes around a box (LPS mm): with a margin of a tenth of the
     longest edge on every side, and 64 voxels along that edge unless size or spacing are given."""
+    given = _checked_size(size)
     extent = [b - a for a, b in zip(low, high)]
     longest = max(extent)
     margin = 0.1 * longest
     edges = [e + 2 * margin for e in extent]
-    steps = _spacing_for(size, spacing, edges, 3 * [(longest + 2 * margin) / 63])
-    given = _checked_size(size)
+    steps = _spacing_for(given, spacing, edges, 3 * [(longest + 2 * margin) / 63])
     n = given or [math.ceil(c - 1e-9) + 1 for c in _cells(edges, steps)]
     centre = [0.5 * (a + b) for a, b in zip(low, high)]
     start = [c - 0.5 * h * float(m - 1) for c, h, m in zip(centre, steps, n)] if origin is None else origin
@@ -163,9 +163,9 @@ def grid_within(
     the same centre."""
     if size is None and spacing is None and origin is None and direction is None:
         return model
-    edges = [float(n - 1) * h for n, h in zip(model.size, model.spacing)]
-    steps = _spacing_for(size, spacing, edges, [float(h) for h in model.spacing])
     given = _checked_size(size)
+    edges = [float(n - 1) * h for n, h in zip(model.size, model.spacing)]
+    steps = _spacing_for(given, spacing, edges, [float(h) for h in model.spacing])
     n = given or [math.floor(c + 1e-9) + 1 for c in _cells(edges, steps)]
     made = Grid(n, steps, direction=model.direction if direction is None else direction)
     if origin is None:

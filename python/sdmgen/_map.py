@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Optional, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import Float32, Float64, address, float32, number, whole
+from ._arrays import Float32, Float64, address, float32, instance, number, whole
 from ._errors import Error, argument_error
 from ._grid import Grid
 from ._library import call, make
@@ -33,8 +33,7 @@ class Image:
     on a grid in the coordinates LPS (x to the left, y to the back, z to the head), mm."""
 
     def __init__(self, values: ArrayLike, grid: Grid, text: str = "") -> None:
-        if not isinstance(grid, Grid):
-            raise argument_error("grid: need an sdmgen.Grid")
+        instance(grid, Grid, "grid")
         array = np.ascontiguousarray(values)
         if array.dtype.kind not in "fiu" or array.dtype.itemsize not in (1, 2, 4, 8):
             raise argument_error(f"values: need real numbers, not values of type {array.dtype}")
@@ -193,9 +192,7 @@ def surface(map: Image, level: float = 0.0) -> Surface:
     is negative inside, level 0 is the surface of the shape."""
     from ._mesh import Surface, taken_mesh
 
-    if not isinstance(map, Image) or map.values.ndim != 3:
-        raise argument_error("surface: need a map")
-    values = float32(map.values, map.grid.shape, "values")
+    values = float32(instance(map, Image, "map").values, map.grid.shape, "values")
     mesh, cut = make("sdm_mesh"), c_bool()
     call("sdm_isosurface", map.grid, address(values), number(level, "level"), byref(mesh), byref(cut))
     vertices, triangles = taken_mesh(mesh)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Mapping, Optional, Sequence, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import Float32, Float64, Triple, address, choice, copied, finite, float64, indices, number, path_bytes, whole
+from ._arrays import Float32, Float64, Triple, address, choice, copied, finite, flag, float64, indices, instance, number, path_bytes, whole, words
 from ._errors import argument_error
 from ._grid import Grid, grid_around
 from ._library import Callbacks, Handle, call, function, make
@@ -200,7 +200,7 @@ class Mesh:
         return self._engine(sign, keep_overlap, threads).report
 
     def _engine(self, sign: str, keep_overlap: bool, threads: int) -> _Engine:
-        key = (choice(sign, SIGNS, "sign"), bool(keep_overlap), whole(threads, "threads", 0))
+        key = (choice(sign, SIGNS, "sign"), flag(keep_overlap, "keep_overlap"), whole(threads, "threads", 0))
         with self._lock:
             if key not in self._engines:
                 self._engines[key] = _Engine(self, *key)
@@ -273,8 +273,7 @@ def exact(
     edge of the bounding box with a margin of a tenth of it on every side. layers: any of "closest",
     "normal", "triangle" and, for shapes, "jacobian". narrow: clamps distances to this many voxels.
     keep_overlap: measures to all triangles, also to those inside the union."""
-    for layer in layers:
-        choice(layer, _LAYERS, "layers")
+    layers = words(layers, _LAYERS, "layers")
     shape = source if not isinstance(source, (Mesh, tuple, list)) else None
     if "jacobian" in layers and shape is None:
         raise argument_error("layers: 'jacobian' needs a shape: a mesh has no parameters")
@@ -284,8 +283,7 @@ def exact(
         grid = grid_around(engine.report.audit.low, engine.report.audit.high, size, spacing, origin)
     elif size is not None or spacing is not None or origin is not None:
         raise argument_error("grid: give a grid, or size, spacing and origin, not both")
-    elif not isinstance(grid, Grid):
-        raise argument_error("grid: need an sdmgen.Grid")
+    instance(grid, Grid, "grid")
     result = ExactMap(np.empty(grid.shape, np.float32), grid, MapInfo(error_mm=engine.report.union_error_mm))
     result.report = engine.report
     if "closest" in layers:
@@ -340,6 +338,7 @@ def exact_band(
 ) -> Band:
     """The narrow band of half width `width` (mm) of an exact map in blocks of 8 x 8 x 8 voxels, for
     closed meshes; distances NEGATIVE INSIDE."""
+    instance(grid, Grid, "grid")
     engine = mesh_of(source, params)._engine("auto", keep_overlap, threads)
     blocks = make("sdm_blocks")
     engine.call("sdm_exact_map_blocks", engine, grid, number(width, "width"), byref(blocks))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _abi
-from ._arrays import Float32, Float64, Triple, address, choice, finite, float32, float64, named_values, number, path_bytes, whole
+from ._arrays import Float32, Float64, Triple, address, choice, finite, flag, float32, float64, instance, named_values, number, path_bytes, whole
 from ._errors import QualityError, argument_error
 from ._grid import Grid, grid_within
 from ._library import Handle, call, function, make
@@ -91,7 +91,8 @@ class Model:
         else:
             call("sdm_model_open", path_bytes(path), self._handle.out())
             self.path = path
-        self._plugin, self._shape = plugin, shape
+        self._plugin = plugin
+        self._shape = None if shape is None else instance(shape, Shape, "shape")
         self._lock = threading.Lock()
         info = _abi.structs["sdm_model_info"].from_address(function("sdm_model_get_info")(self))
         params = (_abi.structs["sdm_model_param"] * info.n_params).from_address(info.params)
@@ -163,7 +164,7 @@ class Model:
             "sdm_generate_opts",
             policy=choice(policy, POLICIES, "policy"),
             n_threads=whole(threads, "threads", 0),
-            check=bool(check),
+            check=flag(check, "check"),
             max_error_of=choice(error_of, STATISTICS, "error_of"),
             outside=choice(outside, ("refuse", "bound", "exact"), "outside"),
         )
@@ -234,8 +235,7 @@ class Model:
             return grid_within(self.grid, size, spacing, origin, direction)
         if size is not None or spacing is not None or origin is not None or direction is not None:
             raise argument_error("grid: give a grid, or size, spacing, origin and direction, not both")
-        if not isinstance(grid, Grid):
-            raise argument_error("grid: need an sdmgen.Grid")
+        instance(grid, Grid, "grid")
         return self.grid if grid == self.grid else grid
 
     def batch(
@@ -327,7 +327,7 @@ class Model:
     def check_map(self, map: Map, params: Params = None, **named: float) -> Check:
         """The error of any map of this shape near the surface, mm, against exact distances."""
         p, result = self.values(params, **named), make("sdm_check")
-        values = float32(map.values, map.grid.shape, "map")
+        values = float32(instance(map, Map, "map").values, map.grid.shape, "map")
         shape = self.shape
         shape.call("sdm_check_shape", shape, address(p), map.grid, address(values), byref(result))
         return check_of(result)
@@ -418,7 +418,7 @@ class Field:
     use it."""
 
     def __init__(self, model: Model, params: Float64, opts: Any, derivatives: bool) -> None:
-        self._model, self._opts, self._derivatives = model, opts, bool(derivatives)
+        self._model, self._opts, self._derivatives = model, opts, flag(derivatives, "derivatives")
         self.params = params
         self._exact = bool(opts.exact_shape)
         self._handle = Handle("sdm_field_free")
@@ -436,6 +436,7 @@ class Field:
         """Signed distances (mm, NEGATIVE INSIDE) at points [n, 3], LPS mm, and their derivatives; the
         slopes need derivatives=True in Model.field()."""
         x = finite(float64(points, (None, 3), "points"), "points")
+        gradient, slopes = flag(gradient, "gradient"), flag(slopes, "slopes")
         n = len(x)
         result = Samples(
             np.empty(n, np.float32),
@@ -457,12 +458,13 @@ class Field:
 
     def grid(self, grid: Grid) -> Map:
         """The map on a grid."""
-        values = np.empty(grid.shape, np.float32)
+        values = np.empty(instance(grid, Grid, "grid").shape, np.float32)
         self._model._call(self._exact, "sdm_field_grid", self, grid, address(values), None)
         return Map(values, grid, self.info)
 
     def band(self, width: float, grid: Optional[Grid] = None) -> Band:
         """The narrow band of half width `width` (mm) on a grid, by default the model's."""
         blocks, w = make("sdm_blocks"), number(width, "width")
-        self._model._call(self._exact, "sdm_field_band", self, grid or self._model.grid, w, byref(blocks))
+        on = self._model.grid if grid is None else instance(grid, Grid, "grid")
+        self._model._call(self._exact, "sdm_field_band", self, on, w, byref(blocks))
         return band_of(blocks)

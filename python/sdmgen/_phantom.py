@@ -9,7 +9,7 @@ from typing import Mapping, Optional, Sequence, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import Float64, Triple, address, float64, number, triple, whole
+from ._arrays import Float64, Triple, address, flag, float64, instance, number, triple, whole
 from ._grid import Grid, Pose, grid_around
 from ._library import Callbacks, function, make
 from ._map import Image
@@ -57,11 +57,13 @@ def phantom(
     """A CT-like image (float32, HU) of a shape in a pose, with partial volume, texture, blur and
     noise; the arguments are the options of `sdmgen phantom`, with its defaults. Without grid, size
     and spacing the grid is fitted to the shape, 64 voxels along the longest edge."""
-    p, at = shape.values(params), pose or Pose()
+    p = instance(shape, Shape, "shape").values(params)
+    at = Pose() if pose is None else instance(pose, Pose, "pose")
     if grid is None:
         vertices = at.apply(shape.mesh(p).vertices)
         low, high = ([float(x) for x in f(axis=0)] for f in (vertices.min, vertices.max))
         grid = grid_around(low, high, size, spacing, origin)
+    instance(grid, Grid, "grid")
     opts = function("sdm_phantom_defaults")()
     for name, given in (("inside", inside), ("outside", outside), ("air", air)):
         if given is not None:
@@ -77,7 +79,7 @@ def phantom(
         opts.noise = number(noise, "noise")
     if supersample is not None:
         opts.supersampling = whole(supersample, "supersample", 1, 16)
-    opts.noise_is_blurred = not white_noise
+    opts.noise_is_blurred = not flag(white_noise, "white_noise")
     opts.seed, opts.n_threads = whole(seed, "seed", 0, 2**53), whole(threads, "threads", 0)
     callbacks = Callbacks()
     opts.cancelled = callbacks.wrap("sdm_phantom_opts", "cancelled", callbacks.stopped, True)

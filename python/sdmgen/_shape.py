@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _abi
-from ._arrays import Float64, address, float64, indices, named_values, number, path_bytes
+from ._arrays import Float64, address, float64, indices, named_values, number, path_bytes, text_bytes, whole
 from ._errors import Error, ShapeError, argument_error
 from ._library import Callbacks, Handle, array, call, function, make
 from ._mesh import Mesh, taken_mesh
@@ -63,7 +63,7 @@ class Registry(Handle):
 
     def find(self, name: str) -> int:
         near = ctypes.c_char_p()
-        found = function("sdm_registry_find")(self, name.encode(), byref(near))
+        found = function("sdm_registry_find")(self, text_bytes(name, "shape"), byref(near))
         if found:
             return int(found)
         known = ", ".join(self.names())
@@ -121,7 +121,7 @@ class Shape:
             self.name = self._python.name
         else:
             raise argument_error("shape: need the name of a shape, or a function that returns vertices and triangles")
-        words = [(key.encode(), str(value).encode()) for key, value in options.items()]
+        words = [(text_bytes(key, "option"), text_bytes(value, f"option {key}")) for key, value in options.items()]
         named = array("sdm_named_text", words)
         self._instance = Handle("sdm_instance_free")
         folder = None if base_dir is None else path_bytes(base_dir, "base_dir")
@@ -172,7 +172,7 @@ class Shape:
     def random(self, seed: int) -> Float64:
         """Random parameters, each from its distribution."""
         result = np.empty(len(self.params))
-        function("sdm_phantom_random_params")(self, seed, address(result))
+        function("sdm_phantom_random_params")(self, whole(seed, "seed", 0, 2**63), address(result))
         return result
 
     def __repr__(self) -> str:
@@ -210,7 +210,7 @@ class _PythonShape:
         summary: str,
         velocity: Optional[Callable[..., Any]],
     ) -> None:
-        self.name = str(name or getattr(mesh, "__name__", ""))
+        self.name = str(getattr(mesh, "__name__", "") if name is None else name)
         if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
             raise argument_error(f"name: '{self.name}' must consist of small letters, digits and _, and begin with a letter")
         self._mesh, self._velocity = mesh, velocity
@@ -300,7 +300,7 @@ class _PythonShape:
 def _c_param(p: Param) -> Any:
     if not isinstance(p, Param):
         raise argument_error("params: need a list of sdmgen.Param")
-    result = make("sdm_param", name=p.name.encode(), unit=p.unit.encode(), help=(p.help or p.name).encode())
+    result = make("sdm_param", name=text_bytes(p.name, "name"), unit=text_bytes(p.unit, "unit"), help=text_bytes(p.help or p.name, "help"))
     low, high = number(p.min, f"{p.name}: min"), number(p.max, f"{p.name}: max")
     default = 0.5 * (low + high) if p.default is None else number(p.default, f"{p.name}: default")
     for member, value in (("min", low), ("max", high), ("def", default)):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Callable, Mapping, Optional, Sequence, Union
 
 from . import _abi
-from ._arrays import path_bytes
+from ._arrays import flag, instance, path_bytes, text_bytes
 from ._errors import argument_error
 from ._library import Callbacks, make
 from ._model import Accuracy, Model, accuracy_of
@@ -67,10 +67,12 @@ def train(
     A folder that holds a model or a checkpoint stays unchanged unless resume (continues from the
     checkpoint) or force (starts again) is given. progress is called a few times a second; an
     exception in it, or Ctrl-C, writes a checkpoint and stops the training."""
+    if shape is not None:
+        instance(shape, Shape, "shape")
     if shape is not None and plugin is not None:
         raise argument_error("train: give a shape or a plug-in, not both")
     lines = [f"{k}={v}" for k, v in settings.items()] if isinstance(settings, Mapping) else [str(s) for s in settings]
-    texts = (ctypes.c_char_p * len(lines))(*[line.encode() for line in lines])
+    texts = (ctypes.c_char_p * len(lines))(*[text_bytes(line, "settings") for line in lines])
     callbacks, messages = Callbacks(), list[str]()
 
     def show(_user: Any, at: int) -> None:
@@ -84,8 +86,8 @@ def train(
         settings=ctypes.addressof(texts),
         n_settings=len(lines),
         folder=None if out is None else path_bytes(out, "out"),
-        resume=bool(resume),
-        force=bool(force),
+        resume=flag(resume, "resume"),
+        force=flag(force, "force"),
         progress=callbacks.wrap("sdm_training_opts", "progress", show, None),
         cancelled=callbacks.wrap("sdm_training_opts", "cancelled", callbacks.stopped, True),
         message=callbacks.wrap("sdm_training_opts", "message", lambda _user, line: messages.append(line.decode()), None),

@@ -11,9 +11,9 @@ import sdmgen.torch as st  # noqa: E402
 
 SHAPE = "shape: {name: ellipsoid}\ngrid: {size: [13, 12, 11], spacing: 0.9}\n"
 KINDS = {
-    "f32": "network: {kind: pod, depth: 2, width: 16, rank: 8, modes: 16, degree: 2, weights: float32}\n",
-    "f16": "network: {kind: pod, depth: 0, rank: 8, modes: 16, degree: 3, block: 3, weights: float16}\n",
-    "i8": "network: {kind: pod, depth: 1, width: 13, rank: 9, modes: 16, degree: 2, block: 4, weights: byte}\n",
+    "f32": "network: {kind: pod, depth: 2, width: 16, rank: 8, modes: 16, degree: 2, weights: f32}\n",
+    "f16": "network: {kind: pod, depth: 0, rank: 8, modes: 16, degree: 3, block: 3, weights: f16}\n",
+    "i8": "network: {kind: pod, depth: 1, width: 13, rank: 9, modes: 16, degree: 2, block: 4, weights: i8}\n",
     "deepsdf": "network: {kind: deepsdf, depth: 3, width: 20}\n",
     "imnet": "network: {kind: imnet, depth: 3, width: 24}\n",
     "sdmnn": "network: {kind: sdmnn, depth: 2, channels: 3, width: 10}\n",
@@ -94,15 +94,15 @@ def test_a_fit_to_a_map(model, kind):
     target = sdm(truth).detach()
     low = torch.tensor([p.min for p in model.params], dtype=torch.float64)
     size = torch.tensor([p.max - p.min for p in model.params], dtype=torch.float64)
-    x = torch.full((1, 4), 0.5, dtype=torch.float64, requires_grad=True)
+    x = torch.zeros((1, 4), dtype=torch.float64, requires_grad=True)
 
     def loss():
         optimiser.zero_grad()
-        value = ((sdm(low + size * x.clamp(0, 1)) - target) ** 2).mean()
+        value = ((sdm(low + size * x.sigmoid()) - target) ** 2).mean()
         value.backward()
         return value
 
-    optimiser = torch.optim.Adam([x], lr=0.05) if kind == "adam" else torch.optim.LBFGS([x], max_iter=40)
+    optimiser = torch.optim.Adam([x], lr=0.1) if kind == "adam" else torch.optim.LBFGS([x], max_iter=60, line_search_fn="strong_wolfe")
     first = float(loss())
     for _ in range(150 if kind == "adam" else 2):
         optimiser.step(loss)

@@ -25,7 +25,8 @@ class _Maps(torch.autograd.Function):
     """Forward: maps; backward: vector-Jacobian products, both by the library."""
 
     @staticmethod
-    def forward(ctx: Any, params: Tensor, model: Model, options: dict[str, Any]) -> Tensor:
+    def forward(ctx: Any, *arguments: Any) -> Tensor:
+        params, model, options = arguments
         rows = params.detach().cpu().double().numpy()
         ctx.save_for_backward(params)
         ctx.model, ctx.options = model, options
@@ -35,11 +36,12 @@ class _Maps(torch.autograd.Function):
             maps = np.stack([model.jvp(still, row, **options).map.values for row in rows])
         else:
             maps = model.batch(rows, **options).values
-        return torch.from_numpy(maps).to(params)
+        result: Tensor = torch.from_numpy(maps).to(params)
+        return result
 
     @staticmethod
-    @torch.autograd.function.once_differentiable  # type: ignore[misc]
-    def backward(ctx: Any, adjoint: Tensor) -> tuple[Tensor, None, None]:
+    def backward(ctx: Any, *adjoints: Any) -> tuple[Tensor, None, None]:
+        (adjoint,) = adjoints
         (params,) = ctx.saved_tensors
         rows = params.detach().cpu().double().numpy()
         weights = adjoint.detach().cpu().float().numpy()

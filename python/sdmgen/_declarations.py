@@ -14,6 +14,7 @@ typedef struct sdm_grid { int64_t n[3]; double origin[3]; double spacing[3]; dou
 sdm_grid sdm_grid_centred(const int64_t n[3], double spacing, const double centre[3]);
 sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err);
 size_t sdm_grid_count(const sdm_grid *g);
+size_t sdm_grid_voxel(const sdm_grid *g, int64_t i, int64_t j, int64_t k);
 void sdm_grid_world(const sdm_grid *g, const double index[3], double world[3]);
 void sdm_grid_index(const sdm_grid *g, const double world[3], double index[3]);
 enum { SDM_BLOCK_SIZE = 8 };
@@ -76,6 +77,7 @@ sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
 sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t size, sdm_model **out, sdm_error *err);
 void sdm_model_free(sdm_model *m);
 const sdm_model_info *sdm_model_get_info(const sdm_model *m);
+int sdm_model_param_index(const sdm_model *m, const char *name);
 size_t sdm_model_scratch_bytes(const sdm_model *m, size_t n);
 void sdm_model_forward(const sdm_model *m, const double *params, size_t n, float *values, void *scratch);
 size_t sdm_model_jacobian_scratch_bytes(const sdm_model *m);

@@ -18,7 +18,7 @@ function(sdm_library target language)
   set_target_properties(${target} PROPERTIES OUTPUT_NAME ${LIB_OUTPUT} EXPORT_NAME ${LIB_EXPORT}
     LINKER_LANGUAGE ${language} VERSION ${PROJECT_VERSION}
     SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} INSTALL_RPATH "$ORIGIN"
-    BUILD_WITH_INSTALL_RPATH ON) # the files of the build folder can be copied, too
+    BUILD_RPATH_USE_ORIGIN ON) # the files of the build folder can be copied, too
   target_include_directories(${target} INTERFACE ${SDM_USER_HEADERS})
   target_link_libraries(${target} PRIVATE sdm_flags ${LIB_LINK})
   if(NOT SDM_SANITIZE)

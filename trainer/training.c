@@ -111,8 +111,7 @@ sdm_status sdm_training_run(const char *path, const sdm_registry *registry,
         return sdm_fail(err, SDM_E_ARG, "training: a path and a registry are needed");
     training t = {.opts = opts ? opts : &defaults};
     sdm_status s = read_config(&t, path, err);
-    if (!s)
-        s = sdm_train_check_folder(t.config->output.folder, t.opts->resume, t.opts->force, err);
+    if (!s) s = sdm_train_check_folder(t.config->output.folder, t.opts->resume, t.opts->force, err);
     if (!s) s = make_shape(&t, registry, err);
     if (!s) s = fit_grid(&t, err);
     if (!s) s = train(&t, result, err);

@@ -222,7 +222,8 @@ class Pose:
     def apply(self, points: ArrayLike) -> Float64:
         """points [n, 3] of the shape's frame, in the world"""
         matrix = self.matrix
-        result: Float64 = float64(points, (None, 3), "points") @ matrix[:3, :3].T + matrix[:3, 3]
+        x = finite(float64(points, (None, 3), "points"), "points")
+        result: Float64 = x @ matrix[:3, :3].T + matrix[:3, 3]
         return result
 
     def inverse(self) -> Pose:

@@ -61,8 +61,8 @@ typedef struct sdm_training_result {
  * the caller's own) and trains. The folder of the run then holds model.sdm and the other files of
  * docs/formats.md. Relative paths in the options of the shape start from the folder of the file.
  * opts and result may be NULL. SDM_E_CONFIG with one line "file:line:column: ..." for each mistake;
- * SDM_E_ARG (the folder), SDM_E_IO, SDM_E_NOMEM, SDM_E_PLUGIN, SDM_E_CANCELLED; SDM_E_QUALITY: the network gives numbers
- * that are not finite. [any thread; one run at a time in a folder] */
+ * SDM_E_ARG (the folder), SDM_E_IO, SDM_E_NOMEM, SDM_E_PLUGIN, SDM_E_CANCELLED; SDM_E_QUALITY: the
+ * network gives numbers that are not finite. [any thread; one run at a time in a folder] */
 SDM_API sdm_status sdm_training_run(const char *path, const sdm_registry *registry,
                                     const sdm_training_opts *opts, sdm_training_result *result,
                                     sdm_error *err);

@@ -73,8 +73,8 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
                      bool resume, const sdm_train_hooks *hooks, sdm_train_report *report,
                      sdm_error *err);
 
-/* Refuses a folder with a model or a checkpoint, unless `resume` (there must be a checkpoint then) or
-   `force` is set. SDM_E_ARG. */
+/* Refuses a folder with a model or a checkpoint, unless `resume` (there must be a checkpoint then)
+   or `force` is set. SDM_E_ARG. */
 sdm_status sdm_train_check_folder(const char *folder, bool resume, bool force, sdm_error *err);
 
 /* *out = the configured shape with its options, to be freed with sdm_instance_free(); `shape` is

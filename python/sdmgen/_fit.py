@@ -514,7 +514,7 @@ def _run(
             progress(FitProgress(phase, c.iteration, c.objective, c.step, params, pose, c.round, c.start, c.n_starts))
 
     opts.progress = callbacks.wrap("sdm_fit_opts", "progress", show, None)
-    opts.cancelled = callbacks.wrap("sdm_fit_opts", "cancelled", lambda _user: callbacks.raised is not None, True)
+    opts.cancelled = callbacks.wrap("sdm_fit_opts", "cancelled", callbacks.stopped, True)
     result = make("sdm_fit_result")
     try:
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import os
+import signal
 import threading
 from pathlib import Path
 from typing import Any, Callable, Optional, Sequence
@@ -109,11 +110,13 @@ def call(name: str, *arguments: Any) -> None:
 
 
 class Handle:
-    """An object of the C library, freed with its function when it is no longer used."""
+    """An object of the C library, freed with its function when it is no longer used; the objects that
+    it needs are kept until then."""
 
-    def __init__(self, free: str) -> None:
+    def __init__(self, free: str, *needs: Any) -> None:
         self.pointer = ctypes.c_void_p()
         self._free = function(free)
+        self._needs = needs
 
     def out(self) -> Any:
         """The place where a function stores the new object."""
@@ -170,14 +173,34 @@ class Callbacks:
 
     def stopped(self, _user: Any = None) -> bool:
         """For `cancelled` callbacks: lets Python handle signals such as Ctrl-C."""
-        return False
+        return self.raised is not None
+
+    def _note(self, handler: Callable[..., Any]) -> Callable[..., None]:
+        """A handler of signals that keeps the exception of another one for the end of the call: one
+        that is raised at the first instruction of a callback would be lost."""
+
+        def note(*arguments: Any) -> None:
+            try:
+                handler(*arguments)
+            except BaseException as raised:
+                self.raised = raised
+
+        return note
 
     def call(self, name: str, *arguments: Any) -> None:
+        """Calls a function that these callbacks belong to."""
+        main = threading.current_thread() is threading.main_thread()
+        handler = signal.getsignal(signal.SIGINT) if main else None
+        if callable(handler):
+            signal.signal(signal.SIGINT, self._note(handler))
         try:
             call(name, *arguments)
         except Exception:
             if self.raised is None:
                 raise
+        finally:
+            if callable(handler):
+                signal.signal(signal.SIGINT, handler)
         raised, self.raised = self.raised, None
         if raised is not None:
             raise raised

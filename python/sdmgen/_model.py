@@ -135,7 +135,8 @@ class Model:
         """The shape that the network was trained on, with the same options, for exact maps."""
         with self._lock:
             if self._shape is None:
-                registry, instance = Registry(self._plugin), Handle("sdm_instance_free")
+                registry = Registry(self._plugin)
+                instance = Handle("sdm_instance_free", registry)
                 call("sdm_runtime_instance", self, registry, instance.out())
                 self._shape = InstanceShape(registry, instance, self.shape_name)
             return self._shape
@@ -421,7 +422,7 @@ class Field:
         self._model, self._opts, self._derivatives = model, opts, flag(derivatives, "derivatives")
         self.params = params
         self._exact = bool(opts.exact_shape)
-        self._handle = Handle("sdm_field_free")
+        self._handle = Handle("sdm_field_free", model._handle, opts, model._shape and model._shape._instance)
         result = make("sdm_result")
         call("sdm_field_create", model, byref(opts), self._derivatives, self._handle.out())
         model._call(self._exact, "sdm_field_set_params", self, address(params), byref(result))

@@ -123,7 +123,7 @@ class Shape:
             raise argument_error("shape: need the name of a shape, or a function that returns vertices and triangles")
         words = [(text_bytes(key, "option"), text_bytes(value, f"option {key}")) for key, value in options.items()]
         named = array("sdm_named_text", words)
-        self._instance = Handle("sdm_instance_free")
+        self._instance = Handle("sdm_instance_free", self._registry, self._python)
         folder = None if base_dir is None else path_bytes(base_dir, "base_dir")
         call("sdm_instance_create", self._registry.find(self.name), named, len(words), folder, self._instance.out())
         self.params = _params(self._instance)

@@ -1,8 +1,11 @@
 """Maps, derivatives and distances: the same bits as those of the program."""
 
 import multiprocessing
+import os
 import pickle
+import signal
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -197,6 +200,20 @@ def test_eight_threads(model):
     for thread in threads:
         thread.join()
     assert not wrong
+
+
+def test_ctrl_c_stops_an_exact_map():
+    mesh, finished = sdmgen.Shape("cochlea").mesh(), False
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        timer.start()
+        sdmgen.exact(mesh, size=(320, 320, 320), threads=1)
+        finished = True
+        time.sleep(60)
+    assert not finished
+    # the handler of before is back, and the mesh serves as before
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert sdmgen.exact(mesh, size=(5, 5, 5)).shape == (5, 5, 5)
 
 
 def test_fork_after_use(model):

@@ -1,6 +1,7 @@
 """Shapes written in Python: exact maps, derivatives, training and fits through the table of the
 library; their mistakes."""
 
+import gc
 import threading
 
 import numpy as np
@@ -66,6 +67,17 @@ def test_names_options_and_distributions():
     torus = sdmgen.Shape("torus")
     inside = torus.distance([torus.defaults[0], 0, 0])
     assert inside == pytest.approx(-torus.defaults[1])
+
+
+def test_objects_outlive_what_they_need(model, model_file):
+    """Meshes, fields and shapes are used after the objects that they came from are gone."""
+    for _ in range(20):
+        fields = [sdmgen.Model(model_file).field(outside="exact") for _ in range(2)]
+        shapes = [sdmgen.Shape(egg, PARAMS) for _ in range(2)] + [sdmgen.Model(model_file).shape]
+        bands = [sdmgen.Shape("torus").mesh().report() for _ in range(2)]
+        gc.collect()
+        assert fields[0].sample([[9, 9, 9]]).distance > 3 and fields[1].grid(model.grid).shape == model.grid.shape
+        assert len(shapes[0].mesh().vertices) > 100 and shapes[2].mesh().audit().closed and bands[0].sign
 
 
 def fails(function, kind, text, cause=None):

@@ -95,3 +95,8 @@ def test_the_source_archive(tmp_path):
 def test_without_a_library(tmp_path):
     done = built(tmp_path, "b.build_wheel('..')")
     assert done.returncode != 0 and "set SDMGEN_LIBRARY to the path of libsdmgen.so" in done.stderr + done.stdout
+    plain = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(SOURCE / "python"), "PYTHONDONTWRITEBYTECODE": "1"}
+    words = [sys.executable, "-c", "import sdmgen; sdmgen.Shape('torus')"]
+    done = subprocess.run(words, env=plain, cwd=tmp_path, capture_output=True, text=True)
+    if done.returncode:  # no library is installed on this system
+        assert "ImportError: libsdmgen.so.0.1 cannot be loaded" in done.stderr and "set SDMGEN_LIBRARY" in done.stderr

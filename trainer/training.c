@@ -1,121 +1,170 @@
-/* Trains from a configuration file, for programs that use the library. */
-#include "sdm/training.h"
+/* The training of one kind of network from beginning to end: maps, network, training, model file.
+ */
+#include "training.h"
 
+#include <math.h>
 #include <stdio.h>
-#include <string.h>
 
-#include "sdm/internal/train.h"
+#include "data/dataset_fill.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/text.h"
 #include "sdm/memory.h"
+#include "set_up.h"
+#include "state/checkpoint.h"
+#include "state/export_model.h"
+#include "state/new_samples.h"
+#include "state/progress.h"
 
-/* A run: what is freed at its end, and the callbacks of the caller. */
-typedef struct training {
-    const sdm_training_opts *opts;
-    sdm_config *config;
-    sdm_instance *shape;
-} training;
+/* true: the folder holds the model of the kind that was trained before. */
+static bool is_second(const trainer *t) { return t->turns->at > 0; }
 
-static const char *phase_name(sdm_phase phase)
+static void fill_report(void *user, size_t done, size_t all)
 {
-    static const char *const names[] = {"data", "bases", "fit", "refine", "evaluate"};
-    return names[phase];
+    trainer *t = user;
+    t->pace.done = (int64_t)done;
+    trainer_report(t, trainer_start_fraction(t), done == all);
 }
 
-static void show_progress(void *user, const sdm_progress *p)
+static bool fill_cancelled(void *user) { return trainer_cancelled(user); }
+
+/* true when the computation of the data has used half of a time budget. */
+static bool fill_enough(void *user) { return trainer_start_fraction(user) > 0.5; }
+
+/* Makes all maps needed before training. resumed: exactly as many as the interrupted run made, else
+ * as many as the time budget allows. */
+static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
 {
-    const training *t = user;
-    const sdm_training_progress shown = {.phase = phase_name(p->phase),
-                                         .fraction = p->fraction,
-                                         .step = p->step,
-                                         .maps = p->samples,
-                                         .loss_mm2 = p->loss,
-                                         .heldout_rmse_mm = p->heldout_rmse_mm,
-                                         .seconds = p->seconds,
-                                         .seconds_left = p->seconds_left};
-    t->opts->progress(t->opts->user, &shown);
+    const size_t start = t->data.n_start;
+    const fill_hooks hooks = {.report = fill_report,
+                              .cancelled = fill_cancelled,
+                              .enough = resumed ? NULL : fill_enough,
+                              .user = t};
+    t->phase = SDM_PHASE_DATA;
+    trainer_pace_start(t, 1);
+    t->data.known = t->tried.n_voxels ? &t->tried : NULL;
+    const sdm_status s = trainer_dataset_fill(&t->data, t->n_threads, &hooks, err);
+    t->data.known = NULL;
+    trainer_dataset_dispose(&t->tried);
+    if (s) return s;
+    if (t->data.n_start < start)
+        trainer_message(t,
+                        "half of the budget is over after %zu of %zu random maps: training starts "
+                        "with these (lower "
+                        "data.start or raise "
+                        "train.minutes)",
+                        t->data.n_start, start);
+    return trainer_check_grid(t, err);
 }
 
-static bool is_cancelled(void *user)
+/* Prepares everything for the first step: maps, network, producer. A resumed run makes the n_taken
+ * random samples of the checkpoint again. */
+static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_error *err)
 {
-    const training *t = user;
-    return t->opts->cancelled(t->opts->user);
-}
-
-static void show_message(void *user, const char *line)
-{
-    const training *t = user;
-    t->opts->message(t->opts->user, line);
-}
-
-static sdm_status read_config(training *t, const char *path, sdm_error *err)
-{
-    const sdm_training_opts *o = t->opts;
-    sdm_status s = SDM_ALLOC(&t->config, 1, "configuration", err);
-    if (!s) s = sdm_config_read(path, o->settings, o->n_settings, t->config, err);
-    char *folder = s ? NULL : t->config->output.folder;
-    if (!folder || !o->folder) return s;
-    if (strlen(o->folder) >= sizeof t->config->output.folder)
-        return sdm_fail(err, SDM_E_ARG, "the folder '%.100s...': the name is too long", o->folder);
-    strcpy(folder, o->folder);
-    return SDM_OK;
-}
-
-static sdm_status make_shape(training *t, const sdm_registry *registry, sdm_error *err)
-{
-    sdm_config *c = t->config;
-    const char *near = NULL;
-    const sdm_shape *shape = sdm_registry_find(registry, c->shape.name, &near);
-    if (shape) return sdm_train_shape(c, shape, &t->shape, err);
-    char where[1200];
-    return sdm_fail(err, SDM_E_CONFIG, "%s: unknown shape '%s'%s%s%s",
-                    sdm_config_where(c, c->shape.mark, where), c->shape.name,
-                    near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
-}
-
-/* Completes a grid that is to be fitted to the shapes, and tells its numbers. */
-static sdm_status fit_grid(const training *t, sdm_error *err)
-{
-    sdm_text line = {0};
-    const sdm_status s = sdm_train_grid(t->config, t->shape, &line, err);
-    if (!s && line.data && t->opts->message) t->opts->message(t->opts->user, line.data);
-    sdm_text_dispose(&line);
+    sdm_status s = train_make_maps(t, resumed, err);
+    t->phase = SDM_PHASE_BASES;
+    trainer_pace_start(t, 0);
+    trainer_report(t, trainer_start_fraction(t), true);
+    if (!s) s = t->kind->begin(t, err);
+    if (!s) s = trainer_samples_start(t, err);
+    if (!s && resumed) s = trainer_samples_retake(t, n_taken, err);
+    if (s == SDM_E_CANCELLED && is_second(t))
+        s = sdm_fail(err, s,
+                     "stopped on request before the training of pod began: %s holds the model of "
+                     "kind template",
+                     t->folder);
+    else if (s == SDM_E_CANCELLED)
+        s = sdm_fail(err, s, "stopped on request before the training began: %s is as it was",
+                     t->folder);
     return s;
 }
 
-static sdm_status train(training *t, sdm_training_result *result, sdm_error *err)
+/* Runs all steps from set-up to trained weights. config: the open temporary file of config.yaml. It
+   is committed, and the files of an older run are removed, only after all checks of the
+   configuration: until then the folder stays as it was. The second training of a run leaves the
+   files of the first alone. */
+static sdm_status train_run(trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
 {
-    const sdm_training_opts *o = t->opts;
-    const sdm_train_hooks hooks = {.progress = o->progress ? show_progress : NULL,
-                                   .cancelled = o->cancelled ? is_cancelled : NULL,
-                                   .message = o->message ? show_message : NULL,
-                                   .user = t};
-    sdm_train_report report = {.steps = 0};
-    const sdm_status s =
-        sdm_train(t->config, t->shape, t->config->output.folder, o->resume, &hooks, &report, err);
-    if (s || !result) return s;
-    *result = (sdm_training_result){.accuracy = report.accuracy,
-                                    .steps = report.steps,
-                                    .maps = report.samples,
-                                    .seconds = report.seconds,
-                                    .grade = sdm_grade_name(report.verdict.grade)};
-    snprintf(result->model_path, sizeof result->model_path, "%s", report.model_path);
-    snprintf(result->sentence, sizeof result->sentence, "%s", report.verdict.sentence);
-    return SDM_OK;
+    bool found = false;
+    sdm_status s = trainer_set_up(t, err);
+    if (!s && resume) {
+        s = trainer_checkpoint_read(t, &found, err);
+        if (!s && !found)
+            trainer_message(t, "no checkpoint in %s: training starts from the beginning",
+                            t->folder);
+    }
+    if (s) return s;
+    const sdm_phase from = t->phase;
+    const double resumed_seconds = trainer_seconds(t);
+    s = train_prepare(t, found, t->data.n_taken, err);
+    if (!s && !resume && !is_second(t)) s = trainer_checkpoint_clear_folder(t, err);
+    if (!s && !is_second(t)) s = sdm_outfile_commit(config, err);
+    if (s) return s;
+
+    if (found) {
+        // the time in which the maps were made again does not count
+        t->started += trainer_seconds(t) - resumed_seconds;
+        t->phase = from;
+    } else {
+        trainer_enter(t, SDM_PHASE_MODE_FIT);
+    }
+    t->last_checkpoint = t->prepared_seconds = trainer_seconds(t);
+    return t->kind->run(t, found, err);
 }
 
-sdm_status sdm_training_run(const char *path, const sdm_registry *registry,
-                            const sdm_training_opts *opts, sdm_training_result *result,
-                            sdm_error *err)
+/* Tells if the run took longer than its budget of time, and why. measured: seconds of the
+ * measurement of the model. */
+static void tell_overrun(trainer *t, double measured)
 {
-    static const sdm_training_opts defaults = {.settings = NULL};
-    if (!path || !registry || (opts && opts->n_settings && !opts->settings))
-        return sdm_fail(err, SDM_E_ARG, "training: a path and a registry are needed");
-    training t = {.opts = opts ? opts : &defaults};
-    sdm_status s = read_config(&t, path, err);
-    if (!s) s = sdm_train_check_folder(t.config->output.folder, t.opts->resume, t.opts->force, err);
-    if (!s) s = make_shape(&t, registry, err);
-    if (!s) s = fit_grid(&t, err);
-    if (!s) s = train(&t, result, err);
-    sdm_instance_free(t.shape);
-    sdm_free(t.config);
+    const double budget = t->config->train.minutes * 60, over = trainer_seconds(t) - budget;
+    if (!trainer_by_time(t) || over < fmax(1, 0.02 * budget)) return;
+    trainer_message(
+        t,
+        "the run took %.0f s longer than train.minutes: the maps, bases and trials before "
+        "the first step took %.0f s, the measurement of the model %.0f s (lower "
+        "data.start, data.static or data.holdout, or raise train.minutes)",
+        over, t->prepared_seconds, measured);
+}
+
+/* Measures the model, and writes it unless the one that the folder holds is better. If it cannot be
+ * written, a checkpoint keeps the trained weights. */
+static sdm_status train_finish(trainer *t, sdm_outfile **config, sdm_train_report *report,
+                               sdm_error *err)
+{
+    const sdm_phase phase = t->phase;
+    const double started = trainer_seconds(t);
+    const size_t lines = t->metrics->size;
+    t->phase = SDM_PHASE_EVALUATE;
+    trainer_report(t, 1, true);
+    sdm_status s = trainer_export_judge(t, report, err);
+    if (!s && (!is_second(t) || trainer_second_wins(t->turns, &report->accuracy))) {
+        s = trainer_export_model(t, err);
+        if (!s && is_second(t)) s = sdm_outfile_commit(config, err);
+    }
+    report->seconds = trainer_seconds(t);
+    if (!s) {
+        tell_overrun(t, report->seconds - started);
+        return trainer_checkpoint_remove(t, err);
+    }
+    t->phase = phase;
+    t->metrics->size = lines;
+    if (s != SDM_E_QUALITY && !trainer_checkpoint_write(t, NULL))
+        trainer_message(t, "a checkpoint is in %s: go on with --resume", t->folder);
+    return s;
+}
+
+sdm_status trainer_training(trainer *t, bool resume, sdm_train_report *report, sdm_error *err)
+{
+    sdm_outfile *config = NULL;
+    t->kind = trainer_kind_find(t->config->network.kind);
+    sdm_status s = trainer_export_config(t, &config, err);
+    if (!s) s = train_run(t, resume, &config, err);
+    trainer_producer_stop(t->producer);
+    t->producer = NULL;
+    if (!s) s = train_finish(t, &config, report, err);
+    sdm_outfile_discard(&config);
+    t->kind->dispose(t);
+    trainer_dataset_dispose(&t->data);
+    trainer_dataset_dispose(&t->tried);
+    sdm_free(t->blocks);
     return s;
 }

@@ -1,5 +1,5 @@
 /* The training of the library: the model of a configuration file, settings that replace keys,
- * mistakes, and a stop on request. Tests: training.c
+ * mistakes, and a stop on request. Tests: train_file.c
  * train_folder.c train_shape.c */
 #include <math.h>
 #include <setjmp.h>
@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "sdm/training.h"
+#include "sdm/trainer.h"
 #include "train_tools.h"
 
 static char path[64];

@@ -84,7 +84,7 @@ foreach(folder framework runtime shapes trainer)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm
       DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h"
-      PATTERN internal EXCLUDE PATTERN vdb.h EXCLUDE PATTERN trainer.h EXCLUDE)
+      PATTERN internal EXCLUDE PATTERN vdb.h EXCLUDE PATTERN train_file.h EXCLUDE)
   endif()
 endforeach()
 if(SDM_VDB)
@@ -92,7 +92,7 @@ if(SDM_VDB)
     DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sdm)
 endif()
 if(TARGET sdmgen_training)
-  install(FILES ${PROJECT_SOURCE_DIR}/trainer/include/sdm/trainer.h
+  install(FILES ${PROJECT_SOURCE_DIR}/trainer/include/sdm/train_file.h
     DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sdm)
 endif()
 

@@ -1,5 +1,5 @@
 /* Trains from a configuration file, for programs that use the library. */
-#include "sdm/trainer.h"
+#include "sdm/train_file.h"
 
 #include <stdio.h>
 #include <string.h>

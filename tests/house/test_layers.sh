@@ -49,7 +49,7 @@ check() {
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
          own("all", "sdmgen") # the header that includes all public ones
-         own("trainer", "train trainer verdict")
+         own("trainer", "train train_file verdict")
         parts("core", "core")
         parts("config", "core config")
         parts("geom", "core geom")

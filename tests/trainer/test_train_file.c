@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "sdm/trainer.h"
+#include "sdm/train_file.h"
 #include "train_tools.h"
 
 static char path[64];

@@ -1,7 +1,7 @@
 /* Trains a network as a configuration file says: the same run as that of `sdmgen train`. A library
  * of its own, since it needs libyaml and, for pictures, cairo. */
-#ifndef SDM_TRAINER_H
-#define SDM_TRAINER_H
+#ifndef SDM_TRAIN_FILE_H
+#define SDM_TRAIN_FILE_H
 
 #include <stdbool.h>
 

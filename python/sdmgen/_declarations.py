@@ -133,7 +133,7 @@ typedef enum sdm_voxel_type { SDM_VOXEL_UINT8 = 0, SDM_VOXEL_INT8 = 1, SDM_VOXEL
 size_t sdm_voxel_size(sdm_voxel_type type);
 const char *sdm_voxel_name(sdm_voxel_type type);
 typedef struct sdm_segment { char name[96]; char id[96]; int64_t value; size_t layer; } sdm_segment;
-typedef struct sdm_volume { sdm_grid grid; bool placed; bool checked; size_t n_layers; float *values; sdm_voxel_type stored; float min, max; size_t n_nan, n_inf; sdm_segment *segments; size_t n_segments; char text[256]; } sdm_volume;
+typedef struct sdm_volume { sdm_grid grid; bool placed; bool checked; size_t n_layers; float *values; sdm_voxel_type stored; float min, max; size_t n_nan, n_inf; sdm_segment *segments; size_t n_segments; char text[256]; double frames_differ_mm; bool frames_mirrored; } sdm_volume;
 sdm_status sdm_volume_read(const char *path, sdm_volume *out, sdm_error *err);
 void sdm_volume_dispose(sdm_volume *v);
 bool sdm_volume_knows(const char *path);
@@ -185,9 +185,10 @@ typedef struct sdm_fit_progress { sdm_fit_phase phase; size_t iteration; double 
 typedef struct sdm_fit_opts { sdm_fit_model image_model; double l_ref; double blur; bool keep_blur; sdm_fit_appearance appearance; bool keep_appearance; double tissue_mm; double point_sd; double point_dof; const double *start_params; sdm_pose start_pose; sdm_fit_turns turns; size_t n_turns; double pivot[3]; bool keep_params; bool keep_pose; double prior_sd; double prior_rotation_sd; double prior_translation_sd; double margin; bool use_box; double box_min[3], box_max[3]; double cavity; double least_inside; size_t max_iterations; size_t max_polish_iterations; double eps; double polish_eps; int n_threads; void (*progress)(void *user, const sdm_fit_progress *p); bool (*cancelled)(void *user); void *user; } sdm_fit_opts;
 sdm_fit_opts sdm_fit_defaults(void);
 sdm_fit_opts sdm_fit_defaults_for(double voxel);
-typedef struct sdm_fit_result { size_t n_params; double *params; sdm_pose pose; double *covariance; double *sd; double *correlation; bool *at_bound; bool *by_prior; bool start_clamped; size_t n_exact_outside; bool converged; char reason[256]; size_t n_iterations; double *objective; double log_likelihood; double log_likelihood_without; double evidence; double inside_share; size_t n_used, n_nan; size_t n_cavity; double noise_factor; double model_error_mm; double blur; sdm_fit_appearance appearance; double point_sd; size_t turn; size_t n_network, n_exact; double seconds, seconds_network, seconds_exact, seconds_search; } sdm_fit_result;
+typedef struct sdm_fit_result { size_t n_params; double *params; sdm_pose pose; double *covariance; double *sd; double *correlation; bool *at_bound; bool *by_prior; bool start_clamped; size_t n_exact_outside; bool converged; char reason[256]; size_t n_iterations; double *objective; double log_likelihood; double log_likelihood_without; double evidence; double inside_share; size_t n_used, n_nan; size_t n_cavity; double noise_factor; double model_error_mm; double blur; sdm_fit_appearance appearance; double point_sd; size_t turn; size_t n_network, n_exact; double seconds, seconds_network, seconds_exact, seconds_search; double outliers; char open_motions[512]; double kept_pose_motion, kept_pose_gain; double widest_space; } sdm_fit_result;
 sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err);
 void sdm_fit_dispose(sdm_fit_result *r);
+sdm_status sdm_fit_surface_points(const sdm_mesh *mesh, size_t n, int n_threads, double *points, sdm_error *err);
 sdm_status sdm_fit_close_labels(const sdm_grid *grid, double radius, int n_threads, float *values, sdm_error *err);
 sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const sdm_pose *pose, const sdm_grid *grid, int n_threads, float *values, sdm_error *err);
 sdm_status sdm_fit_pose_from_points(const double *shape, const double *world, size_t n, sdm_pose *out, sdm_error *err);

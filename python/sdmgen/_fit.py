@@ -25,7 +25,7 @@ Label = Union[int, str]
 Target = Union[Image, Mesh, ArrayLike, Any]
 _KEEP = ("parameters", "pose", "blur", "appearance")
 _POSE = ("rotation_x", "rotation_y", "rotation_z", "translation_x", "translation_y", "translation_z")
-_TURNS_ABOUT_AXIS, _TURNS_ALL, _POINTS_MAX = 12, 60, 50000
+_TURNS_ABOUT_AXIS, _TURNS_ALL, _SURFACE_POINTS = 12, 60, 20000
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,15 @@ def _labels(value: Union[None, Label, Sequence[Label]]) -> list[Label]:
     return list(value)
 
 
-def _open_target(target: Target) -> Union[Image, Float64]:
+def _surface_points(mesh: Mesh, threads: int) -> Float64:
+    """Points that lie evenly on the surface of a mesh."""
+    points = np.empty((_SURFACE_POINTS, 3))
+    n = whole(threads, "threads", 0)
+    call("sdm_fit_surface_points", byref(mesh._c), len(points), n, address(points))
+    return points
+
+
+def _open_target(target: Target, threads: int) -> Union[Image, Float64]:
     """An image, or points [n, 3]."""
     if isinstance(target, Image):
         return target
@@ -214,8 +222,7 @@ def _open_target(target: Target) -> Union[Image, Float64]:
             return read_image(target)
         target = Mesh.read(target) if _ends(target, MESHES) else read_array(target)
     if isinstance(target, Mesh):
-        step = 1 + max(len(target.vertices) - 1, 0) // _POINTS_MAX
-        target = target.vertices[::step]
+        target = _surface_points(target, threads) if len(target.triangles) else target.vertices
     points = finite(float64(target, (None, 3), "points"), "points")
     if len(points) < 3:
         raise FormatError("format", f"{len(points)} points, need 3 or more")
@@ -417,7 +424,7 @@ def fit(
     from_where, start_params, clamped = _open_source(source, params, exact, polish, policy, spacing)
     start = _Start(rotation, translation, start_centre, start_axis, start_points, turns, turns_sphere)
     start.check()
-    opened = _open_target(target)
+    opened = _open_target(target, threads)
     chosen_labels = _labels(label)
     if chosen_labels and not isinstance(opened, Image):
         raise argument_error("label: it applies to images")

@@ -49,7 +49,7 @@ check() {
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
          own("all", "sdmgen") # the header that includes all public ones
-         own("trainer", "train verdict")
+         own("trainer", "train train_file verdict")
         parts("core", "core")
         parts("config", "core config")
         parts("geom", "core geom")
@@ -58,7 +58,7 @@ check() {
         parts("shape", "core geom io shape")
         parts("shapes", "core geom shape shapes")
         parts("runtime", "core geom nn io shape runtime")
-        parts("all", "core geom nn io shape shapes runtime all")
+        parts("all", "core geom nn io shape shapes runtime trainer all")
         parts("trainer", "core config geom nn io shape trainer")
         parts("cli", "core config geom nn io shape shapes runtime trainer cli")
         rooms("framework/geom/", "memory simd exactly mesh solid features map sign layers points methods .")

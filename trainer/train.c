@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "data/dataset_fill.h"
+#include "fine/fine_fit.h"
 #include "race.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/team.h"
@@ -142,7 +143,8 @@ static sdm_status train_finish(trainer *t, sdm_train_report *report, sdm_error *
     const size_t lines = t->metrics->size;
     t->phase = SDM_PHASE_EVALUATE;
     trainer_report(t, 1, true);
-    const sdm_status s = trainer_export_model(t, report, err);
+    sdm_status s = trainer_export_model(t, report, err);
+    if (!s) s = trainer_fine_add(t, err);
     if (!s) {
         tell_overrun(t, trainer_seconds(t) - started);
         return trainer_checkpoint_remove(t, err);

@@ -85,7 +85,7 @@ static sdm_status fit_shape(cli_fit *f, sdm_error *err)
     f->opts.user = &w;
     cli_progress_start(&w.bar);
     const sdm_status s = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
-    cli_progress_clear(&w.bar);
+    cli_progress_end(&w.bar, !s || s == SDM_E_QUALITY);
     f->found = f->result.objective && f->result.params;
     f->doubt.status = s;
     if (!s || s == SDM_E_QUALITY) return SDM_OK;

@@ -86,6 +86,7 @@ int main(int argc, char **argv)
     cli_args args;
     sdm_error err = {0};
     const sdm_status s = cli_parse(argc, argv, &args, &err);
+    cli_set_form(args.progress);
     int code;
     if (s)
         code = cli_report(&err);

@@ -18,7 +18,7 @@
 #include "state/progress.h"
 
 /* The sizes were chosen on the cochlea (docs/notes/network.md). */
-enum { SHAPES = 256, PER_SHAPE = 1024, TEST_SHAPES = 16, BATCH = 256, STEPS = 12000 };
+enum { SHAPES = 512, PER_SHAPE = 1024, TEST_SHAPES = 16, BATCH = 256, STEPS = 24000 };
 enum { IN = SDM_FINE_INPUTS, OUT = SDM_FINE_OUTPUTS };
 #define THRESHOLD 0.4f
 #define RATE 4e-3

@@ -7,8 +7,8 @@
 #include "bench.h"
 #include "experiment_command.h"
 #include "report/terminal.h"
-#include "sdm/field.h"
 #include "report/train_progress.h"
+#include "sdm/field.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
@@ -77,7 +77,8 @@ sdm_status cli_experiment_provide_model(const cli_experiment_run *run,
     return s;
 }
 
-/* *mb = growth of the resident memory while the model is opened and makes a map on the grid, MiB. */
+/* *mb = growth of the resident memory while the model is opened and makes a map on the grid, MiB.
+ */
 static sdm_status measure_memory(const char *path, const double *p, const sdm_grid *grid,
                                  float *values, double *mb, sdm_error *err)
 {
@@ -143,7 +144,8 @@ sdm_status cli_experiment_network(const cli_experiment_run *run, cli_experiment_
 {
     char path[SDM_PATH_TEXT_MAX];
     sdm_model *model = NULL;
-    sdm_status s = cli_experiment_path(run, run->e->rows[job->index].network_row, "model.sdm", path, err);
+    sdm_status s =
+        cli_experiment_path(run, run->e->rows[job->index].network_row, "model.sdm", path, err);
     if (!s) s = cli_experiment_provide_model(run, job, out, err);
     if (!s) s = sdm_model_open(path, &model, err);
     if (!s) s = measure_network(run, job, path, model, out, err);

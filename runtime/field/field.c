@@ -84,7 +84,8 @@ static sdm_status open_exact(sdm_field *f, sdm_error *err)
     return s ? s : sdm_exact_create(&f->mesh, &exact, &f->engine, err);
 }
 
-/* maps[1 + n_params or 1][voxels of the model's grid] = the map by the network, and its derivatives.
+/* maps[1 + n_params or 1][voxels of the model's grid] = the map by the network, and its
+ * derivatives.
  */
 static sdm_status network_maps(const sdm_field *f, float *maps, sdm_error *err)
 {
@@ -104,8 +105,8 @@ static sdm_status fine_maps(const sdm_field *f, float *maps, sdm_error *err)
                         sizeof *coarse, "maps of a field", err);
     if (!s) s = network_maps(f, coarse, err);
     if (!s)
-        s = sdm_fine_map(sdm_model_fine(f->model), &f->info->grid, n_tangents, coarse,
-                         f->n_threads, maps, err);
+        s = sdm_fine_map(sdm_model_fine(f->model), &f->info->grid, n_tangents, coarse, f->n_threads,
+                         maps, err);
     sdm_free(coarse);
     return s;
 }

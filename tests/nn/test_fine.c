@@ -56,7 +56,10 @@ static void fill_map(double shift, float *map)
 
 /* ---- halfway between the voxels */
 
-static double quintic(double x) { return 0.3 + x * (1 - x * (0.7 - x * (0.2 - x * (0.05 + 0.01 * x)))); }
+static double quintic(double x)
+{
+    return 0.3 + x * (1 - x * (0.7 - x * (0.2 - x * (0.05 + 0.01 * x))));
+}
 
 static void test_polynomials_are_continued(void **state)
 {
@@ -70,8 +73,9 @@ static void test_polynomials_are_continued(void **state)
         float map[600], fine[13 * 17 * 15];
         double largest = 0;
         for (int64_t i = 0; i < n[0] * n[1] * n[2]; i++)
-            map[i] = (float)(quintic((double)(i % n[0]) / 4) * quintic((double)(i / n[0] % n[1]) / 4) *
-                             quintic((double)(i / n[0] / n[1]) / 4));
+            map[i] =
+                (float)(quintic((double)(i % n[0]) / 4) * quintic((double)(i / n[0] % n[1]) / 4) *
+                        quintic((double)(i / n[0] / n[1]) / 4));
         assert_false(sdm_fine_map(NULL, &g, 0, map, 2, fine, NULL));
         for (int64_t i = 0; i < (int64_t)sdm_grid_count(&f); i++) {
             const int64_t x = i % f.n[0], y = i / f.n[0] % f.n[1], z = i / f.n[0] / f.n[1];
@@ -315,7 +319,7 @@ static void test_damaged_sections_are_refused(void **state)
     assert_non_null(strstr(err.text, "section fine"));
     open_damaged(plain, plain_size, &good, 8, &err);
     open_damaged(plain, plain_size, &good, 0, &err);
-    static const uint32_t heads[][3] = {{6, 65, 8},  {0, 65, 8}, {WIDTH, 64, 8},
+    static const uint32_t heads[][3] = {{6, 65, 8},     {0, 65, 8},    {WIDTH, 64, 8},
                                         {WIDTH, 65, 7}, {4096, 65, 8}, {UINT32_MAX, 65, 8}};
     for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) {
         bad = good;
@@ -352,15 +356,14 @@ static void test_each_allocation_may_fail(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_polynomials_are_continued),
-        cmocka_unit_test(test_short_axes),
-        cmocka_unit_test(test_changes_agree_with_the_formulas),
-        cmocka_unit_test(test_cells_and_inputs),
-        cmocka_unit_test(test_derivatives_agree_with_differences),
-        cmocka_unit_test(test_same_bits_for_threads_and_processors),
-        cmocka_unit_test(test_section_of_the_file),
-        cmocka_unit_test(test_damaged_sections_are_refused),
-        cmocka_unit_test(test_each_allocation_may_fail)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_polynomials_are_continued),
+                                       cmocka_unit_test(test_short_axes),
+                                       cmocka_unit_test(test_changes_agree_with_the_formulas),
+                                       cmocka_unit_test(test_cells_and_inputs),
+                                       cmocka_unit_test(test_derivatives_agree_with_differences),
+                                       cmocka_unit_test(test_same_bits_for_threads_and_processors),
+                                       cmocka_unit_test(test_section_of_the_file),
+                                       cmocka_unit_test(test_damaged_sections_are_refused),
+                                       cmocka_unit_test(test_each_allocation_may_fail)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

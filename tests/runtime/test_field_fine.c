@@ -1,6 +1,6 @@
-/* Fields of a model with a fine level: its own grid, the grid of the fine level, other grids, points
- * and bands against each other, derivatives against differences.
- * Tests: field.c field_grid.c field_points.c field_band.c */
+/* Fields of a model with a fine level: its own grid, the grid of the fine level, other grids,
+ * points and bands against each other, derivatives against differences. Tests: field.c field_grid.c
+ * field_points.c field_band.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -115,11 +115,10 @@ static void test_points_and_bands_agree_with_grids(void **state)
         const int64_t at[3] = {v % 33, v / 33 % 31, v / 33 / 31};
         const uint32_t tile = b.tile[(at[2] / 8 * b.n[1] + at[1] / 8) * b.n[0] + at[0] / 8];
         const float d = values[v];
-        const float in_band = tile == SDM_TILE_INSIDE    ? -width
-                              : tile == SDM_TILE_OUTSIDE ? width
-                                                         : b.values[tile][(at[2] % 8 * 8 +
-                                                                           at[1] % 8) * 8 +
-                                                                          at[0] % 8];
+        const float in_band = tile == SDM_TILE_INSIDE ? -width
+                              : tile == SDM_TILE_OUTSIDE
+                                  ? width
+                                  : b.values[tile][(at[2] % 8 * 8 + at[1] % 8) * 8 + at[0] % 8];
         assert_true(in_band == (d >= width ? width : d <= -width ? -width : d));
     }
     sdm_blocks_dispose(&b);

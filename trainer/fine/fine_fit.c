@@ -37,8 +37,7 @@ typedef struct fit {
 static sdm_status fit_create(fit *f, size_t width, sdm_error *err)
 {
     enum { ALGEBRAIC = 4 };
-    f->arch =
-        (sdm_pod_arch){.n_inputs = IN, .depth = 2, .width = width, .activation = ALGEBRAIC};
+    f->arch = (sdm_pod_arch){.n_inputs = IN, .depth = 2, .width = width, .activation = ALGEBRAIC};
     f->last = trainer_mlp_count(&f->arch);
     const size_t n = f->last + (width + 1) * OUT;
     sdm_status s = trainer_parameters_create(&f->w, n, err);
@@ -129,8 +128,8 @@ static sdm_status fit_run(fit *f, const trainer *t, const fine_samples *s, sdm_e
         if (trainer_cancelled(t)) return sdm_fail(err, SDM_E_CANCELLED, "stopped on request");
         for (size_t i = 0; i < BATCH; i++)
             load(f, s, i,
-                 (size_t)sdm_rng_below(t->data.seed, STREAM_FINE + 3,
-                                       (uint64_t)step * BATCH + i, s->n));
+                 (size_t)sdm_rng_below(t->data.seed, STREAM_FINE + 3, (uint64_t)step * BATCH + i,
+                                       s->n));
         const double rate = RATE * trainer_rate_schedule(used, 0.02);
         fit_backward(f, fit_forward(f, f->w.w, t->n_threads), t->n_threads);
         trainer_adam_update_all(&f->w, f->gradient, trainer_adam_begin(rate, DECAY, step),
@@ -190,8 +189,10 @@ static sdm_status tell(trainer *t, const sdm_model *before, const sdm_fine *f, s
     sdm_status s = SDM_OK;
     for (int k = 0; k < 2 && !s; k++) {
         fine_samples samples = {0};
-        s = trainer_fine_samples(t, before, of[k], THRESHOLD, SHAPES, TEST_SHAPES, 0, &samples, err);
-        for (int i = 0; i < 2; i++) rmse[k][i] = sqrt(samples.square[i] / fmax(samples.count[i], 1));
+        s = trainer_fine_samples(t, before, of[k], THRESHOLD, SHAPES, TEST_SHAPES, 0, &samples,
+                                 err);
+        for (int i = 0; i < 2; i++)
+            rmse[k][i] = sqrt(samples.square[i] / fmax(samples.count[i], 1));
         trainer_fine_samples_dispose(&samples);
     }
     if (!s)

@@ -110,8 +110,8 @@ static sdm_status sample_shape(const sample_job *j, bench *b, size_t shape, sdm_
     if (!s) measure(b, sdm_grid_near(g), j->sums[shape]);
     for (size_t i = 0; i < j->per_shape && n && !s; i++) {
         const size_t to = shape * j->per_shape + i;
-        const double u = sdm_rng_uniform(d->seed, STREAM_FINE + 1,
-                                         (j->first + shape) * j->per_shape + i);
+        const double u =
+            sdm_rng_uniform(d->seed, STREAM_FINE + 1, (j->first + shape) * j->per_shape + i);
         const size_t cell = (size_t)(((double)i + u) / (double)j->per_shape * (double)n);
         fill_sample(b, g, j->threshold, cells[cell < n ? cell : n - 1], j->out, to);
     }

@@ -15,10 +15,11 @@ typedef struct fine_samples {
     double square[2], count[2];
 } fine_samples;
 
-/* f: the fine level whose changes are made already; NULL: none. Fills *out with per_shape samples of each of n_shapes random shapes, numbers first and up of the
-   stream of these samples; maps without creases give samples with a gate of 0. All threads; the bits
-   do not depend on their number. Call trainer_fine_samples_dispose() also after an error.
-   SDM_E_CANCELLED, errors of the exact engine. */
+/* f: the fine level whose changes are made already; NULL: none. Fills *out with per_shape samples
+   of each of n_shapes random shapes, numbers first and up of the stream of these samples; maps
+   without creases give samples with a gate of 0. All threads; the bits do not depend on their
+   number. Call trainer_fine_samples_dispose() also after an error. SDM_E_CANCELLED, errors of the
+   exact engine. */
 sdm_status trainer_fine_samples(const trainer *t, const sdm_model *m, const sdm_fine *f,
                                 float threshold, size_t first, size_t n_shapes, size_t per_shape,
                                 fine_samples *out, sdm_error *err);

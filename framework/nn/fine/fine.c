@@ -75,13 +75,35 @@ sdm_status sdm_fine_cells(const sdm_grid *g, float threshold, const float *map, 
     return s;
 }
 
-/* values[SDM_FINE_STENCIL], `apart` floats apart = the stencil of a cell. */
-static void gather(const sdm_grid *g, const float *map, uint32_t cell, size_t apart, float *values)
+/* Row i (0 .. 15) of four voxels of the stencil of a cell. */
+static const float *stencil_row(const sdm_grid *g, const float *map, uint32_t cell, size_t i)
 {
     const size_t nx = (size_t)g->n[0], plane = nx * (size_t)g->n[1];
-    const float *first = map + cell - plane - nx - 1;
-    for (size_t i = 0; i < SDM_FINE_STENCIL; i++)
-        values[i * apart] = first[i / 16 * plane + i / 4 % 4 * nx + i % 4];
+    return map + cell - plane - nx - 1 + i / 4 * plane + i % 4 * nx;
+}
+
+typedef float four __attribute__((vector_size(16)));
+typedef float four_u __attribute__((vector_size(16), aligned(4)));
+
+/* values[SDM_FINE_STENCIL][FINE_CELLS] = the stencils of FINE_CELLS cells: rows of four cells are
+   transposed together. */
+static void gather(const sdm_grid *g, const float *map, const uint32_t *cells, float *values)
+{
+    for (size_t i = 0; i < SDM_FINE_STENCIL / 4; i++)
+        for (size_t l = 0; l < FINE_CELLS; l += 4) {
+            four r[4];
+            for (size_t k = 0; k < 4; k++)
+                r[k] = *(const four_u *)stencil_row(g, map, cells[l + k], i);
+            const four a = __builtin_shufflevector(r[0], r[1], 0, 4, 1, 5),
+                       b = __builtin_shufflevector(r[2], r[3], 0, 4, 1, 5),
+                       c = __builtin_shufflevector(r[0], r[1], 2, 6, 3, 7),
+                       d = __builtin_shufflevector(r[2], r[3], 2, 6, 3, 7);
+            float *to = values + 4 * i * FINE_CELLS + l;
+            *(four_u *)to = __builtin_shufflevector(a, b, 0, 1, 4, 5);
+            *(four_u *)(to + FINE_CELLS) = __builtin_shufflevector(a, b, 2, 3, 6, 7);
+            *(four_u *)(to + 2 * FINE_CELLS) = __builtin_shufflevector(c, d, 0, 1, 4, 5);
+            *(four_u *)(to + 3 * FINE_CELLS) = __builtin_shufflevector(c, d, 2, 3, 6, 7);
+        }
 }
 
 void sdm_fine_inputs(const sdm_grid *g, float threshold, const float *map, uint32_t cell,
@@ -89,7 +111,8 @@ void sdm_fine_inputs(const sdm_grid *g, float threshold, const float *map, uint3
 {
     float v[SDM_FINE_STENCIL], mean = 0, c = 0;
     const float h = smallest(g);
-    gather(g, map, cell, 1, v);
+    for (size_t i = 0; i < SDM_FINE_STENCIL / 4; i++)
+        memcpy(v + 4 * i, stencil_row(g, map, cell, i), 4 * sizeof *v);
     for (size_t q = 0; q < 8; q++) {
         const size_t i = 21 + q / 4 * 16 + q / 2 % 2 * 4 + q % 2;
         mean += v[i] / 8;
@@ -118,16 +141,13 @@ typedef struct change_job {
     float *fine;
 } change_job;
 
-/* Adds the changes of n cells, at most FINE_CELLS. */
+/* Adds the changes of n cells; cells[FINE_CELLS] has more, which are computed too. */
 static void change_cells(const change_job *j, const uint32_t *cells, size_t n, float *work)
 {
-    const size_t nx = (size_t)j->g->n[0], ny = (size_t)j->g->n[1], fx = 2 * nx - 1,
-                 fy = 2 * ny - 1;
+    const size_t nx = (size_t)j->g->n[0], ny = (size_t)j->g->n[1], fx = 2 * nx - 1, fy = 2 * ny - 1;
     float *out = work + j->n_maps * SDM_FINE_STENCIL * FINE_CELLS;
     for (size_t m = 0; m < j->n_maps; m++)
-        for (size_t l = 0; l < FINE_CELLS; l++)
-            gather(j->g, j->maps + m * j->voxels, cells[l < n ? l : 0], FINE_CELLS,
-                   work + m * SDM_FINE_STENCIL * FINE_CELLS + l);
+        gather(j->g, j->maps + m * j->voxels, cells, work + m * SDM_FINE_STENCIL * FINE_CELLS);
     sdm_fine_kernels()->cells(j->f, smallest(j->g), j->n_maps - 1, work, out);
     for (size_t m = 0; m < j->n_maps; m++)
         for (size_t l = 0; l < n; l++) {
@@ -151,9 +171,10 @@ static sdm_status change_map(const change_job *j, int n_threads, sdm_error *err)
     const size_t groups = s ? 0 : (n + FINE_CELLS - 1) / FINE_CELLS;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (size_t k = 0; k < groups; k++) {
-        const size_t first = k * FINE_CELLS, left = n - first;
-        change_cells(j, cells + first, left < FINE_CELLS ? left : FINE_CELLS,
-                     work + (size_t)sdm_thread() * floats);
+        const size_t first = k * FINE_CELLS, left = n - first < FINE_CELLS ? n - first : FINE_CELLS;
+        uint32_t group[FINE_CELLS];
+        for (size_t l = 0; l < FINE_CELLS; l++) group[l] = cells[first + (l < left ? l : 0)];
+        change_cells(j, group, left, work + (size_t)sdm_thread() * floats);
     }
     sdm_free(work);
     sdm_free(cells);

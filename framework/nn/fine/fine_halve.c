@@ -38,7 +38,8 @@ static void mix_rows(size_t n, size_t taps, const midpoint *m, const float *rest
     const float *first = rows + m->first * step, *w = m->weight;
     if (taps == TAPS) {
         const float *restrict a = first, *restrict b = a + step, *restrict c = b + step,
-                              *restrict d = c + step, *restrict e = d + step, *restrict f = e + step;
+                              *restrict d = c + step, *restrict e = d + step,
+                              *restrict f = e + step;
         for (size_t i = 0; i < n; i++)
             out[i] = ((w[0] * a[i] + w[5] * f[i]) + (w[1] * b[i] + w[4] * e[i])) +
                      (w[2] * c[i] + w[3] * d[i]);
@@ -89,9 +90,9 @@ sdm_status sdm_fine_halve(const int64_t n[3], const float *map, int n_threads, f
     const size_t fx = 2 * nx - 1, fy = 2 * ny - 1;
     float *along_x = NULL, *along_y = NULL;
     midpoint *middle = NULL;
-    sdm_status s = sdm_alloc_unset((void **)&along_x, fx * ny * nz, sizeof *along_x, "fine map", err);
-    if (!s)
-        s = sdm_alloc_unset((void **)&along_y, fx * fy * nz, sizeof *along_y, "fine map", err);
+    sdm_status s =
+        sdm_alloc_unset((void **)&along_x, fx * ny * nz, sizeof *along_x, "fine map", err);
+    if (!s) s = sdm_alloc_unset((void **)&along_y, fx * fy * nz, sizeof *along_y, "fine map", err);
     if (!s) s = SDM_ALLOC(&middle, nx, "fine map", err);
     if (!s) {
         for (size_t i = 0; i + 1 < nx; i++) middle[i] = find_midpoint(i, nx);

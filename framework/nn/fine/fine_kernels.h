@@ -1,5 +1,5 @@
-/* The network of a fine level, for 16 cells at once; compiled for several instruction sets, with the
-   same bits. Internal to the room `fine`. */
+/* The network of a fine level, for 16 cells at once; compiled for several instruction sets, with
+   the same bits. Internal to the room `fine`. */
 #pragma once
 
 #include "sdm/internal/fine.h"

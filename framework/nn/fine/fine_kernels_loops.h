@@ -42,7 +42,10 @@ static void activate(size_t n, lanes *z, lanes *slope)
 }
 
 /* The stencil's index of corner q (0 .. 7) of the cell. */
-static size_t corner(size_t q) { return (1 + (q >> 2)) * 16 + (1 + (q >> 1 & 1)) * 4 + 1 + (q & 1); }
+static size_t corner(size_t q)
+{
+    return (1 + (q >> 2)) * 16 + (1 + (q >> 1 & 1)) * 4 + 1 + (q & 1);
+}
 
 static lanes mean(const lanes *v)
 {
@@ -83,7 +86,8 @@ static void open_gate(lanes c, float threshold, kept *k)
 
 static void run_values(const sdm_fine *f, float h, const lanes *v, kept *k, lanes *out)
 {
-    const float *w0 = f->weights, *w1 = w0 + (IN + 1) * f->width, *w2 = w1 + (f->width + 1) * f->width;
+    const float *w0 = f->weights, *w1 = w0 + (IN + 1) * f->width,
+                *w2 = w1 + (f->width + 1) * f->width;
     const lanes m = mean(v);
     lanes x[IN], y[WIDTH], z[WIDTH];
     lanes root = m * m + h * h;
@@ -103,7 +107,8 @@ static void run_values(const sdm_fine *f, float h, const lanes *v, kept *k, lane
 static void run_tangents(const sdm_fine *f, float h, const lanes *v, const lanes *d, const kept *k,
                          lanes *out)
 {
-    const float *w0 = f->weights, *w1 = w0 + (IN + 1) * f->width, *w2 = w1 + (f->width + 1) * f->width;
+    const float *w0 = f->weights, *w1 = w0 + (IN + 1) * f->width,
+                *w2 = w1 + (f->width + 1) * f->width;
     const lanes m = mean(d), gate = k->gate_slope * (bend(v, d) * (2 / (h * h)));
     lanes x[IN], y[WIDTH], z[WIDTH];
     for (size_t i = 0; i < SDM_FINE_STENCIL; i++) x[i] = (d[i] - m) * (1 / h);
@@ -113,8 +118,7 @@ static void run_tangents(const sdm_fine *f, float h, const lanes *v, const lanes
     layer(f->width, f->width, w1, NULL, y, z);
     for (size_t i = 0; i < f->width; i++) z[i] *= k->slope[1][i];
     layer(f->width, OUT, w2, NULL, z, out);
-    for (size_t o = 0; o < OUT; o++)
-        out[o] = (k->gate * out[o] + gate * k->out[o]) * (0.1f * h);
+    for (size_t o = 0; o < OUT; o++) out[o] = (k->gate * out[o] + gate * k->out[o]) * (0.1f * h);
 }
 
 static void cells(const sdm_fine *f, float h, size_t n_tangents, const float *values, float *out)

@@ -1,9 +1,10 @@
 /* The fine level of a model: its map between the voxels.
 
-   A map of n voxels along an axis becomes one of 2 n - 1 voxels of half the spacing. Halfway between
-   two voxels the polynomial through the six nearest ones is taken (Deslauriers and Dubuc 1989), and
-   where the map has a crease, a small network corrects it. A polynomial rounds creases off, and
-   bases err there; both errors look alike everywhere, so one network learns them for all places.
+   A map of n voxels along an axis becomes one of 2 n - 1 voxels of half the spacing. Halfway
+   between two voxels the polynomial through the six nearest ones is taken (Deslauriers and Dubuc
+   1989), and where the map has a crease, a small network corrects it. A polynomial rounds creases
+   off, and bases err there; both errors look alike everywhere, so one network learns them for all
+   places.
 
      cell      a voxel and the new voxels in front of it: at 0 or 1/2 along x, y and z, x fastest
      stencil   the 4 x 4 x 4 voxels around a cell, from one before it to two behind it
@@ -30,9 +31,10 @@ extern "C" {
 
 /* The network of a fine level. */
 typedef struct sdm_fine {
-    size_t width;         /* units of each hidden layer, a multiple of 4 */
-    float threshold;      /* t */
-    const float *weights; /* [sdm_fine_count()]: W0, b0, W1, b1, W2, b2; matrices [inputs][outputs] */
+    size_t width;    /* units of each hidden layer, a multiple of 4 */
+    float threshold; /* t */
+    const float
+        *weights; /* [sdm_fine_count()]: W0, b0, W1, b1, W2, b2; matrices [inputs][outputs] */
 } sdm_fine;
 
 /* Number of weights. */

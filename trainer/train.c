@@ -146,6 +146,7 @@ static sdm_status train_finish(trainer *t, sdm_train_report *report, sdm_error *
     sdm_status s = trainer_export_model(t, report, err);
     if (!s) s = trainer_fine_add(t, err);
     if (!s) {
+        if (report) report->seconds = trainer_seconds(t);
         tell_overrun(t, trainer_seconds(t) - started);
         return trainer_checkpoint_remove(t, err);
     }

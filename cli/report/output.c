@@ -187,7 +187,10 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
     bool cut = false;
     sdm_status s = sdm_isosurface(map->grid, map->values, 0.0f, &surface, &cut, err);
     if (!s && surface.n_tri == 0)
-        s = sdm_fail(err, SDM_E_MESH, "%s: the map has no zero surface", path);
+        s = sdm_fail(err, SDM_E_MESH,
+                     "%s: the map has no zero surface: all voxels are %s the shape; does the grid "
+                     "cover it?",
+                     path, map->values[0] < 0 ? "inside" : "outside");
     if (!s) s = sdm_mesh_write(path, &surface, err);
     if (!s && cut) cli_warn("%s: the surface leaves the grid and is open at its border", path);
     sdm_mesh_dispose(&surface);

@@ -186,8 +186,8 @@ sdm_status cli_time_two(const sdm_model *m, const sdm_instance *shape, cli_timin
 void cli_print_two(const char *begin, const cli_timing *t)
 {
     const double ratio = t->ms_exact / t->ms_network;
-    printf("%sone map on one core: network %.3g ms, exact engine %.3g ms, %.2g times as long",
-           begin, t->ms_network, t->ms_exact, ratio);
+    printf("%sone map on one core: network %.3g ms, exact engine %.3g ms, %.*f times as long",
+           begin, t->ms_network, t->ms_exact, ratio < 10 ? 2 : 0, ratio);
     if (ratio < ABOUT_AS_FAST)
         printf(": exact maps (sdmgen exact, fit --exact) need no network here");
     printf("\n");

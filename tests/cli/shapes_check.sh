@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen shapes check, and what mesh, exact, config and train say about a shape with faults (tests/shape/faulty_shape.h): one line each.
-# Tests: report_survey.c report_audit.c shapes_check.c cmd_mesh.c
+# Tests: report_survey.c report_audit.c shapes_check.c cmd_mesh.c crash_guard.c callback.c
 . "$(dirname "$0")/common.sh"
 plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
 
@@ -114,4 +114,18 @@ expect 2 'x\.ply' sdmgen shapes check torus -o x.ply
 expect 1 'missing\.yaml' sdmgen shapes check missing.yaml
 expect 2 'either --shape NAME or --mesh FILE' sdmgen mesh --audit
 expect 2 'p and -O need --shape' sdmgen mesh --mesh mended.ply -p a=1 --audit
+# A plug-in that ends the program: one line names it, the callback and the parameters; no file is left.
+for fault in crash abort exit; do
+    case $fault in
+    crash) reason='the plug-in used memory that is not its own' ;;
+    abort) reason='the plug-in called abort\(\), or damaged memory' ;;
+    exit) reason='the plug-in called exit\(\), which it must not' ;;
+    esac
+    expect 3 "shape 'faulty', mesh\(\) at size=2.5 reach=1.5: $reason" \
+        sdmgen mesh --shape faulty -O fault=$fault --plugin "$plugin" -o ended.ply
+    expect 3 "shape 'faulty', mesh\(\) at .*: $reason" sdmgen shapes check faulty -O fault=$fault --plugin "$plugin" --samples 4
+done
+absent ended.ply
+expect 0 - sdmgen mesh --shape faulty -O fault=crash -p size=1.5 --plugin "$plugin" -o fine.ply
+
 finish

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The command line itself: help, unknown words, bad values, texts generated from the table of options.
-# Tests: cmd_help.c command_line.c help.c main.c option_table.c terminal.c
+# Tests: cmd_help.c command_line.c help.c help_completion.c help_man.c main.c option_table.c terminal.c
 . "$(dirname "$0")/common.sh"
 
 expect 0 - sdmgen --version
@@ -54,6 +54,17 @@ has '^<filter-progress>0\.[0-9]+</filter-progress>$'
 has '^<filter-progress>1\.000</filter-progress>$'
 expect 0 - sdmgen "${slow[@]}" --progress slicer --quiet
 ! grep -q filter out || bad 'progress with --quiet'
+
+# With closed stdout or stderr, files hold what belongs into them and nothing else.
+expect 0 - sdmgen mesh --shape torus -O edge=1 -o open.ply
+sdmgen mesh --shape torus -O edge=1 -o closed.ply >&- 2>&-
+cmp -s open.ply closed.ply || bad 'stdout and stderr closed: another file'
+sdmgen config "$source_folder/tests/cli/tiny.yaml" --dump >&- 2>&- && bad 'a result that cannot be printed counts as success'
+
+# A file that is replaced keeps its permissions.
+chmod 600 open.ply
+expect 0 - sdmgen mesh --shape torus -O edge=1 -o open.ply
+[ "$(stat -c %a open.ply)" = 600 ] || bad "permissions became $(stat -c %a open.ply)"
 
 # Texts generated from the table of options.
 expect 0 - sdmgen help --completion bash

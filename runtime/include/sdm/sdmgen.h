@@ -30,7 +30,8 @@
  * In brackets: the CMake target of the library with the functions; all others are in
  * sdmgen::sdmgen. sdm/vdb.h is included where it is installed.
  *
- * The map of a trained network, and the distance at a point:
+ * For many points of one map, sdm_field_create() computes the map once and sdm_field_points() reads
+ * it. The map of a trained network, and the distance at a point:
  *
  *   sdm_error err = {0};
  *   sdm_model *model = NULL;
@@ -48,10 +49,7 @@
  *   if (!s) s = sdm_generate_points(model, p, NULL, x, 1, &value, gradient, NULL, NULL, &err);
  *   if (!s) printf("%g mm at (1, 2, 0.5)\n", value);
  *   if (s) fputs(err.text, stderr);
- *   sdm_model_free(model);
- *
- * For points of many maps, sdm_field_create() keeps the memory; for millions of points a program
- * computes the map once and asks sdm_field_points(). */
+ *   sdm_model_free(model); */
 // clang-format on
 #ifndef SDM_SDMGEN_H
 #define SDM_SDMGEN_H

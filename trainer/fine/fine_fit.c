@@ -111,12 +111,16 @@ static void load(fit *f, const fine_samples *s, size_t i, size_t k)
     f->gate[i] = s->gate[k];
 }
 
+/* trainer_seconds() at which the training must end. */
+static double end_of_time(const trainer *t)
+{
+    return trainer_by_time(t) ? 60 * t->config->train.minutes * 0.995 : INFINITY;
+}
+
 /* Used part of the training, which began at time `began`. */
 static double fraction(const trainer *t, double began, int64_t step)
 {
-    const double steps = (double)step / STEPS;
-    if (!trainer_by_time(t)) return steps;
-    const double end = t->config->train.minutes * 60 - fmin(1, 0.05 * t->config->train.minutes);
+    const double steps = (double)step / STEPS, end = end_of_time(t);
     return fmax(steps, end > began ? (trainer_seconds(t) - began) / (end - began) : 1);
 }
 
@@ -171,7 +175,9 @@ static sdm_status train(trainer *t, const sdm_model *m, size_t width, float **we
 {
     fit f = {0};
     fine_samples samples = {0};
-    sdm_status s = trainer_fine_samples(t, m, NULL, THRESHOLD, 0, SHAPES, PER_SHAPE, &samples, err);
+    const double now = trainer_seconds(t), until = now + 0.5 * (end_of_time(t) - now);
+    sdm_status s =
+        trainer_fine_samples(t, m, NULL, THRESHOLD, 0, SHAPES, PER_SHAPE, until, &samples, err);
     if (!s) s = fit_create(&f, width, err);
     if (!s) fit_start(&f, t->data.seed);
     if (!s) s = fit_run(&f, t, &samples, err);
@@ -181,27 +187,31 @@ static sdm_status train(trainer *t, const sdm_model *m, size_t width, float **we
     return s;
 }
 
-/* Tells the errors of other shapes between the voxels without and with the fine level. */
-static sdm_status tell(trainer *t, const sdm_model *before, const sdm_fine *f, sdm_error *err)
+/* Measures the errors of other shapes between the voxels without and with the fine level, and tells
+   them. *gains: all voxels together gain. */
+static sdm_status measure(trainer *t, const sdm_model *before, const sdm_fine *f, bool *gains,
+                          sdm_error *err)
 {
     double rmse[2][2];
     const sdm_fine *of[2] = {NULL, f};
     sdm_status s = SDM_OK;
     for (int k = 0; k < 2 && !s; k++) {
         fine_samples samples = {0};
-        s = trainer_fine_samples(t, before, of[k], THRESHOLD, SHAPES, TEST_SHAPES, 0, &samples,
-                                 err);
+        s = trainer_fine_samples(t, before, of[k], THRESHOLD, SHAPES, TEST_SHAPES, 0, INFINITY,
+                                 &samples, err);
         for (int i = 0; i < 2; i++)
             rmse[k][i] = sqrt(samples.square[i] / fmax(samples.count[i], 1));
         trainer_fine_samples_dispose(&samples);
     }
-    if (!s)
-        trainer_message(t,
-                        "fine level: RMSE between the voxels %.5f -> %.5f mm, within %g mm of the "
-                        "surface %.5f -> %.5f mm",
-                        rmse[0][0], rmse[1][0], sdm_grid_near(&sdm_model_get_info(before)->grid),
-                        rmse[0][1], rmse[1][1]);
-    return s;
+    if (s) return s;
+    *gains = rmse[1][0] < rmse[0][0];
+    trainer_message(t,
+                    "fine level: RMSE between the voxels %.5f -> %.5f mm, within %g mm of the "
+                    "surface %.5f -> %.5f mm%s",
+                    rmse[0][0], rmse[1][0], sdm_grid_near(&sdm_model_get_info(before)->grid),
+                    rmse[0][1], rmse[1][1],
+                    *gains ? "" : ": left out (raise train.minutes, or lower network.fine)");
+    return SDM_OK;
 }
 
 sdm_status trainer_fine_add(trainer *t, sdm_error *err)
@@ -218,9 +228,10 @@ sdm_status trainer_fine_add(trainer *t, sdm_error *err)
     if (!s) s = sdm_model_open_memory(path, file, file_size, &m, err);
     if (!s) s = train(t, m, width, &weights, err);
     const sdm_fine fine = {.width = width, .threshold = THRESHOLD, .weights = weights};
-    if (!s) s = tell(t, m, &fine, err);
-    if (!s) s = sdm_fine_attach(file, file_size, &fine, &bytes, &size, err);
-    if (!s) s = sdm_container_write(path, bytes, size, err);
+    bool gains = false;
+    if (!s) s = measure(t, m, &fine, &gains, err);
+    if (!s && gains) s = sdm_fine_attach(file, file_size, &fine, &bytes, &size, err);
+    if (!s && gains) s = sdm_container_write(path, bytes, size, err);
     sdm_model_free(m);
     sdm_free(bytes);
     sdm_free(weights);

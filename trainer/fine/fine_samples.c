@@ -11,6 +11,9 @@
 #include "sdm/memory.h"
 #include "state/progress.h"
 
+/* Shapes that are made whatever the time. */
+enum { LEAST_SHAPES = 16 };
+
 /* The memory of a thread. */
 typedef struct bench {
     sdm_grid fine;
@@ -121,7 +124,7 @@ static sdm_status sample_shape(const sample_job *j, bench *b, size_t shape, sdm_
 
 sdm_status trainer_fine_samples(const trainer *t, const sdm_model *m, const sdm_fine *f,
                                 float threshold, size_t first, size_t n_shapes, size_t per_shape,
-                                fine_samples *out, sdm_error *err)
+                                double until, fine_samples *out, sdm_error *err)
 {
     const size_t n = n_shapes * per_shape;
     sample_job j = {.t = t,
@@ -137,14 +140,21 @@ sdm_status trainer_fine_samples(const trainer *t, const sdm_model *m, const sdm_
     if (!s) s = SDM_ALLOC(&out->y, n * SDM_FINE_OUTPUTS, "samples of the fine level", err);
     if (!s) s = SDM_ALLOC(&j.sums, n_shapes, "samples of the fine level", err);
     if (s) return s;
+    size_t end = n_shapes; // of the shapes whose samples count
 #pragma omp parallel num_threads(t->n_threads)
     {
         bench b;
         sdm_error mine = {0};
         sdm_status my = bench_create(&b, m, &mine);
 #pragma omp for schedule(dynamic)
-        for (size_t i = 0; i < n_shapes; i++)
-            if (!my) my = sample_shape(&j, &b, i, &mine);
+        for (size_t i = 0; i < n_shapes; i++) {
+            if (i >= LEAST_SHAPES && trainer_seconds(t) > until) {
+#pragma omp critical(sdm_fine_samples)
+                end = i < end ? i : end;
+            } else if (!my) {
+                my = sample_shape(&j, &b, i, &mine);
+            }
+        }
         bench_dispose(&b);
 #pragma omp critical(sdm_fine_samples)
         if (my && !s) {
@@ -152,7 +162,8 @@ sdm_status trainer_fine_samples(const trainer *t, const sdm_model *m, const sdm_
             if (err) *err = mine;
         }
     }
-    for (size_t i = 0; i < n_shapes && !s; i++)
+    out->n = end * per_shape;
+    for (size_t i = 0; i < end && !s; i++)
         for (int k = 0; k < 2; k++) {
             out->square[k] += j.sums[i][k];
             out->count[k] += j.sums[i][2 + k];

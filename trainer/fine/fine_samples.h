@@ -22,5 +22,5 @@ typedef struct fine_samples {
    exact engine. */
 sdm_status trainer_fine_samples(const trainer *t, const sdm_model *m, const sdm_fine *f,
                                 float threshold, size_t first, size_t n_shapes, size_t per_shape,
-                                fine_samples *out, sdm_error *err);
+                                double until, fine_samples *out, sdm_error *err);
 void trainer_fine_samples_dispose(fine_samples *s);

@@ -44,6 +44,7 @@ static void print_model(const char *path, const sdm_model_info *m)
         a->q50_mm, a->q90_mm, a->q99_mm);
     printf("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
            (long long)m->train_samples, (unsigned long long)m->seed, m->version);
+    if (m->fine_width) printf("fine level   %zu units a layer (docs/grids.md)\n", m->fine_width);
     printf("file         %zu bytes, weights %zu bytes, checksum %016llx\n", m->file_bytes,
            m->weight_bytes, (unsigned long long)m->checksum);
 }
@@ -100,6 +101,7 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     sdm_json_int(&j, "train_samples", m->train_samples);
     sdm_json_int(&j, "file_bytes", (int64_t)m->file_bytes);
     sdm_json_int(&j, "weight_bytes", (int64_t)m->weight_bytes);
+    sdm_json_int(&j, "fine_width", (int64_t)m->fine_width);
     sdm_json_text(&j, "checksum", checksum);
     sdm_json_text(&j, "config", m->config ? m->config : "");
     sdm_json_close(&j, '}');

@@ -6,6 +6,7 @@
 #include <stdio.h>
 
 #include "data/dataset_fill.h"
+#include "fine/fine_fit.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
@@ -139,6 +140,7 @@ static sdm_status train_finish(trainer *t, sdm_outfile **config, sdm_train_repor
     if (!s && (!is_second(t) || trainer_second_wins(t->turns, &report->accuracy))) {
         s = trainer_export_model(t, err);
         if (!s && is_second(t)) s = sdm_outfile_commit(config, err);
+        if (!s) s = trainer_fine_add(t, err);
     }
     report->seconds = trainer_seconds(t);
     if (!s) {

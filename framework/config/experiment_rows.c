@@ -36,6 +36,19 @@ static void make_row(const sdm_experiment *e, const sdm_experiment_method *m,
     make_folder(row->title, row->folder);
 }
 
+/* The first variant with the same `set` as v. */
+static size_t first_alike(const sdm_experiment *e, size_t v)
+{
+    for (size_t u = 0; u < v; u++) {
+        const sdm_overrides *a = &e->variants[u].set, *b = &e->variants[v].set;
+        size_t i = 0;
+        if (a->n != b->n) continue;
+        while (i < a->n && !strcmp(a->items[i].text, b->items[i].text)) i++;
+        if (i == a->n) return u;
+    }
+    return v;
+}
+
 /* Sets network_row of every row. A method with fit: polish uses the network of the last method with
  * fit: network before it. `model`: position of the key fit.model. */
 static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mistakes)
@@ -54,8 +67,8 @@ static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mista
             else
                 strcpy(m->network, e->methods[from].network);
         }
-        for (size_t row = i; row < e->n_rows; row += e->n_methods)
-            e->rows[row].network_row = row - i + from;
+        for (size_t row = i, v = 0; row < e->n_rows; row += e->n_methods, v++)
+            e->rows[row].network_row = first_alike(e, v) * e->n_methods + from;
     }
     if (*e->fit.model && n_networks != 1)
         sdm_mistakes_add(

@@ -179,6 +179,10 @@ static const sdm_field METHOD[] = {
 #define V sdm_experiment_variant
 static const sdm_field VARIANT[] = {
     TEXT(V, "name", name, SDM_NAME_MAX, "required", "appended to the name of the method"),
+    ROW(V, "finer", SDM_FIELD_INT64, finer, 1, 64, "1", "",
+        "maps are made and measured with the spacing of the configuration divided by this number; "
+        "networks are trained on the grid of the configuration, once for all variants that differ "
+        "in this key alone"),
     SPECIAL("set", read_set, "mapping", "keys of a training", "none",
             "keys of the training configuration in this variant, e.g. {grid.spacing: 0.1}"),
 };

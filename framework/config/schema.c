@@ -160,6 +160,9 @@ static const sdm_field NETWORK[] = {
             "total degree of the polynomial part"),
     OF_KIND(BASES, INT, "input_degree", network.input_degree, 1, 8, "4", "",
             "total degree of the products of parameters that are inputs of the MLP"),
+    OF_KIND(BASES, INT, "fine", network.fine, 0, 256, "0", "",
+            "units of a hidden layer of the fine level, which corrects creases between the voxels "
+            "(docs/grids.md); rounded up to a multiple of 4; 0: no fine level"),
     OF_KIND(SDMNN, INT, "channels", network.channels, 1, 512, "16", "",
             "channels of the first level, doubled in each further level"),
     OF_KIND(SDMNN, REAL, "dropout", network.dropout, 0, 0.9, "0.1", "",

@@ -10,6 +10,7 @@
 struct sdm_field {
     const sdm_model *model;
     const sdm_model_info *info;
+    sdm_grid grid; /* of the map in use: the model's, or that of its fine level */
     sdm_generate_opts opts;
     int n_threads;
     bool derivatives;

@@ -11,6 +11,11 @@
 
 double trainer_seconds(const trainer *t) { return sdm_clock() - t->started; }
 
+double trainer_budget_seconds(const trainer *t)
+{
+    return (t->config->network.fine ? 0.9 : 1) * 60 * t->config->train.minutes;
+}
+
 bool trainer_by_time(const trainer *t) { return t->config->train.minutes > 0; }
 
 int64_t trainer_steps(const trainer *t)

@@ -7,6 +7,10 @@
  * which the maps were computed again does not. */
 double trainer_seconds(const trainer *t);
 
+/* Seconds of train.minutes in which the network is trained and measured: all, or all but a tenth if
+   a fine level follows. */
+double trainer_budget_seconds(const trainer *t);
+
 /* true: the budget is a time (train.minutes). false: it is trainer_steps() optimiser steps. */
 bool trainer_by_time(const trainer *t);
 int64_t trainer_steps(const trainer *t);

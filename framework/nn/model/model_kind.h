@@ -5,6 +5,7 @@
 
 #include "model_text.h"
 #include "sdm/internal/container.h"
+#include "sdm/internal/fine.h"
 #include "sdm/model.h"
 
 typedef struct sdm_model_kind {
@@ -46,6 +47,7 @@ struct sdm_model {
     uint8_t *file; /* the whole file; weights point into it */
     const sdm_model_kind *kind;
     void *network; /* a struct whose type depends on the kind */
+    sdm_fine fine; /* width 0: none */
 };
 
 /* Type of the numbers in a section of weights. */
@@ -62,6 +64,10 @@ typedef enum sdm_number {
    has another size, or holds a floating-point number that is not finite. */
 const void *sdm_model_weights(sdm_model *m, const sdm_section *sections, size_t n, const char *name,
                               sdm_number type, uint64_t count, sdm_error *err);
+
+/* Reads the section of the fine level, if there is one, into m->fine; its weights point into the
+   file. SDM_E_FORMAT. */
+sdm_status sdm_fine_open(sdm_model *m, const sdm_section *sections, size_t n, sdm_error *err);
 
 /* The section `name` among sections[n], or NULL. */
 const sdm_section *sdm_section_find(const sdm_section *sections, size_t n, const char *name);

@@ -86,6 +86,8 @@ typedef struct sdm_experiment_method {
 /* An element of `variants`: every method is run once for each variant, e.g. on another grid. */
 typedef struct sdm_experiment_variant {
     char name[SDM_NAME_MAX];
+    /* the maps have (n - 1) finer + 1 voxels where the configuration has n; default 1 */
+    int64_t finer;
     sdm_overrides set;
     sdm_mark mark;
 } sdm_experiment_variant;
@@ -111,7 +113,8 @@ typedef struct sdm_experiment_row {
     const sdm_experiment_method *method;
     const sdm_experiment_variant *variant;     /* NULL: there are no variants */
     const sdm_experiment_reference *reference; /* NULL: none */
-    /* Index of the row whose network this row uses: its own index, except for FIT_POLISH. */
+    /* Index of the row whose network this row uses: its own index, except for FIT_POLISH and for
+       variants that differ in `finer` alone from one before them. */
     size_t network_row;
     int64_t samples; /* number of shapes on which errors are measured */
 } sdm_experiment_row;

@@ -28,6 +28,19 @@ double sdm_fit_robust_sd(double *x, size_t n, double centre)
     return SD_OF_MAD * sdm_fit_median(x, n);
 }
 
+double sdm_fit_shortest_half(double *x, size_t n, double *sd)
+{
+    *sd = NAN;
+    if (!n) return NAN;
+    qsort(x, n, sizeof *x, ascending);
+    const size_t half = n / 2;
+    size_t best = 0;
+    for (size_t i = 0; i + half < n; i++)
+        if (x[i + half] - x[i] < x[best + half] - x[best]) best = i;
+    *sd = 0.5 * SD_OF_MAD * (x[best + half] - x[best]);
+    return 0.5 * (x[best + half] + x[best]);
+}
+
 double sdm_fit_robust_correlation(double *d, size_t n)
 {
     if (n < DIFFERENCES_MIN) return 0;

@@ -17,6 +17,8 @@
 #define BEYOND 4.0
 // smallest sd of the noise, as a share: labels have none, but show shares only to a few per cent
 #define SD_MIN 0.02
+// the spread inside is at most this factor above what the differences of neighbours say
+#define WIDER 1.5
 // correlations below this count as none
 #define CORRELATION_MIN 0.05
 
@@ -38,7 +40,7 @@ static bool is_pure(const fit_residuals *r, size_t i, int side, double limit)
     return fabs(r->expected[i] - side) <= limit;
 }
 
-// median and spread of the values on one side
+// middle and spread of the values on one side
 static void side_measure(const fit_problem *p, fit_residuals *r, int side, double *list)
 {
     double limit = DEEP;
@@ -52,29 +54,42 @@ static void side_measure(const fit_problem *p, fit_residuals *r, int side, doubl
             if (is_pure(r, i, side, limit) && seen++ % step == 0)
                 list[kept++] = (double)p->samples.value[i];
         r->n_deep[side] = n;
-        r->middle[side] = sdm_fit_median(list, kept);
-        r->spread[side] = sdm_fit_robust_sd(list, kept, r->middle[side]);
+        r->middle[side] = sdm_fit_shortest_half(list, kept, &r->spread[side]);
     }
     if (is_labels(p)) r->middle[side] = side;
 }
 
-static void voxels_fill(const fit_problem *p, fit_residuals *r, double *list)
+// places, predicted shares, and observed ones less these
+static void shares_fill(const fit_problem *p, fit_residuals *r, double *list)
 {
     const fit_samples *s = &p->samples;
-    for (size_t i = 0; i < r->n; i++) r->expected[i] = predicted_share(p, s->field[i]);
-    for (int side = 0; side < 2; side++) side_measure(p, r, side, list);
-    const double contrast = r->middle[1] - r->middle[0];
-    double sd[2];
-    for (int side = 0; side < 2; side++) sd[side] = fmax(r->spread[side] / fabs(contrast), SD_MIN);
     for (size_t i = 0; i < r->n; i++) {
-        const double a = r->expected[i], share = ((double)s->value[i] - r->middle[0]) / contrast;
-        r->used[i] = share < 1 + BEYOND * sd[1];
-        r->sd[i] = sqrt(a * sd[1] * sd[1] + (1 - a) * sd[0] * sd[0]);
-        r->residual[i] = fmax(share, -BEYOND * sd[0]) - a;
         const int64_t *size = p->target->grid.n, v = (int64_t)s->voxel[i], k = (int64_t)p->stride;
         r->place[3 * i] = (int32_t)(v % size[0] / k);
         r->place[3 * i + 1] = (int32_t)(v / size[0] % size[1] / k);
         r->place[3 * i + 2] = (int32_t)(v / size[0] / size[1] / k);
+        r->expected[i] = predicted_share(p, s->field[i]);
+        r->used[i] = true;
+    }
+    for (int side = 0; side < 2; side++) side_measure(p, r, side, list);
+    const double contrast = r->middle[1] - r->middle[0];
+    for (size_t i = 0; i < r->n; i++) {
+        r->residual[i] = ((double)s->value[i] - r->middle[0]) / contrast - r->expected[i];
+        r->sd[i] = 1;
+    }
+}
+
+// sd of the noise of every voxel; leaves out a third material, and limits what is beyond the outside
+static void noise_fill(fit_residuals *r)
+{
+    const double contrast = fabs(r->middle[1] - r->middle[0]);
+    double sd[2];
+    for (int side = 0; side < 2; side++) sd[side] = fmax(r->spread[side] / contrast, SD_MIN);
+    for (size_t i = 0; i < r->n; i++) {
+        const double a = r->expected[i], share = r->residual[i] + a;
+        r->used[i] = share < 1 + BEYOND * sd[1];
+        r->sd[i] = sqrt(a * sd[1] * sd[1] + (1 - a) * sd[0] * sd[0]);
+        r->residual[i] = fmax(share, -BEYOND * sd[0]) - a;
     }
 }
 
@@ -113,9 +128,10 @@ static sdm_status lookup_create(const fit_residuals *r, lookup *l, sdm_error *er
     return s;
 }
 
-// correlation of pure voxels of one side that lie `lag` steps apart along an axis
-static double correlation_at(const fit_residuals *r, const lookup *l, int axis, int lag,
-                             double *list)
+// list = differences, in sd of the noise, of pure voxels that lie `lag` steps apart along an axis;
+// side 0 or 1: only of that side; returns their number
+static size_t differences(const fit_residuals *r, const lookup *l, int axis, int lag, int only,
+                          double *list)
 {
     const size_t step = r->n / (4 * VALUES_MAX) + 1;
     size_t n = 0;
@@ -124,24 +140,55 @@ static double correlation_at(const fit_residuals *r, const lookup *l, int axis, 
         int32_t at[3] = {r->place[3 * i], r->place[3 * i + 1], r->place[3 * i + 2]};
         at[axis] += lag;
         const uint32_t *found = lookup_at(l, at);
-        if (!r->used[i] || !is_pure(r, i, side, DEEP) || !found || !*found) continue;
+        if ((only >= 0 && side != only) || !r->used[i] || !is_pure(r, i, side, DEEP) || !found ||
+            !*found)
+            continue;
         const size_t j = *found - 1;
         if (!r->used[j] || !is_pure(r, j, side, DEEP)) continue;
         list[n++] = r->residual[i] / r->sd[i] - r->residual[j] / r->sd[j];
     }
-    return sdm_fit_robust_correlation(list, n);
+    return n;
 }
 
-static sdm_status correlations_measure(fit_residuals *r, double *list, sdm_error *err)
+/* Two materials inside a wrong shape widen the spread there, but hardly the differences of
+ * neighbours. Image noise is as smooth inside as outside, so that these differences, compared with
+ * those outside, limit the spread inside. */
+static void spread_limit(fit_residuals *r, const lookup *l, double *list)
 {
-    lookup l = {0};
-    const sdm_status s = lookup_create(r, &l, err);
-    for (int axis = 0; axis < 3 && !s; axis++)
+    double difference[2];
+    for (int side = 0; side < 2; side++) {
+        const size_t n = differences(r, l, 0, 1, side, list);
+        difference[side] = sdm_fit_robust_sd(list, n, 0);
+    }
+    const double limit = WIDER * r->spread[0] * difference[1] / difference[0];
+    if (isfinite(limit)) r->spread[1] = fmin(r->spread[1], limit);
+}
+
+static void correlations_measure(fit_residuals *r, const lookup *l, double *list)
+{
+    for (int axis = 0; axis < 3; axis++)
         for (int lag = 1; lag <= FIT_RESIDUAL_LAGS; lag++) {
-            const double c = correlation_at(r, &l, axis, lag, list);
+            const size_t n = differences(r, l, axis, lag, -1, list);
+            const double c = sdm_fit_robust_correlation(list, n);
             if (c < CORRELATION_MIN) break;
             r->correlation[axis][lag] = c;
         }
+}
+
+static sdm_status voxels_fill(const fit_problem *p, fit_residuals *r, double radius, double *list,
+                              sdm_error *err)
+{
+    lookup l = {0};
+    shares_fill(p, r, list);
+    const sdm_status s = lookup_create(r, &l, err);
+    if (!s) {
+        spread_limit(r, &l, list);
+        noise_fill(r);
+        correlations_measure(r, &l, list);
+    }
+    for (int a = 0; a < 3; a++)
+        r->edge[a] = (int32_t)fmax(
+            floor(0.5 * radius / (p->target->grid.spacing[a] * (double)p->stride) + 0.5), 2);
     sdm_free(l.number);
     return s;
 }
@@ -171,15 +218,10 @@ sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sd
     if (!s) s = SDM_ALLOC(&r->place, 3 * r->n, "residuals of the fit", err);
     if (!s) s = SDM_ALLOC(&list, r->n, "residuals of the fit", err);
     const double radius = sdm_fit_inradius(&p->maps);
-    if (!s && is_voxels(p)) {
-        voxels_fill(p, r, list);
-        for (int a = 0; a < 3; a++)
-            r->edge[a] = (int32_t)fmax(
-                floor(0.5 * radius / (p->target->grid.spacing[a] * (double)p->stride) + 0.5), 2);
-        s = correlations_measure(r, list, err);
-    } else if (!s) {
+    if (!s && is_voxels(p))
+        s = voxels_fill(p, r, radius, list, err);
+    else if (!s)
         points_fill(p, r, radius);
-    }
     sdm_free(list);
     return s;
 }

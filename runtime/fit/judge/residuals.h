@@ -2,7 +2,7 @@
 
    Voxels: the observed share of the inside material is the value of the voxel on the scale from the
    outside (0) to the inside (1); the prediction is the share that the shape fills. Both ends of the
-   scale are medians over the voxels deep inside and deep outside. They and the noise are robust:
+   scale are least medians of squares over the voxels deep inside and deep outside. They and the noise are robust:
    the tissues of the fit itself would not do, because a wrong shape widens them until they excuse
    everything. Points: the residual is the signed distance from the surface over the largest radius
    of the shape. */
@@ -26,7 +26,7 @@ typedef struct fit_residuals {
     int32_t edge[3];
     /* correlation of the noise of voxels that lie so many steps apart along each axis */
     double correlation[3][FIT_RESIDUAL_LAGS + 1];
-    /* voxels: median and robust sd of the values deep outside [0] and deep inside [1], and the
+    /* voxels: middle and robust sd of the values deep outside [0] and deep inside [1], and the
        number of these voxels; points: 0 */
     double middle[2], spread[2];
     size_t n_deep[2];

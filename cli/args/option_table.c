@@ -410,7 +410,8 @@ const cli_option cli_options[] = {
      "exit code 4 when less than this fraction of the fitted shape lies in the image (default "
      "0.5)"},
     {"tolerance", 0, CLI_REAL, "F", NULL, 0, 1, ON(CLI_FIT), AT(fit.tolerance),
-     "share of the volume of the shape that the target may contradict, since organs differ from the "
+     "share of the volume of the shape that the target may contradict, since organs differ from "
+     "the "
      "model (default 0: residuals must be noise; labels and points 0.05)"},
     {"beside", 0, CLI_REAL, "F", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.beside),
      "volume of the inside's material that may lie beside the shape, over that of the shape "

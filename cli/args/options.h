@@ -98,7 +98,8 @@ typedef struct cli_fit_args {
     double start_centre[3], start_axis[3], region[6];
     int64_t turns, turns_sphere, max_iterations; /* 0: option missing */
     double inside[2], outside[2], air[2];
-    double blur, l_ref, point_sd, margin, cavity, tissue_field, label_close, least_inside, tolerance, beside;
+    double blur, l_ref, point_sd, margin, cavity, tissue_field, label_close, least_inside,
+        tolerance, beside;
     double prior_sd, prior_rotation, prior_translation, eps;
 } cli_fit_args;
 

@@ -44,10 +44,10 @@ typedef struct cli_fit {
     sdm_fit_opts opts;
 
     /* fit_mirror.c: the fit of the mirror image of the shape */
-    const char *mirror;         /* option that mirrors the shape; NULL: none is tried */
-    char side[64];              /* its value in the result; "" where the shape is a model's */
-    double better;              /* by how much the result is better; see sdm_fit_compare() */
-    sdm_instance *given_shape;  /* the shape of the side that was not taken */
+    const char *mirror;        /* option that mirrors the shape; NULL: none is tried */
+    char side[64];             /* its value in the result; "" where the shape is a model's */
+    double better;             /* by how much the result is better; see sdm_fit_compare() */
+    sdm_instance *given_shape; /* the shape of the side that was not taken */
 
     /* fit_compare.c: labels to compare the fitted shape with */
     sdm_grid reference_grid;

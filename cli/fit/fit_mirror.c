@@ -53,8 +53,7 @@ static sdm_status take_other_side(cli_fit *f, sdm_error *err)
     items[given->n] = option;
     const cli_list options = {items, given->n + 1};
     sdm_instance *other = NULL;
-    const sdm_status s =
-        cli_create_shape(f->registry, f->args->shape, &options, &other, err);
+    const sdm_status s = cli_create_shape(f->registry, f->args->shape, &options, &other, err);
     if (s) return s;
     f->given_shape = f->shape; // the names of the parameters belong to it
     f->source.shape = f->shape = other;

@@ -89,7 +89,8 @@ static sdm_status measure_dice(const sdm_fit_source *source, const sdm_fit_resul
     return s;
 }
 
-/* Refuses a fit of a shape with a mirror image unless it is better than that of the mirror image. */
+/* Refuses a fit of a shape with a mirror image unless it is better than that of the mirror image.
+ */
 static sdm_status check_mirror(const cli_experiment_job *job, const sdm_fit_source *source,
                                const sdm_fit_target *target, const sdm_fit_opts *opts,
                                const sdm_fit_result *r, sdm_error *why)
@@ -181,11 +182,11 @@ void cli_experiment_fits_free(cli_experiment_fits *f)
     sdm_free(f);
 }
 
-/* Fits all phantoms, which show the shape of `shown`; *why holds the reason why the first of the failed fits did not converge. */
+/* Fits all phantoms, which show the shape of `shown`; *why holds the reason why the first of the
+ * failed fits did not converge. */
 static sdm_status fit_all(const cli_experiment_run *run, const cli_experiment_job *job,
-                          const cli_experiment_job *shown,
-                          const sdm_fit_source *source, cli_experiment_result *out, sdm_error *why,
-                          sdm_error *err)
+                          const cli_experiment_job *shown, const sdm_fit_source *source,
+                          cli_experiment_result *out, sdm_error *why, sdm_error *err)
 {
     const bool polish = out->row->method->fit == SDM_EXPERIMENT_FIT_POLISH;
     sdm_status s = allocate_fits(run, job, &out->fits, err);

@@ -148,9 +148,9 @@ void cli_experiment_fit_markdown(const cli_experiment_run *run, sdm_text *t)
             sdm_text_add(t, "\n");
         }
     }
-    sdm_text_add(t,
-                 "\nMeans of absolute values over the fits that are to be trusted; the last column omits "
-                 "estimates at an end of their range.\n");
+    sdm_text_add(
+        t, "\nMeans of absolute values over the fits that are to be trusted; the last column omits "
+           "estimates at an end of their range.\n");
 }
 
 void cli_experiment_fit_json(const cli_experiment_run *run, const cli_experiment_result *r,

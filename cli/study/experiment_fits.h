@@ -3,7 +3,8 @@
 
 #include "experiment_command.h"
 
-/* The fit of a method to one phantom. found and sd are NaN unless it is to be trusted (converged). */
+/* The fit of a method to one phantom. found and sd are NaN unless it is to be trusted (converged).
+ */
 typedef struct cli_experiment_fit {
     bool converged;
     bool at_bound[SDM_MAX_PARAMS]; /* the estimate is at an end of its range */

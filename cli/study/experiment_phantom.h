@@ -12,7 +12,7 @@ typedef struct cli_experiment_phantom {
     sdm_grid grid;
     double contrast; /* inside mean less outside mean, HU */
     float *values;   /* [nz][ny][nx] HU; labels: 1 inside, 0 outside */
-    uint8_t *label; /* [nz][ny][nx] 1 inside, 0 outside */
+    uint8_t *label;  /* [nz][ny][nx] 1 inside, 0 outside */
 } cli_experiment_phantom;
 
 /* Makes phantom `index` of the experiment for a method: the shape of `job` as the method shows it

@@ -74,8 +74,9 @@ static void find_shown(sdm_experiment *e, sdm_mistakes *mistakes)
             for (from = 0; from < e->n_methods; from++)
                 if (e->methods[from].fit && !strcmp(e->methods[from].name, m->shows)) break;
         if (from == e->n_methods) {
-            sdm_mistakes_add(mistakes, m->mark, "method '%s': shows: no method with fit is named '%s'",
-                             m->name, m->shows);
+            sdm_mistakes_add(mistakes, m->mark,
+                             "method '%s': shows: no method with fit is named '%s'", m->name,
+                             m->shows);
             from = i;
         }
         for (size_t row = i; row < e->n_rows; row += e->n_methods)

@@ -22,8 +22,8 @@ static sdm_instance *shape_of(const char *name)
 }
 
 // An image of a shape at its defaults in the pose POSE (caller frees); labels: 1 inside, 0 outside.
-static float *image_of_shape(const sdm_instance *shape, const sdm_grid *g, double noise, bool labels,
-                             uint64_t seed)
+static float *image_of_shape(const sdm_instance *shape, const sdm_grid *g, double noise,
+                             bool labels, uint64_t seed)
 {
     const size_t n = sdm_grid_count(g);
     sdm_phantom_opts o = sdm_phantom_defaults();
@@ -50,8 +50,9 @@ static sdm_status fit_of(const sdm_instance *shape, const sdm_fit_target *t, dou
                          sdm_fit_result *r, sdm_error *err)
 {
     sdm_fit_opts o = sdm_fit_defaults();
-    const sdm_fit_source source = {.shape = shape, .grid = sdm_grid_centred(
-        (int64_t[3]){34, 34, 34}, 0.35, (double[3]){0, 0, 0})};
+    const sdm_fit_source source = {
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){34, 34, 34}, 0.35, (double[3]){0, 0, 0})};
     o.start_pose = POSE;
     o.polish_eps = 1e-4;
     o.appearance.n_outside = 1;
@@ -80,8 +81,7 @@ static void test_noise_is_robust(void **state)
     assert_true(fabs(median) < 0.6);
     assert_true(fabs(sdm_fit_robust_sd(x, N, median) - 3) < 0.8);
     // an autoregressive series of correlation 0.6 at lag 1
-    for (size_t i = 0; i < N; i++)
-        x[i] = last = 0.6 * last + 0.8 * sdm_rng_normal(2, 0, i);
+    for (size_t i = 0; i < N; i++) x[i] = last = 0.6 * last + 0.8 * sdm_rng_normal(2, 0, i);
     for (size_t i = 1; i < N; i++) d[i - 1] = x[i] - x[i - 1];
     assert_true(fabs(sdm_fit_robust_correlation(d, N - 1) - 0.6) < 0.05);
     assert_true(sdm_fit_robust_correlation(d, 5) == 0);
@@ -157,8 +157,8 @@ static void test_wrong_shapes_are_refused(void **state)
             sdm_fit_result r;
             sdm_error err;
             if (fit_of(pairs[k][0], &t, 0, &r, &err) != SDM_E_QUALITY)
-                fail_msg("pair %zu, labels %d: accepted: residuals %.3g, empty %.3g, missing %.3g", k,
-                         labels, finding(&r, SDM_FIT_CHECK_RESIDUALS)->figure,
+                fail_msg("pair %zu, labels %d: accepted: residuals %.3g, empty %.3g, missing %.3g",
+                         k, labels, finding(&r, SDM_FIT_CHECK_RESIDUALS)->figure,
                          finding(&r, SDM_FIT_CHECK_EMPTY)->figure,
                          finding(&r, SDM_FIT_CHECK_MISSING)->figure);
             assert_int_equal(r.verdict.grade, SDM_FIT_FAILED);

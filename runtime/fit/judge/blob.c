@@ -18,8 +18,8 @@ typedef struct ellipsoid {
 static void voxel_centre(const sdm_grid *g, size_t v, double x[3])
 {
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
-    sdm_grid_world(g, (const double[3]){(double)(v % nx), (double)(v / nx % ny),
-                                        (double)(v / nx / ny)}, x);
+    sdm_grid_world(
+        g, (const double[3]){(double)(v % nx), (double)(v / nx % ny), (double)(v / nx / ny)}, x);
 }
 
 // centre and covariance of the inside of the map; the ellipsoid of this covariance is scaled to the
@@ -85,9 +85,9 @@ sdm_status sdm_fit_against_blob(const fit_problem *p, double *gain, double *alik
         *gain = p->information.log_likelihood;
         for (size_t i = 0; i < p->samples.n; i++) {
             fit_likelihood l;
-            sdm_fit_likelihood(&p->observation, (double)p->samples.value[i],
-                               fit_sample_weights(&p->samples, i),
-                               sdm_fit_field_at(&f, &p->state, p->samples.world + 3 * i), false, &l);
+            sdm_fit_likelihood(
+                &p->observation, (double)p->samples.value[i], fit_sample_weights(&p->samples, i),
+                sdm_fit_field_at(&f, &p->state, p->samples.world + 3 * i), false, &l);
             *gain -= l.log_likelihood;
         }
         *alike = 2 * both / fmax(shape + blob, 1);

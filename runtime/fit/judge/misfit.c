@@ -147,7 +147,8 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
     for (size_t i = 0; i < r->n; i++) volume += r->expected[i];
     const double factor = points ? points_volume_factor(p) : 1;
     for (size_t from = 0, to; from < n && !s; from = to) {
-        for (to = from; to < n && m[to].unit == m[from].unit; to++) {}
+        for (to = from; to < n && m[to].unit == m[from].unit; to++) {
+        }
         if (to - from < 2) continue;
         const unit_mean u = unit_measure(r, m + from, to - from);
         const double z2 = u.mean * u.mean / u.variance;

@@ -2,9 +2,9 @@
 
    Where the shape is right, residuals are noise. Where it is wrong, the residuals of a whole
    neighbourhood have one sign. The samples are therefore grouped into units: the samples in a cube
-   whose edge is half of the largest radius of the shape, separately on both sides of the surface. The mean
-   residual of a unit is compared with its standard deviation, which follows from the size and the
-   correlation of the noise. */
+   whose edge is half of the largest radius of the shape, separately on both sides of the surface.
+   The mean residual of a unit is compared with its standard deviation, which follows from the size
+   and the correlation of the noise. */
 #pragma once
 
 #include "residuals.h"

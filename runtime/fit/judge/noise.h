@@ -12,8 +12,8 @@ double sdm_fit_median(double *x, size_t n);
    (Hampel 1974). Overwrites x[n]; NaN for n = 0. */
 double sdm_fit_robust_sd(double *x, size_t n, double centre);
 
-/* Middle of the shortest interval that holds half of x[n], the least median of squares estimate of a
-   location (Rousseeuw 1984): where the values have two modes, it lies in the larger one. *sd:
+/* Middle of the shortest interval that holds half of x[n], the least median of squares estimate of
+   a location (Rousseeuw 1984): where the values have two modes, it lies in the larger one. *sd:
    standard deviation of Gaussian values with an interval of this length. Sorts x; NaN for n = 0. */
 double sdm_fit_shortest_half(double *x, size_t n, double *sd);
 

@@ -79,7 +79,8 @@ static void shares_fill(const fit_problem *p, fit_residuals *r, double *list)
     }
 }
 
-// sd of the noise of every voxel; leaves out a third material, and limits what is beyond the outside
+// sd of the noise of every voxel; leaves out a third material, and limits what is beyond the
+// outside
 static void noise_fill(fit_residuals *r)
 {
     const double contrast = fabs(r->middle[1] - r->middle[0]);

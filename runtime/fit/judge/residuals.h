@@ -2,10 +2,10 @@
 
    Voxels: the observed share of the inside material is the value of the voxel on the scale from the
    outside (0) to the inside (1); the prediction is the share that the shape fills. Both ends of the
-   scale are least medians of squares over the voxels deep inside and deep outside. They and the noise are robust:
-   the tissues of the fit itself would not do, because a wrong shape widens them until they excuse
-   everything. Points: the residual is the signed distance from the surface over the largest radius
-   of the shape. */
+   scale are least medians of squares over the voxels deep inside and deep outside. They and the
+   noise are robust: the tissues of the fit itself would not do, because a wrong shape widens them
+   until they excuse everything. Points: the residual is the signed distance from the surface over
+   the largest radius of the shape. */
 #pragma once
 
 #include "fit/solver/problem.h"
@@ -20,7 +20,8 @@ typedef struct fit_residuals {
     double *expected, *residual, *sd;
     /* [n] false: the sample holds a third material, and its residual says nothing */
     bool *used;
-    /* [n][3] place of the sample, in steps of the image (points: in halves of the largest radius) */
+    /* [n][3] place of the sample, in steps of the image (points: in halves of the largest radius)
+     */
     int32_t *place;
     /* edge of the cubes in which residuals are averaged, in steps along each axis, >= 1 */
     int32_t edge[3];

@@ -54,10 +54,8 @@ static void add(sdm_fit_verdict *v, sdm_fit_check_kind kind, bool passed, sdm_fi
 static void add(sdm_fit_verdict *v, sdm_fit_check_kind kind, bool passed, sdm_fit_grade grade,
                 double figure, double limit, const char *fmt, ...)
 {
-    sdm_fit_finding f = {.kind = kind,
-                         .grade = passed ? SDM_FIT_PASSED : grade,
-                         .figure = figure,
-                         .limit = limit};
+    sdm_fit_finding f = {
+        .kind = kind, .grade = passed ? SDM_FIT_PASSED : grade, .figure = figure, .limit = limit};
     va_list args;
     va_start(args, fmt);
     if (!passed) vsnprintf(f.text, sizeof f.text, fmt, args);
@@ -86,8 +84,8 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
     const sdm_fit_appearance *a = &r->appearance, *b = &o->appearance;
     const double in = main_law(a->inside, a->n_inside)->mean,
                  out = main_law(a->outside, a->n_outside)->mean;
-    const bool darker = main_law(b->inside, b->n_inside)->mean <
-                        main_law(b->outside, b->n_outside)->mean;
+    const bool darker =
+        main_law(b->inside, b->n_inside)->mean < main_law(b->outside, b->n_outside)->mean;
     add(v, SDM_FIT_CHECK_CONVERGED, r->converged, SDM_FIT_FAILED, (double)r->n_iterations, NAN,
         "not converged after %zu iterations (%.120s); allow more of them, or give a nearer start",
         r->n_iterations, r->reason);
@@ -223,5 +221,6 @@ double sdm_fit_compare(const sdm_fit_result *fit, const sdm_fit_result *rival)
     if (!one || !other) return one ? INFINITY : other ? -INFINITY : NAN;
     if (!isnan(fit->evidence) && !isnan(rival->evidence)) return fit->evidence - rival->evidence;
     const double n = 0.5 * (double)(fit->verdict.n_units + rival->verdict.n_units);
-    return 0.5 * n * log(fmax(rival->verdict.chi_square, 1e-3) / fmax(fit->verdict.chi_square, 1e-3));
+    return 0.5 * n *
+           log(fmax(rival->verdict.chi_square, 1e-3) / fmax(fit->verdict.chi_square, 1e-3));
 }

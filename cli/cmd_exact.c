@@ -71,8 +71,9 @@ static sdm_status open_mesh(job *j, sdm_error *err)
                         args->method);
     if (args->columns && !args->points)
         return sdm_fail(err, SDM_E_ARG, "exact: --columns belongs to --points FILE");
-    sdm_status s =
-        args->points ? cli_points_check(args, &j->points, err) : cli_layers_check(args, err);
+    sdm_status s = cli_check_vdb_options(args, err);
+    if (!s)
+        s = args->points ? cli_points_check(args, &j->points, err) : cli_layers_check(args, err);
     if (s) return s;
     s = args->mesh ? cli_read_mesh(args->mesh, &j->mesh, err) : make_shape_mesh(j, err);
     return s || !args->turn_parts ? s : cli_turn_parts(&j->mesh, err);
@@ -184,7 +185,7 @@ static sdm_status run_method(job *j, sdm_error *err)
     sdm_method_report report;
     cli_progress_start(&w.bar);
     s = method->map(&j->mesh, &j->grid, &opts, j->values, &report, err);
-    cli_progress_clear(&w.bar);
+    cli_progress_end(&w.bar, !s);
     if (s) return s;
     // the report
     j->report = report.exact;
@@ -223,34 +224,36 @@ static void notice_mesh(const job *j)
     if (j->report.parts_turned)
         cli_notice("%zu parts were inside out; their orientation has been reversed",
                    j->report.parts_turned);
-    cli_notice_audit(a);
+    cli_warn_audit(a);
     // a single part that meets no other cannot be inside out after the engine has turned it
-    if (a->components > 1)
-        cli_notice_parts(&j->mesh, j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
+    if (a->components > 1) cli_warn_parts(&j->mesh, j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
                    "triangles (error at most %.2g mm)",
                    a->n_tri, j->report.n_tri_used, j->report.union_error_mm);
 }
 
-static void notice_signs(const job *j)
+/* Returns what the certificate says; without --certify it says nothing. */
+static sdm_status judge_signs(const job *j, sdm_error *err)
 {
     const sdm_sign_certificate *c = &j->certificate;
-    if (!c->checked) return;
+    if (!c->checked) return SDM_OK;
     if (c->wrong) {
         const double index[3] = {(double)c->first_wrong[0], (double)c->first_wrong[1],
                                  (double)c->first_wrong[2]};
         double x[3];
         sdm_grid_world(&j->grid, index, x);
-        cli_notice("signs: %zu of %zu voxels differ from %s, the first at %g, %g, %g mm", c->wrong,
-                   c->checked, c->compared, x[0], x[1], x[2]);
-    } else {
-        cli_notice("signs: %zu of %zu voxels compared with %s, all agree", c->checked, c->voxels,
-                   c->compared);
+        return sdm_fail(err, SDM_E_QUALITY,
+                        "signs: %zu of %zu voxels differ from %s, the first at %g, %g, %g mm",
+                        c->wrong, c->checked, c->compared, x[0], x[1], x[2]);
     }
-    if (c->below_zero)
-        cli_notice("%zu voxels are in a part of the mesh that is inside out and count as outside",
-                   c->below_zero);
+    cli_notice("signs: %zu of %zu voxels compared with %s, all agree", c->checked, c->voxels,
+               c->compared);
+    if (!c->below_zero) return SDM_OK;
+    return sdm_fail(
+        err, SDM_E_QUALITY,
+        "signs: %zu voxels are in a part of the mesh that is inside out and count as outside",
+        c->below_zero);
 }
 
 static sdm_status write_outputs(const job *j, sdm_error *err)
@@ -331,10 +334,10 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
     } else if (!s) {
         s = strcmp(args->method, "exact") ? run_method(&j, err) : run_engine(&j, err);
         if (!s) notice_mesh(&j);
-        if (!s) notice_signs(&j);
         if (!s) s = write_outputs(&j, err);
         if (!s) s = cli_layers_write(&j.layers, args, &j.grid, err);
         if (!s && args->json) s = print_json(&j, err);
+        if (!s) s = judge_signs(&j, err);
     }
     cli_layers_dispose(&j.layers);
     sdm_exact_free(j.engine);

@@ -87,7 +87,7 @@ static sdm_status fit_shape(cli_fit *f, sdm_error *err)
     f->doubt.status = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
     sdm_status s = SDM_OK;
     if (!f->doubt.status || f->doubt.status == SDM_E_QUALITY) s = cli_fit_mirror(f, err);
-    cli_progress_clear(&w.bar);
+    cli_progress_end(&w.bar, !s && (!f->doubt.status || f->doubt.status == SDM_E_QUALITY));
     f->found = f->result.objective && f->result.params;
     if (s || !f->doubt.status || f->doubt.status == SDM_E_QUALITY) return s;
     return sdm_fail(err, f->doubt.status, "%s: %s", f->path, f->doubt.text);

@@ -166,12 +166,26 @@ static sdm_status open_model(job *j, sdm_error *err)
     return cli_model_params(j->info, &j->params, err);
 }
 
+/* Refuses options that would do nothing. */
+static sdm_status check_options(const cli_args *args, sdm_error *err)
+{
+    const bool grid = args->size[0] > 0 || args->spacing[0] > 0 || !isnan(args->origin[0]) ||
+                      !isnan(args->direction[0]);
+    if (args->columns && !args->points)
+        return sdm_fail(err, SDM_E_ARG, "generate: --columns belongs to --points FILE");
+    if (!(args->max_error > 0) && strcmp(args->error_of, "max"))
+        return sdm_fail(err, SDM_E_ARG, "generate: --error-of does nothing without --max-error MM");
+    if (cli_outside(args) != SDM_OUTSIDE_REFUSE && !grid && !args->points)
+        return sdm_fail(err, SDM_E_ARG,
+                        "generate: --outside does nothing on the grid of the model; it is for "
+                        "another grid (--size, --spacing, --origin, --direction) or --points");
+    return cli_check_vdb_options(args, err);
+}
+
 /* Opens the model and checks everything before the first map is made. */
 static sdm_status prepare_job(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
-    if (args->columns)
-        return sdm_fail(err, SDM_E_ARG, "generate: --columns belongs to --points FILE");
     if (!args->outputs.n && !args->json && !args->gradient && !args->jacobian && !args->check)
         return sdm_fail(
             err, SDM_E_ARG,
@@ -447,14 +461,15 @@ static sdm_status run_maps(job *j, sdm_error *err)
         if (!s && i + 1 < j->n_rows) s = cli_check_interrupt(err);
         cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j->n_rows, NULL);
     }
-    cli_progress_clear(&progress);
+    cli_progress_end(&progress, !s);
     return !s && j->args->json ? print_json(j, err) : s;
 }
 
 sdm_status cmd_generate(const cli_args *args, sdm_error *err)
 {
     job j = {.args = args};
-    const sdm_status s = args->points ? run_points(&j, err) : run_maps(&j, err);
+    sdm_status s = check_options(args, err);
+    if (!s) s = args->points ? run_points(&j, err) : run_maps(&j, err);
     job_dispose(&j);
     return s;
 }

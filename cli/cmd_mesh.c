@@ -9,12 +9,15 @@
 #include "report/terminal.h"
 #include "sdm/meshfile.h"
 
-/* Prints the audit, or JSON; without both, only warns. */
+/* Prints the audit, or JSON, and returns the verdict; without both, only warns. */
 static sdm_status report_audit(const cli_args *args, const sdm_mesh *mesh, sdm_error *err)
 {
-    cli_notice_parts(mesh, args->shape ? CLI_MEND_SHAPE : CLI_MEND_FILE);
-    if (!args->audit && !args->json) return SDM_OK;
+    const char *mend = args->shape ? CLI_MEND_SHAPE : CLI_MEND_FILE;
     sdm_part_audit audit;
+    if (!args->audit && !args->json) {
+        cli_warn_mesh(mesh, mend);
+        return SDM_OK;
+    }
     sdm_status s = sdm_part_audit_make(mesh, true, &audit, err);
     if (s) return s;
     if (args->json) {
@@ -29,6 +32,7 @@ static sdm_status report_audit(const cli_args *args, const sdm_mesh *mesh, sdm_e
     } else {
         cli_print_audit(&audit);
     }
+    if (!s) s = cli_audit_verdict(&audit, mend, err);
     sdm_part_audit_dispose(&audit);
     return s;
 }

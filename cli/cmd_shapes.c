@@ -10,7 +10,6 @@
 #include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
 #include "shapes/shapes_command.h"
-#include "study/check_family.h"
 
 static const char *option_type(const sdm_option *o)
 {
@@ -247,7 +246,7 @@ static command_function find_subcommand(const cli_args *args)
     static const struct {
         const char *word;
         command_function run;
-    } subcommands[] = {{"new", cli_shapes_new}, {"check", cli_check_family}};
+    } subcommands[] = {{"new", cli_shapes_new}, {"check", cli_shapes_check}};
     for (size_t i = 0; i < sizeof subcommands / sizeof *subcommands && args->files.n > 0; i++)
         if (!strcmp(args->files.items[0], subcommands[i].word)) return subcommands[i].run;
     return NULL;

@@ -45,23 +45,35 @@ static sdm_status check_folder(const cli_args *args, const char *folder, sdm_err
 }
 
 /* Draws slices exact | network | error at the default parameters of the model. */
-static sdm_status write_picture(const sdm_train_report *report, const sdm_instance *shape,
+static sdm_status write_picture(const sdm_model *model, const sdm_instance *shape,
                                 const char *folder, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];
     double p[SDM_MAX_PARAMS];
-    sdm_model *model = NULL;
-    sdm_status s = sdm_model_open(report->model_path, &model, err);
-    if (s) return s;
     const sdm_model_info *info = sdm_model_get_info(model);
     for (size_t i = 0; i < info->n_params && i < SDM_MAX_PARAMS; i++) p[i] = info->params[i].def;
     snprintf(path, sizeof path, "%s/slices.png", folder);
-    s = cli_picture_compare(model, shape, 0, 0, p, path, err);
+    return cli_picture_compare(model, shape, 0, 0, p, path, err);
+}
+
+/* Draws slices.png and measures the time of a map with the finished model. */
+static sdm_status look_at_model(const char *model_path, const sdm_instance *shape,
+                                const char *folder, cli_timing *times, sdm_error *err)
+{
+    sdm_model *model = NULL;
+    sdm_error picture = {0};
+    sdm_status s = sdm_model_open(model_path, &model, err);
+    // without SDM_PICTURE, the notice about loss.png says enough
+    if (!s && !sdm_picture_check("slices.png", NULL) &&
+        write_picture(model, shape, folder, &picture))
+        cli_notice("%s", picture.text);
+    if (!s) s = cli_time_two(model, shape, times, err);
     sdm_model_free(model);
     return s;
 }
 
-static sdm_status print_summary(const cli_args *args, const sdm_train_report *r, sdm_error *err)
+static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
+                                const cli_timing *times, sdm_error *err)
 {
     const sdm_accuracy *a = &r->accuracy;
     // print as JSON
@@ -78,6 +90,8 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         sdm_json_int(&j, "heldout", a->samples);
         sdm_json_int(&j, "steps", r->steps);
         sdm_json_int(&j, "maps", r->samples);
+        sdm_json_real(&j, "ms_network", times->ms_network);
+        sdm_json_real(&j, "ms_exact", times->ms_exact);
         sdm_json_open(&j, "verdict", '{');
         sdm_verdict_json(&j, &r->verdict);
         sdm_json_real(&j, "saved_seconds", r->verdict.saved_seconds);
@@ -96,6 +110,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
            "%.5f mm, largest %.5f mm\n",
            (long long)a->samples, a->mse_mm2, a->rmse_mm, a->near_mm, a->rmse_near_mm,
            a->max_abs_mm);
+    cli_print_two("  time        ", times);
     cli_print_verdict(&r->verdict);
     return SDM_OK;
 }
@@ -110,13 +125,11 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     if (!args->resume) cli_notice_survey(config, shape);
     cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
-    cli_progress_clear(&progress);
+    cli_progress_end(&progress, !s);
     if (s) return s;
-    sdm_error picture = {0};
-    // without SDM_PICTURE, the notice about loss.png says enough
-    if (!sdm_picture_check("slices.png", NULL) && write_picture(&report, shape, folder, &picture))
-        cli_notice("%s", picture.text);
-    return print_summary(args, &report, err);
+    cli_timing times;
+    s = look_at_model(report.model_path, shape, folder, &times, err);
+    return s ? s : print_summary(args, &report, &times, err);
 }
 
 sdm_status cmd_train(const cli_args *args, sdm_error *err)

@@ -72,7 +72,7 @@ static sdm_status verify_image(const cli_args *args, const char *path, sdm_error
 }
 
 static sdm_status report_model(const cli_args *args, const char *path, const sdm_model_info *info,
-                               const cli_eval *e, sdm_error *err)
+                               const cli_eval *e, const cli_timing *times, sdm_error *err)
 {
     const double stated = info->accuracy.rmse_mm;
     const bool good = e->n == 0 || e->rmse_mm <= TOLERANCE * stated;
@@ -85,13 +85,19 @@ static sdm_status report_model(const cli_args *args, const char *path, const sdm
         sdm_json_bool(&j, "ok", good);
         sdm_json_int(&j, "samples", (int64_t)e->n);
         sdm_json_real(&j, "stated_rmse_mm", stated);
-        if (e->n > 0) sdm_json_real(&j, "rmse_mm", e->rmse_mm);
+        if (e->n > 0) {
+            sdm_json_real(&j, "rmse_mm", e->rmse_mm);
+            sdm_json_real(&j, "ms_network", times->ms_network);
+            sdm_json_real(&j, "ms_exact", times->ms_exact);
+        }
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else {
         printf("%s: every checksum is right\n", path);
-        if (e->n > 0)
+        if (e->n > 0) {
             printf("RMSE %.5f mm on %zu random shapes, stated %.5f mm\n", e->rmse_mm, e->n, stated);
+            cli_print_two("", times);
+        }
     }
     if (!s && !good)
         s = sdm_fail(err, SDM_E_QUALITY,
@@ -106,6 +112,7 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
     sdm_instance *shape = NULL;
     sdm_model *model = NULL;
     cli_eval e = {0};
+    cli_timing times;
     sdm_status s = cli_open_registry(args, &registry, err);
     if (!s) s = cli_open_model(path, &model, err); // verifies every checksum
     const sdm_model_info *info = s ? NULL : sdm_model_get_info(model);
@@ -115,10 +122,11 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
         s = cli_evaluate(model, shape, args->seed < 0 ? 1 : (uint64_t)args->seed,
                          args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples, false, &e,
                          err);
+    if (!s && known) s = cli_time_two(model, shape, &times, err);
     if (!s && !known)
-        cli_notice("shape '%s' is unknown (--plugin FILE loads it): the accuracy was not measured",
-                   info->shape);
-    if (!s) s = report_model(args, path, info, &e, err);
+        cli_warn("shape '%s' is unknown (--plugin FILE loads it): the accuracy was not measured",
+                 info->shape);
+    if (!s) s = report_model(args, path, info, &e, &times, err);
     cli_eval_dispose(&e);
     sdm_model_free(model);
     sdm_instance_free(shape);

@@ -1,6 +1,8 @@
 /* sdmgen: parses the command line, runs one command and turns its status into an exit code. */
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -10,6 +12,7 @@
 
 #include "args/help.h"
 #include "commands.h"
+#include "report/crash_guard.h"
 #include "report/terminal.h"
 
 /* The functions of the commands, by index into cli_commands. */
@@ -55,6 +58,7 @@ static int run_command(const cli_args *args)
     if (args->threads > 0) omp_set_num_threads((int)args->threads);
 #endif
     cli_catch_interrupts();
+    cli_guard_callbacks();
     sdm_error err = {0};
     const sdm_status s = functions[args->command - cli_commands](args, &err);
     if (!s) return CLI_EXIT_DONE;
@@ -73,8 +77,20 @@ static void keep_memory(void)
 #endif
 }
 
+/* Opens /dev/null for each of stdin, stdout and stderr that is closed: otherwise the first file
+ * that is opened would get its number, and messages would go into that file. It is opened the other
+ * way round, so that a result that cannot be printed remains an error. */
+static void open_standard_files(void)
+{
+    for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++)
+        if (fcntl(fd, F_GETFD) < 0 &&
+            open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY) != fd)
+            _exit(CLI_EXIT_FAILED);
+}
+
 int main(int argc, char **argv)
 {
+    open_standard_files();
     keep_memory();
     if (argc == 2 && !strcmp(argv[1], "--version")) {
         puts("sdmgen " SDM_VERSION_TEXT);
@@ -86,6 +102,7 @@ int main(int argc, char **argv)
     cli_args args;
     sdm_error err = {0};
     const sdm_status s = cli_parse(argc, argv, &args, &err);
+    cli_set_form(args.progress);
     int code;
     if (s)
         code = cli_report(&err);

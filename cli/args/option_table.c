@@ -41,13 +41,15 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      ".obj .off, mm). A surface that overlaps itself stands for the union of the volumes it\n"
      "encloses. Without grid options the grid is fitted to the bounding box of the mesh, with\n"
      "a margin of a tenth of its longest edge on every side: 64 voxels along that edge,\n"
-     "margins included. With --points FILE, distances at points in any order.",
+     "margins included. With --points FILE, distances at points in any order. A mesh that is\n"
+     "not closed, or parts that are inside out, give a warning.",
      "sdmgen exact --shape cochlea -p a=4.2 --size 60,50,50 --spacing 0.2 -o cochlea.nrrd", 0, 0},
     {"mesh", "--shape NAME [-p name=value ...] | --mesh FILE [-o FILE]",
      "write the surface mesh of a shape, or audit and mend a mesh",
      "Makes the mesh of a shape or reads a mesh file (.ply .stl .obj .off, mm), and warns of\n"
-     "parts that are inside out. --audit prints the state of every part and the volume of the\n"
-     "union. --turn-parts turns the parts that are inside out.",
+     "defects. --audit prints the state of every part and the volume of the union. Exit code\n"
+     "of --audit and --json 3: the mesh is not closed; 4: parts are inside out, or it encloses\n"
+     "no volume; files are written all the same. --turn-parts turns parts that are inside out.",
      "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0},
     {"eval", "MODEL", "measure a network on new random shapes",
      "Draws random shapes that the training did not use and compares the network with the\n"
@@ -128,8 +130,8 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "sdmgen fit runs/cochlea/model.sdm ct.nii.gz --start-centre 4,-2,7 --start-axis 0,0,1 -o "
      "fit.stl -o fit.png",
      1, 2},
-    {"help", "[COMMAND]", "print this text, the manual page or the bash completion", NULL,
-     "sdmgen help --completion > ~/.local/share/bash-completion/completions/sdmgen", 0, 1},
+    {"help", "[COMMAND]", "print help, manual pages or completion scripts", NULL,
+     "sdmgen help --completion bash > ~/.local/share/bash-completion/completions/sdmgen", 0, 1},
 };
 
 const cli_option cli_options[] = {
@@ -211,8 +213,8 @@ const cli_option cli_options[] = {
     {"keep-overlap", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXACT), AT(keep_overlap),
      "measure to all triangles, also to those inside the union"},
     {"certify", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXACT), AT(certify),
-     "compute the sign of every voxel again along other axes and report differences (method "
-     "exact)"},
+     "compute the sign of every voxel again along other axes; exit code 4 when signs differ, or "
+     "voxels lie in a part that is inside out (method exact)"},
 
     /* the output */
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(outputs),
@@ -441,9 +443,9 @@ const cli_option cli_options[] = {
     {"markdown", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG) | ON(CLI_EXPERIMENT) | ON(CLI_HELP),
      AT(markdown), "print Markdown"},
     {"man", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_HELP), AT(man),
-     "print the manual page, for man(1)"},
-    {"completion", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_HELP), AT(completion),
-     "print the completion script for bash"},
+     "print the manual page of sdmgen or of COMMAND, for man(1)"},
+    {"completion", 0, CLI_CHOICE, NULL, "bash|zsh|fish", 0, 0, ON(CLI_HELP), AT(completion),
+     "print the completion script for this shell"},
 
     /* all commands */
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
@@ -458,7 +460,14 @@ const cli_option cli_options[] = {
      AT(seed), "seed of the random numbers (default 1; train, config: the configuration's)"},
     {"json", 0, CLI_FLAG, NULL, NULL, 0, 0, REPORTS, AT(json),
      "print the result as one line of JSON"},
-    {"quiet", 'q', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(quiet), "print no progress and no notices"},
+    {"progress", 0, CLI_CHOICE, NULL, "auto|plain|json|slicer", 0, 0,
+     ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_EVAL) | ON(CLI_VERIFY) |
+         ON(CLI_EXPERIMENT) | ON(CLI_FIT),
+     AT(progress),
+     "form of the progress: a bar on a terminal, plain lines elsewhere (auto, default); plain "
+     "lines; every line on stderr as JSON; or the elements on stdout that 3D Slicer reads"},
+    {"quiet", 'q', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(quiet),
+     "print no progress and no notices; warnings and errors remain"},
     {"help", 'h', CLI_FLAG, NULL, NULL, 0, 0, ALL, AT(help), "print this text"},
 };
 const size_t cli_n_options = sizeof cli_options / sizeof *cli_options;

@@ -1,5 +1,5 @@
 /* The tables of commands and options, and the parsed command line. Parsing, --help, the manual
- * page and the bash completion are all made from these tables. */
+ * pages and the completion scripts are all made from these tables. */
 #pragma once
 
 #include <stdbool.h>
@@ -111,6 +111,7 @@ struct cli_args {
     cli_list files; /* positional arguments */
     cli_list plugins, params, options, outputs;
     bool quiet, json, help;
+    const char *progress; /* train, generate, exact, eval, verify, experiment, fit */
     int64_t threads, seed;
     bool resume;                     /* train */
     bool force;                      /* train, experiment, fit */
@@ -124,7 +125,8 @@ struct cli_args {
     bool dump;                       /* config */
     bool keys;                       /* config, experiment */
     bool markdown;                   /* config, experiment, help */
-    bool man, completion;            /* help */
+    bool man;                        /* help */
+    const char *completion;          /* help: shell */
     const char *out;                 /* train, experiment, shapes */
     const char *rows;                /* generate: the file of --params */
     const char *policy;              /* generate, fit */

@@ -4,6 +4,7 @@
 
 #include "fit_command.h"
 #include "inputs/setup.h"
+#include "report/report_audit.h"
 #include "sdm/memory.h"
 
 static sdm_status open_model(cli_fit *f, sdm_error *err)
@@ -111,6 +112,15 @@ static sdm_status check_start(cli_fit *f, sdm_error *err)
     return SDM_OK;
 }
 
+/* Warns of defects of the shape's mesh at the start, if the fit makes exact maps of it. */
+static void warn_shape(const cli_fit *f)
+{
+    sdm_mesh mesh = {0};
+    if (f->shape && !sdm_instance_mesh(f->shape, f->start, &mesh, NULL))
+        cli_warn_mesh(&mesh, CLI_MEND_SHAPE);
+    sdm_mesh_dispose(&mesh);
+}
+
 sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err)
 {
     f->source.policy = cli_policy(f->args);
@@ -130,6 +140,7 @@ sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err)
     if (!s) s = check_start(f, err);
     if (s) return s;
     f->source.shape = f->shape;
+    warn_shape(f);
     if (!network) s = exact_grid(f, err);
     return s;
 }

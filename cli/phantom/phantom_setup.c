@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "phantom_command.h"
+#include "report/report_audit.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
 
@@ -167,6 +168,7 @@ sdm_status cli_phantom_setup(cli_phantom *p, sdm_error *err)
     if (!s) s = draw_params(p, err);
     if (!s) s = read_pose(p, err);
     if (!s) s = sdm_instance_mesh(p->shape.instance, p->shape.values, &mesh, err);
+    if (!s) cli_warn_mesh(&mesh, CLI_MEND_SHAPE);
     if (!s) s = grid_make(p, &mesh, err);
     sdm_mesh_dispose(&mesh);
     return s;

@@ -62,6 +62,25 @@ sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
     return kind == KIND_PICTURE ? sdm_picture_check(path, err) : SDM_OK;
 }
 
+sdm_status cli_check_vdb_options(const cli_args *args, sdm_error *err)
+{
+    const char *given = args->dense      ? "--dense"
+                        : args->half     ? "--half"
+                        : args->band > 0 ? "--band"
+                                         : NULL;
+    bool vdb = false;
+    for (size_t i = 0; i < args->outputs.n; i++)
+        vdb = vdb || kind_of(args->outputs.items[i], NULL) == KIND_VDB;
+    if (given && !vdb)
+        return sdm_fail(err, SDM_E_ARG, "%s: %s does nothing without an output -o FILE.vdb",
+                        args->command->name, given);
+    if (args->dense && args->band > 0)
+        return sdm_fail(err, SDM_E_ARG,
+                        "%s: --band does nothing with --dense, which writes the whole map",
+                        args->command->name);
+    return SDM_OK;
+}
+
 bool cli_blocks_suffice(const cli_args *args)
 {
     for (size_t i = 0; i < args->outputs.n; i++)
@@ -148,7 +167,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
                    "level set; no sign changed",
                    path, (long long)report.adjusted_voxels, report.adjusted_mm);
     if (!s && report.cut)
-        cli_notice("%s: the surface leaves the grid and is cut at its border", path);
+        cli_warn("%s: the surface leaves the grid and is cut at its border", path);
     else if (!s && report.estimated_voxels > 0)
         cli_notice("%s: the band leaves the grid; the distances of %lld voxels beyond it are "
                    "estimated from those at its border: a larger grid or a narrower --band avoids "
@@ -168,9 +187,12 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
     bool cut = false;
     sdm_status s = sdm_isosurface(map->grid, map->values, 0.0f, &surface, &cut, err);
     if (!s && surface.n_tri == 0)
-        s = sdm_fail(err, SDM_E_MESH, "%s: the map has no zero surface", path);
+        s = sdm_fail(err, SDM_E_MESH,
+                     "%s: the map has no zero surface: all voxels are %s the shape; does the grid "
+                     "cover it?",
+                     path, map->values[0] < 0 ? "inside" : "outside");
     if (!s) s = sdm_mesh_write(path, &surface, err);
-    if (!s && cut) cli_notice("%s: the surface leaves the grid and is open at its border", path);
+    if (!s && cut) cli_warn("%s: the surface leaves the grid and is open at its border", path);
     sdm_mesh_dispose(&surface);
     return s;
 }

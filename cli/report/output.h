@@ -28,6 +28,10 @@ typedef struct cli_map {
  * of mesh files. SDM_E_ARG; SDM_E_UNSUPPORTED: .vdb in a build without OpenVDB. */
 sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err);
 
+/* Refuses options of level sets (--band, --half, --dense) if no output is a .vdb file, and --band
+ * with --dense: they would do nothing. SDM_E_ARG. */
+sdm_status cli_check_vdb_options(const cli_args *args, sdm_error *err);
+
 /* Whether all outputs of the command line are level sets, for which blocks suffice. */
 bool cli_blocks_suffice(const cli_args *args);
 

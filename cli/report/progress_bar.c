@@ -1,4 +1,4 @@
-/* Draws the progress bar, or prints progress lines where stderr is no terminal. */
+/* Draws the progress bar, or prints lines of progress. */
 #include "progress_bar.h"
 
 #include <stdio.h>
@@ -7,16 +7,26 @@
 #include <unistd.h>
 
 #include "sdm/internal/clock.h"
+#include "sdm/internal/text.h"
 #include "terminal.h"
 
 enum { MIN_CELLS = 6, MAX_CELLS = 24, LINE_MAX_BYTES = 512 };
 
+/* Shortest time between two lines of progress, s: plain lines are for log files, the others for
+ * programs that show them. */
+static double interval_of(bool bar)
+{
+    if (bar) return 0.1;
+    const cli_form form = cli_get_form();
+    return form == CLI_FORM_JSON || form == CLI_FORM_SLICER ? 0.25 : 10.0;
+}
+
 void cli_progress_start(cli_progress *p)
 {
-    p->terminal = cli_has_terminal();
+    p->bar = cli_get_form() == CLI_FORM_AUTO && cli_has_terminal();
     p->drawn = false;
-    p->interval = p->terminal ? 0.1 : 10.0;
-    p->last = sdm_clock() - (p->terminal ? p->interval : 0.0);
+    p->interval = interval_of(p->bar);
+    p->last = sdm_clock() - (p->interval < 1 ? p->interval : 0.0);
 }
 
 static size_t terminal_width(void)
@@ -36,19 +46,8 @@ static void bar_draw(char bar[MAX_CELLS + 1], double fraction, size_t room)
     bar[cells] = '\0';
 }
 
-void cli_progress_show(cli_progress *p, const char *title, double fraction, const char *text)
+static void draw(cli_progress *p, const char *title, double fraction, const char *text)
 {
-    const double now = sdm_clock();
-    if (cli_is_quiet() || now - p->last < p->interval) return;
-    p->last = now;
-    if (!(fraction >= 0)) fraction = 0;
-    if (fraction > 1) fraction = 1;
-
-    if (!text) text = "";
-    if (!p->terminal) {
-        fprintf(stderr, "sdmgen: %s %.0f %%  %s\n", title, 100 * fraction, text);
-        return;
-    }
     char line[LINE_MAX_BYTES], bar[MAX_CELLS + 1];
     const size_t width = terminal_width(),
                  around = strlen(title) + strlen(text) + strlen("  100 % [] ") + 1;
@@ -61,10 +60,59 @@ void cli_progress_show(cli_progress *p, const char *title, double fraction, cons
     p->drawn = true;
 }
 
+/* {"progress":0.42,"title":"fit","text":"iteration 3 of at most 80"} */
+static void print_json(const char *title, double fraction, const char *text)
+{
+    sdm_json json = {0};
+    sdm_json_open(&json, NULL, '{');
+    sdm_json_real(&json, "progress", fraction);
+    sdm_json_text(&json, "title", title);
+    sdm_json_text(&json, "text", text);
+    sdm_json_close(&json, '}');
+    if (!json.text.failed) fprintf(stderr, "%s\n", json.text.data);
+    sdm_json_dispose(&json);
+}
+
+/* The elements that 3D Slicer finds among other output of a module. */
+static void print_slicer(double fraction)
+{
+    printf("<filter-progress>%.3f</filter-progress>\n", fraction);
+    fflush(stdout);
+}
+
+void cli_progress_show(cli_progress *p, const char *title, double fraction, const char *text)
+{
+    const double now = sdm_clock();
+    if (cli_is_quiet() || now - p->last < p->interval) return;
+    p->last = now;
+    if (!(fraction >= 0)) fraction = 0;
+    if (fraction > 1) fraction = 1;
+    if (!text) text = "";
+
+    if (p->bar)
+        draw(p, title, fraction, text);
+    else if (cli_get_form() == CLI_FORM_JSON)
+        print_json(title, fraction, text);
+    else if (cli_get_form() == CLI_FORM_SLICER)
+        print_slicer(fraction);
+    else
+        fprintf(stderr, "sdmgen: %s %.0f %%  %s\n", title, 100 * fraction, text);
+}
+
 void cli_progress_clear(cli_progress *p)
 {
     if (!p->drawn) return;
     fputs("\r\033[K", stderr);
     fflush(stderr);
     p->drawn = false;
+}
+
+void cli_progress_end(cli_progress *p, bool done)
+{
+    cli_progress_clear(p);
+    if (!done || cli_is_quiet()) return;
+    if (cli_get_form() == CLI_FORM_JSON)
+        print_json("done", 1, "");
+    else if (cli_get_form() == CLI_FORM_SLICER)
+        print_slicer(1);
 }

@@ -1,4 +1,4 @@
-/* Prints the figures of a mesh audit. */
+/* Prints the figures of a mesh audit and judges the mesh. */
 #include "report_audit.h"
 
 #include <math.h>
@@ -63,6 +63,11 @@ void cli_print_audit(const sdm_part_audit *audit)
     printf("box                  %.6g %.6g %.6g .. %.6g %.6g %.6g mm\n", a->min[0], a->min[1],
            a->min[2], a->max[0], a->max[1], a->max[2]);
     print_parts(audit);
+    const bool fine = cli_audit_verdict(audit, "", NULL) == SDM_OK;
+    if (fine)
+        printf("\nfine: the mesh is closed%s%s\n",
+               a->inverted ? "; it is inside out, which maps put right" : "",
+               a->self_intersections ? "; it overlaps itself, and the union counts" : "");
 }
 
 void cli_json_audit(sdm_json *json, const sdm_audit *a)
@@ -90,6 +95,7 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
     sdm_json_real(json, "union_volume_mm3", a->union_volume);
     sdm_json_real(json, "union_area_mm2", a->union_area);
     sdm_json_int(json, "parts_inside_out", (int64_t)a->inside_out);
+    sdm_json_text(json, "verdict", cli_verdict_name(cli_audit_verdict(a, "", NULL)));
     sdm_json_open(json, "parts", '[');
     for (size_t i = 0; i < a->n && i < JSON_PARTS; i++) {
         const sdm_part *p = &a->part[i];
@@ -111,16 +117,16 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
     sdm_json_close(json, ']');
 }
 
-void cli_notice_audit(const sdm_audit *a)
+void cli_warn_audit(const sdm_audit *a)
 {
     if (a->boundary_edges > 0)
-        cli_notice(
+        cli_warn(
             "the mesh is open: %zu boundary edges; inside is where the winding number exceeds 1/2",
             a->boundary_edges);
     if (a->nonmanifold_edges > 0)
         cli_notice("%zu edges with more than two triangles", a->nonmanifold_edges);
     if (a->misoriented_edges > 0)
-        cli_notice("%zu edges with triangles of opposite orientation", a->misoriented_edges);
+        cli_warn("%zu edges with triangles of opposite orientation", a->misoriented_edges);
     if (a->degenerate > 0) cli_notice("%zu degenerate triangles", a->degenerate);
     if (a->duplicate > 0) cli_notice("%zu duplicate triangles", a->duplicate);
 }
@@ -140,22 +146,68 @@ void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
     sdm_text_add(text, "it is subtracted from what it overlaps and is not solid itself");
 }
 
-void cli_notice_parts(const sdm_mesh *mesh, const char *mend)
+static void warn_parts(const sdm_part_audit *audit, const char *mend)
 {
-    sdm_part_audit audit;
-    if (cli_is_quiet() || sdm_part_audit_make(mesh, false, &audit, NULL)) return;
     size_t told = 0;
-    for (size_t i = 0; i < audit.n && told < NOTICES; i++) {
-        if (audit.part[i].state != SDM_PART_INSIDE_OUT) continue;
+    for (size_t i = 0; i < audit->n && told < NOTICES; i++) {
+        if (audit->part[i].state != SDM_PART_INSIDE_OUT) continue;
         sdm_text text = {0};
-        cli_describe_part(&audit, i, &text);
-        if (!text.failed) cli_notice("%s; %s", text.data, mend);
+        cli_describe_part(audit, i, &text);
+        if (!text.failed) cli_warn("%s; %s", text.data, mend);
         sdm_text_dispose(&text);
         told++;
     }
-    if (audit.inside_out > told)
-        cli_notice("%zu more parts are inside out", audit.inside_out - told);
+    if (audit->inside_out > told)
+        cli_warn("%zu more parts are inside out", audit->inside_out - told);
+}
+
+void cli_warn_parts(const sdm_mesh *mesh, const char *mend)
+{
+    sdm_part_audit audit;
+    if (sdm_part_audit_make(mesh, false, &audit, NULL)) return;
+    warn_parts(&audit, mend);
     sdm_part_audit_dispose(&audit);
+}
+
+void cli_warn_mesh(const sdm_mesh *mesh, const char *mend)
+{
+    sdm_part_audit audit;
+    if (sdm_part_audit_make(mesh, false, &audit, NULL)) return;
+    cli_warn_audit(&audit.mesh);
+    warn_parts(&audit, mend);
+    sdm_part_audit_dispose(&audit);
+}
+
+const char *cli_verdict_name(sdm_status verdict)
+{
+    return verdict == SDM_OK ? "fine" : verdict == SDM_E_MESH ? "broken" : "warning";
+}
+
+sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_error *err)
+{
+    size_t open = 0, first = a->n;
+    bool encloses = false;
+    for (size_t i = a->n; i-- > 0;) {
+        open += a->part[i].open_edges;
+        encloses = encloses || a->part[i].state == SDM_PART_SOLID;
+        if (a->part[i].state == SDM_PART_INSIDE_OUT) first = i;
+    }
+    if (open > 0)
+        return sdm_fail(err, SDM_E_MESH,
+                        "the mesh is not closed: on %zu edges not as many triangles run in one "
+                        "direction as in the other; maps take for inside where the winding number "
+                        "exceeds 1/2",
+                        open);
+    if (first < a->n) {
+        sdm_text text = {0};
+        cli_describe_part(a, first, &text);
+        const sdm_status s = sdm_fail(err, SDM_E_QUALITY, "%s; %s",
+                                      text.failed ? "a part is inside out" : text.data, mend);
+        sdm_text_dispose(&text);
+        return s;
+    }
+    if (!encloses) return sdm_fail(err, SDM_E_QUALITY, "the mesh encloses no volume");
+    return SDM_OK;
 }
 
 sdm_status cli_turn_parts(sdm_mesh *mesh, sdm_error *err)

@@ -1,4 +1,4 @@
-/* Prints a mesh audit as text, as JSON and as notices. */
+/* Prints a mesh audit as text, as JSON and as warnings, and judges the mesh. */
 #pragma once
 
 #include "sdm/internal/part_audit.h"
@@ -12,18 +12,29 @@ void cli_print_audit(const sdm_part_audit *a);
 void cli_json_audit(sdm_json *json, const sdm_audit *a);
 void cli_json_parts(sdm_json *json, const sdm_part_audit *a);
 
-/* Prints a notice for each defect that affects an exact map: boundary, non-manifold or misoriented
- * edges, degenerate or duplicate triangles. */
-void cli_notice_audit(const sdm_audit *a);
+/* Warns of each defect that changes what is inside: boundary and misoriented edges; prints notices
+ * about the others: non-manifold edges, degenerate or duplicate triangles. */
+void cli_warn_audit(const sdm_audit *a);
 
 /* Writes one line about part `index`, which is inside out, to `text`: its number, box and vertices,
  * and what becomes of it. */
 void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text);
 
-/* Audits the parts of the mesh and prints one notice for each of the first parts that are inside
- * out and that the engine does not turn. mend: what the user can do. Errors are no notices: the
- * engine reports them. */
-void cli_notice_parts(const sdm_mesh *mesh, const char *mend);
+/* Judges the mesh. SDM_E_MESH: it is not closed; SDM_E_QUALITY: parts are inside out and not turned
+ * by the engine, or it encloses no volume. The message says what is wrong and what the user can do
+ * (mend, for parts that are inside out). */
+sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_error *err);
+
+/* "fine", "warning" or "broken", for the results of cli_audit_verdict(). */
+const char *cli_verdict_name(sdm_status verdict);
+
+/* Audits the parts of the mesh and warns of each of the first parts that are inside out and that
+ * the engine does not turn. mend: what the user can do. Says nothing if the audit fails: the engine
+ * reports that. */
+void cli_warn_parts(const sdm_mesh *mesh, const char *mend);
+
+/* Warns of the defects of the mesh, as the two functions above together. */
+void cli_warn_mesh(const sdm_mesh *mesh, const char *mend);
 
 /* Turns the parts of the mesh that are inside out (--turn-parts) and says how many. */
 sdm_status cli_turn_parts(sdm_mesh *mesh, sdm_error *err);

@@ -274,8 +274,11 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
 
 static void notice(void *user, sdm_status weight, const char *line)
 {
-    (void)user, (void)weight;
-    cli_notice("%s", line);
+    (void)user;
+    if (weight)
+        cli_warn("%s", line);
+    else
+        cli_notice("%s", line);
 }
 
 void cli_notice_survey(const sdm_config *c, const sdm_instance *shape)
@@ -284,7 +287,7 @@ void cli_notice_survey(const sdm_config *c, const sdm_instance *shape)
     sdm_distribution distribution[SDM_MAX_PARAMS];
     size_t n;
     sdm_instance_params(shape, &n);
-    if (cli_is_quiet() || n > SDM_MAX_PARAMS || sdm_train_ranges(c, shape, min, max, NULL) ||
+    if (n > SDM_MAX_PARAMS || sdm_train_ranges(c, shape, min, max, NULL) ||
         sdm_train_distributions(c, shape, min, max, distribution, NULL))
         return;
     for (size_t i = 0; i < n; i++) {

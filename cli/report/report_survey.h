@@ -23,6 +23,6 @@ typedef void cli_tell(void *user, sdm_status weight, const char *line);
 sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell, void *user, sdm_error *err);
 
 /* A survey of about a second of the shape of a configuration, over its ranges, distributions and
- * grid, told as notices. Errors, such as that of an interrupt, are no notices: what follows meets
- * them again. */
+ * grid, told as warnings and notices. Errors, such as that of an interrupt, are no notices: what
+ * follows meets them again. */
 void cli_notice_survey(const sdm_config *c, const sdm_instance *shape);

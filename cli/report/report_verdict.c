@@ -30,7 +30,10 @@ void cli_print_verdict(const sdm_verdict *v)
     const double voxel = v->voxel_mm;
     printf("  in voxels   all %.4f, within a voxel of the surface %.4f; Dice %.4f, smallest %.4f\n",
            v->rmse_mm / voxel, v->rmse_voxel_mm / voxel, v->dice, v->dice_min);
-    printf("  %-11s %s\n", sdm_grade_name(v->grade), sdm_grade_text(v->grade));
+    printf("  %-11s %s", sdm_grade_name(v->grade), sdm_grade_text(v->grade));
+    if (v->cut > 0 && v->grade != SDM_GRADE_POOR)
+        printf("; not for the %.2g %% of the shapes that the grid cuts", fmin(99, 100 * v->cut));
+    printf("\n");
     print_parts(v);
     if (isfinite(v->motion_mm))
         printf("  template    at the vertices: frames and amplitudes %.2g mm, warp %.2g mm\n",

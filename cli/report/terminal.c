@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 static bool quiet_wanted;
+static cli_form form;
 static volatile sig_atomic_t interrupts;
 
 static int exit_code_of(sdm_status status)
@@ -37,6 +38,26 @@ static int exit_code_of(sdm_status status)
 
 void cli_set_quiet(bool quiet) { quiet_wanted = quiet; }
 bool cli_is_quiet(void) { return quiet_wanted; }
+
+void cli_set_form(const char *name)
+{
+    form = !name || !strcmp(name, "auto") ? CLI_FORM_AUTO
+           : !strcmp(name, "plain")       ? CLI_FORM_PLAIN
+           : !strcmp(name, "json")        ? CLI_FORM_JSON
+                                          : CLI_FORM_SLICER;
+}
+
+cli_form cli_get_form(void) { return form; }
+
+void cli_json_line(const char *key, const char *text)
+{
+    sdm_json json = {0};
+    sdm_json_open(&json, NULL, '{');
+    sdm_json_text(&json, key, text);
+    sdm_json_close(&json, '}');
+    if (!json.text.failed) fprintf(stderr, "%s\n", json.text.data);
+    sdm_json_dispose(&json);
+}
 
 bool cli_has_terminal(void)
 {
@@ -70,6 +91,10 @@ int cli_report(const sdm_error *err)
 {
     const bool colour = wants_colour();
     const char *text = err->text[0] ? err->text : sdm_status_name(err->status);
+    if (form == CLI_FORM_JSON) {
+        cli_json_line("error", text);
+        return exit_code_of(err->status);
+    }
     while (*text) {
         const size_t length = strcspn(text, "\n");
         if (!(err->status == SDM_E_CONFIG && has_place(text, length)))
@@ -81,14 +106,34 @@ int cli_report(const sdm_error *err)
     return exit_code_of(err->status);
 }
 
+/* Prints a notice or a warning; `kind` is its key in JSON, `begin` its beginning elsewhere. */
+static void print_line(const char *kind, const char *begin, const char *fmt, va_list args)
+{
+    if (form == CLI_FORM_JSON) {
+        char text[2048];
+        vsnprintf(text, sizeof text, fmt, args);
+        cli_json_line(kind, text);
+        return;
+    }
+    fputs(begin, stderr);
+    vfprintf(stderr, fmt, args);
+    fputc('\n', stderr);
+}
+
 void cli_notice(const char *fmt, ...)
 {
     if (quiet_wanted) return;
     va_list args;
     va_start(args, fmt);
-    fputs("sdmgen: ", stderr);
-    vfprintf(stderr, fmt, args);
-    fputc('\n', stderr);
+    print_line("notice", "sdmgen: ", fmt, args);
+    va_end(args);
+}
+
+void cli_warn(const char *fmt, ...)
+{
+    va_list args;
+    va_start(args, fmt);
+    print_line("warning", "sdmgen: warning: ", fmt, args);
     va_end(args);
 }
 

@@ -17,17 +17,37 @@ enum {
     CLI_EXIT_INTERRUPTED = 130
 };
 
-/* true: no notices and no progress from now on. */
+/* true: no notices and no progress from now on; warnings remain. */
 void cli_set_quiet(bool quiet);
 bool cli_is_quiet(void);
+
+/* Form of the progress, and of all lines on stderr. */
+typedef enum cli_form {
+    CLI_FORM_AUTO = 0, /* a bar on a terminal, plain lines elsewhere */
+    CLI_FORM_PLAIN,    /* plain lines */
+    CLI_FORM_JSON,     /* each line on stderr is a JSON object with the key progress, notice,
+                          warning or error */
+    CLI_FORM_SLICER    /* progress on stdout as 3D Slicer reads it: <filter-progress> */
+} cli_form;
+
+/* Sets the form from the value of --progress; NULL: CLI_FORM_AUTO. */
+void cli_set_form(const char *name);
+cli_form cli_get_form(void);
+
+/* Prints {"key":"text"} as a line on stderr. */
+void cli_json_line(const char *key, const char *text);
 
 /* Prints the message of a failure on stderr, "sdmgen: error: text". Lines of a configuration error
    that begin with the place of the mistake, "file:line:column:", have no such prefix. Returns the
    exit code. */
 int cli_report(const sdm_error *err);
 
-/* Prints "sdmgen: text" on stderr, unless quiet. */
+/* Prints "sdmgen: text" on stderr, unless quiet: good to know. */
 void cli_notice(const char *fmt, ...) SDM_PRINTF(1, 2);
+
+/* Prints "sdmgen: warning: text" on stderr, quiet or not: the input has a fault, or the result is
+   probably not what the user wants. */
+void cli_warn(const char *fmt, ...) SDM_PRINTF(1, 2);
 
 /* True when stderr is a terminal that can redraw a line: TERM is set and not "dumb". */
 bool cli_has_terminal(void);

@@ -9,3 +9,8 @@
  * or there is a shape of that name; SDM_E_IO: the folder exists or cannot be written. After an
  * error nothing is left. */
 sdm_status cli_shapes_new(const cli_args *args, sdm_error *err);
+
+/* `sdmgen shapes check [NAME|CONFIG]`: surveys the shape NAME, the shape of a configuration, or the
+ * only shape of --plugin; prints the findings and a verdict, and draws nine samples for -o.
+ * SDM_E_QUALITY, SDM_E_MESH: the verdict (sdm_shape_survey_verdict()). */
+sdm_status cli_shapes_check(const cli_args *args, sdm_error *err);

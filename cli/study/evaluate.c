@@ -273,7 +273,7 @@ sdm_status cli_evaluate_maps(const cli_map_maker *m, uint64_t seed, size_t n, bo
     evaluation w = {.m = m, .seed = seed, .surfaces = surfaces, .out = out, .failed = n};
     cli_progress_start(&w.progress);
     evaluate_all(&w);
-    cli_progress_clear(&w.progress);
+    cli_progress_end(&w.progress, w.failed == n);
     if (w.failed < n) s = sdm_fail(err, w.err.status, "random shape %zu: %s", w.failed, w.err.text);
     if (s == SDM_E_CANCELLED) s = sdm_fail(err, s, "interrupted");
     if (!s) cli_eval_reduce(out);

@@ -1,5 +1,6 @@
 /* Measures the time per map on one core for a network, the exact engine and the naive method. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,6 +15,8 @@ enum { N_NETWORK = 51, N_MIN = 3, N_EXACT = 9, BATCH = 32, N_BATCHES = 9, NAIVE_
 /* For slow networks: no map starts after this time (s), and a batch is small enough to end within
  * it. */
 #define TIME_LIMIT_S 6.0
+/* Below this ratio of the times the exact engine is about as fast as the network. */
+#define ABOUT_AS_FAST 2.5
 #define BATCH_BYTES 2e8 /* largest size of the maps of a batch, bytes */
 
 static int compare_reals(const void *a, const void *b)
@@ -149,6 +152,29 @@ sdm_status cli_time_naive(const cli_map_maker *m, uint64_t seed, size_t n, doubl
     sdm_mesh_dispose(&mesh);
     sdm_free(each);
     return s;
+}
+
+sdm_status cli_time_two(const sdm_model *m, const sdm_instance *shape, cli_timing *out,
+                        sdm_error *err)
+{
+    *out = (cli_timing){.ms_batch = NAN, .ms_naive = NAN, .naive_share = NAN};
+    float *values = NULL;
+    sdm_status s =
+        SDM_ALLOC(&values, sdm_grid_count(&sdm_model_get_info(m)->grid), "map to time", err);
+    if (!s) s = time_network(m, 1, false, values, out, err);
+    if (!s) s = time_exact(m, shape, 1, false, values, out, err);
+    sdm_free(values);
+    return s;
+}
+
+void cli_print_two(const char *begin, const cli_timing *t)
+{
+    const double ratio = t->ms_exact / t->ms_network;
+    printf("%sone map on one core: network %.3g ms, exact engine %.3g ms, %.*f times as long",
+           begin, t->ms_network, t->ms_exact, ratio < 10 ? 2 : 0, ratio);
+    if (ratio < ABOUT_AS_FAST)
+        printf(": exact maps (sdmgen exact, fit --exact) need no network here");
+    printf("\n");
 }
 
 sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t seed, bool fastest,

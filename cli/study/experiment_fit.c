@@ -206,7 +206,7 @@ static sdm_status fit_all(const cli_experiment_run *run, const cli_experiment_jo
         if (s) s = sdm_fail_in(err, s, "phantom %zu", i + 1);
         cli_experiment_phantom_dispose(&phantom);
     }
-    cli_progress_clear(&bar);
+    cli_progress_end(&bar, !s);
     return s;
 }
 

@@ -38,7 +38,7 @@ static sdm_status train_network(const cli_experiment_run *run, const cli_experim
     cli_progress_start(&progress);
     const sdm_status s = sdm_train(job->config, job->shape, job->config->output.folder, resume,
                                    &hooks, &report, err);
-    cli_progress_clear(&progress);
+    cli_progress_end(&progress, !s);
     if (!s)
         cli_experiment_log(run, "%s: trained in %.1f s, peak memory %.0f MB",
                            run->e->rows[job->index].title, report.seconds,

@@ -1,7 +1,9 @@
-/* Example of the C interface: opens a model, computes a signed distance map with default parameters
- * and prints the value of the central voxel. Usage: consume MODEL */
+/* Example of the C interface: opens a model, computes a signed distance map with default
+ * parameters, and prints the value of the central voxel and the distance half a voxel from it.
+ * Usage: consume MODEL */
 #include <stdio.h>
 
+#include "sdm/field.h"
 #include "sdm/memory.h"
 #include "sdm/runtime.h"
 
@@ -18,7 +20,13 @@ static sdm_status use_model(const sdm_model *model, sdm_error *err)
     if (!s) {
         const int64_t i = grid->n[0] / 2, j = grid->n[1] / 2, k = grid->n[2] / 2;
         printf("%s: %.4f mm in the middle voxel, RMSE %.4f mm\n", info->shape,
-               (double)values[(k * grid->n[1] + j) * grid->n[0] + i], info->accuracy.rmse_mm);
+               (double)values[sdm_grid_voxel(grid, i, j, k)], info->accuracy.rmse_mm);
+        const double index[3] = {(double)i - 0.5, (double)j, (double)k};
+        double x[3]; // LPS, mm
+        float value;
+        sdm_grid_world(grid, index, x);
+        s = sdm_generate_points(model, params, NULL, x, 1, &value, NULL, NULL, NULL, err);
+        if (!s) printf("%.4f mm at (%g, %g, %g) mm\n", (double)value, x[0], x[1], x[2]);
     }
     sdm_free(params);
     sdm_free(values);

@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <stdarg.h>
 #include <stdatomic.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -126,7 +127,8 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
         return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for its name", path);
     }
     struct stat st;
-    if (!stat(path, &st) && !S_ISREG(st.st_mode)) {
+    const bool replaces = !stat(path, &st);
+    if (replaces && !S_ISREG(st.st_mode)) {
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_IO, "%s: cannot write: it is a %s", path,
                         S_ISDIR(st.st_mode) ? "folder"
@@ -137,6 +139,12 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
         const int code = errno;
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", path, strerror(code));
+    }
+    // a file that is replaced keeps its permissions; the owner of a new one may always write it
+    if (replaces && fchmod(f->fd, (st.st_mode & 0777) | S_IWUSR)) {
+        const int code = errno;
+        sdm_outfile_discard(&f);
+        return sdm_fail(err, SDM_E_IO, "%s: cannot set its permissions: %s", path, strerror(code));
     }
     *out = f;
     return SDM_OK;

@@ -56,6 +56,11 @@ size_t sdm_grid_count(const sdm_grid *g)
     return (size_t)g->n[0] * (size_t)g->n[1] * (size_t)g->n[2];
 }
 
+size_t sdm_grid_voxel(const sdm_grid *g, int64_t i, int64_t j, int64_t k)
+{
+    return ((size_t)k * (size_t)g->n[1] + (size_t)j) * (size_t)g->n[0] + (size_t)i;
+}
+
 void sdm_grid_world(const sdm_grid *g, const double index[3], double world[3])
 {
     for (int a = 0; a < 3; a++) {

@@ -14,7 +14,9 @@ static sdm_status instance_call_create(sdm_instance *s, sdm_error *err)
     if (!s->shape->create) return SDM_OK;
     host_call call;
     sdm_host_call_begin(&call, NULL, true);
+    sdm_callback_begin(s, "create", NULL);
     const int failed = s->shape->create(&call.host, s->options, &s->self);
+    sdm_callback_end();
     sdm_status status = SDM_OK;
     if (failed) {
         s->self = NULL;
@@ -33,7 +35,9 @@ static sdm_status instance_call_describe(sdm_instance *s, sdm_error *err)
     if (!s->shape->describe) return SDM_OK;
     const sdm_param *params = NULL;
     uint32_t n = 0;
+    sdm_callback_begin(s, "describe", NULL);
     s->shape->describe(s->self, &params, &n);
+    sdm_callback_end();
     char who[96];
     snprintf(who, sizeof who, "shape '%s', describe()", s->shape->name);
     const sdm_status status = n ? sdm_shape_check_params(who, params, n, err)
@@ -48,7 +52,9 @@ static sdm_status instance_call_distributions(sdm_instance *s, sdm_error *err)
     sdm_status status =
         SDM_ALLOC(&s->distributions, s->n_params, "distributions of the parameters", err);
     if (status || !s->shape->distributions) return status; // zero is uniform
+    sdm_callback_begin(s, "distributions", NULL);
     s->shape->distributions(s->self, s->distributions);
+    sdm_callback_end();
     for (size_t i = 0; i < s->n_params; i++) {
         const sdm_param *p = &s->params[i];
         if (sdm_distribution_check(&s->distributions[i], p->min, p->max, err))
@@ -89,7 +95,11 @@ sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *opt
 void sdm_instance_free(sdm_instance *s)
 {
     if (!s) return;
-    if (s->self && s->shape->destroy) s->shape->destroy(s->self);
+    if (s->self && s->shape->destroy) {
+        sdm_callback_begin(s, "destroy", NULL);
+        s->shape->destroy(s->self);
+        sdm_callback_end();
+    }
     sdm_free(s->distributions);
     sdm_free(s->text);
     sdm_free(s->options);
@@ -180,7 +190,9 @@ sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *o
     sdm_mesh_out filled = {0};
     host_call call;
     sdm_host_call_begin(&call, out, false);
+    sdm_callback_begin(s, "mesh", p);
     const int failed = s->shape->mesh(s->self, &call.host, s->options, p, &filled);
+    sdm_callback_end();
     status = failed ? sdm_host_call_failed(&call, "mesh", failed, SDM_E_PLUGIN, err)
                     : mesh_out_check(out, &filled, err);
     sdm_host_call_end(&call);
@@ -205,7 +217,9 @@ sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const d
     host_call call;
     sdm_host_call_begin(&call, NULL, false);
     double d = NAN;
+    sdm_callback_begin(s, "distance", p);
     const int failed = s->shape->distance(s->self, &call.host, s->options, p, x, &d);
+    sdm_callback_end();
     // a shape may have a closed form only for some values of its options
     if (failed)
         status = sdm_host_call_failed(&call, "distance", failed, SDM_E_UNSUPPORTED, err);

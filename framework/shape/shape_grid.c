@@ -1,4 +1,4 @@
-/* A grid around a box, in numbers that are easy to read. */
+/* A grid around a box, in numbers that are easy to read; how far points lie beyond a grid. */
 #include <math.h>
 
 #include "sdm/internal/shape_box.h"
@@ -49,4 +49,19 @@ sdm_status sdm_grid_around(const double low[3], const double high[3], int voxels
     }
     *out = g;
     return sdm_grid_check(out, err);
+}
+
+double sdm_grid_beyond(const sdm_grid *g, const double x[3], double beyond[3][2])
+{
+    double index[3], most = 0;
+    sdm_grid_index(g, x, index);
+    for (int a = 0; a < 3; a++) {
+        const double mm[2] = {-index[a] * g->spacing[a],
+                              (index[a] - (double)(g->n[a] - 1)) * g->spacing[a]};
+        for (int side = 0; side < 2; side++) {
+            most = fmax(most, mm[side]);
+            if (beyond) beyond[a][side] = fmax(beyond[a][side], mm[side]);
+        }
+    }
+    return most;
 }

@@ -60,6 +60,11 @@ void sdm_host_call_end(host_call *c);
 sdm_status sdm_host_call_failed(const host_call *c, const char *callback, int returned,
                                 sdm_status otherwise, sdm_error *err);
 
+/* callback.c: the calling thread is in the callback `function` of the shape from begin to end; p:
+ * its parameters, NULL: it gets none. */
+void sdm_callback_begin(const sdm_instance *s, const char *function, const double *p);
+void sdm_callback_end(void);
+
 /* velocity.c: sdm_instance_velocity() by differences of meshes, whatever callbacks the shape has.
  */
 sdm_status sdm_velocity_by_differences(const sdm_instance *s, const double *p, size_t n_vert,

@@ -53,20 +53,6 @@ static sdm_status choose(shape_family *f, const sdm_survey_opts *opts, sdm_shape
 
 /* ---- one mesh ---- */
 
-/* How far the mesh lies beyond the outer voxel centres. */
-static void measure_beyond(const sdm_mesh *m, const sdm_grid *g, double beyond[3][2])
-{
-    for (size_t v = 0; v < m->n_vert; v++) {
-        double index[3];
-        sdm_grid_index(g, m->vert + 3 * v, index);
-        for (int a = 0; a < 3; a++) {
-            const double mm = g->spacing[a];
-            beyond[a][0] = fmax(beyond[a][0], -index[a] * mm);
-            beyond[a][1] = fmax(beyond[a][1], (index[a] - (double)(g->n[a] - 1)) * mm);
-        }
-    }
-}
-
 static void hash(const sdm_mesh *m, finding *f)
 {
     f->n_vert = m->n_vert;
@@ -99,7 +85,8 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
     out->area = audit.union_area;
     memcpy(out->min, audit.mesh.min, sizeof out->min);
     memcpy(out->max, audit.mesh.max, sizeof out->max);
-    if (opts->grid) measure_beyond(m, opts->grid, out->beyond);
+    for (size_t v = 0; v < m->n_vert && opts->grid; v++)
+        sdm_grid_beyond(opts->grid, m->vert + 3 * v, out->beyond);
     sdm_part_audit_dispose(&audit);
     return SDM_OK;
 }

@@ -14,7 +14,9 @@ static sdm_status velocity_by_callback(const sdm_instance *s, const double *p, s
 {
     host_call call;
     sdm_host_call_begin(&call, NULL, false);
+    sdm_callback_begin(s, "velocity", p);
     const int failed = s->shape->velocity(s->self, &call.host, s->options, p, n_vert, velocity);
+    sdm_callback_end();
     sdm_status status =
         failed ? sdm_host_call_failed(&call, "velocity", failed, SDM_E_PLUGIN, err) : SDM_OK;
     sdm_host_call_end(&call);

@@ -5,7 +5,7 @@
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm
 present $model
-grid=(--size 16,14,12 --spacing 0.8)
+grid=(--size 16,14,12 --spacing 0.9)
 
 # Error figures as text and as JSON.
 expect 0 - sdmgen generate $model --check
@@ -108,7 +108,7 @@ expect 2 'max-error' sdmgen generate $model --max-error nan -o never.npy
 # A model whose shape is a plug-in that is not loaded: it gives maps, but they cannot be checked.
 plugin=../../plugins/good/octahedron.so
 if [ -e $plugin ]; then
-    expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=octahedron train.steps=2 --plugin $plugin --out away --quiet
+    expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=octahedron 'shape.ranges={radius: [1, 4]}' train.steps=2 --plugin $plugin --out away --quiet
     expect 0 - sdmgen generate away/model.sdm -o o.npy
     expect 3 "^sdmgen: error: --check needs the exact shape: .*'octahedron', which is not known here; load its plug-in" \
         sdmgen generate away/model.sdm --check
@@ -116,4 +116,15 @@ if [ -e $plugin ]; then
     expect 0 - sdmgen generate away/model.sdm --check --plugin $plugin
 fi
 absent never.npy
+# Options that would do nothing are refused.
+expect 2 'error-of does nothing without --max-error' sdmgen generate $model --error-of mean -o x.nrrd
+expect 2 'outside does nothing on the grid of the model' sdmgen generate $model --outside bound -o x.nrrd
+for option in --half --dense '--band 4'; do
+    # shellcheck disable=SC2086
+    expect 2 "generate: ${option% 4} does nothing without an output -o FILE.vdb" sdmgen generate $model $option -o x.nrrd -o x.ply
+    # shellcheck disable=SC2086
+    expect 2 "exact: ${option% 4} does nothing without" sdmgen exact --shape torus $option -o x.nrrd
+done
+expect 2 'band does nothing with --dense' sdmgen exact --shape torus --dense --band 4 -o x.vdb
+absent x.nrrd x.ply x.vdb
 finish

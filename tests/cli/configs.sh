@@ -5,7 +5,11 @@
 
 for config in "$source_folder"/configs/*.yaml; do
     if grep -q '^methods:' "$config"; then continue; fi # tested in experiment.sh
-    expect 0 - sdmgen config "$config" -q # some grids cut a few shapes: shapes_check.sh has the notice
+    sdmgen config "$config" -q >out 2>err || bad "config $config: $(cat err)"
+    case $config in # the box of the published figures, and boxes like it, cut a few shapes
+    */linkage.yaml | */ellipsoid.yaml) [ ! -s err ] || bad "config $config: $(cat err)" ;;
+    *) grep -Ev '^sdmgen: warning: .* and cuts ([0-9.]+ % of the|only) shapes' err && bad "config $config: $(cat err)" ;;
+    esac
     has 'no mistakes$'
     expect 0 - sdmgen config "$config" --dump
     cp out resolved.yaml

@@ -6,7 +6,11 @@ build=$3
 model=../files-of-train/run/model.sdm
 
 cmake --install "$build" --prefix "$PWD/prefix" >log 2>&1 || bad "install: $(tail -n 3 log)"
-present prefix/bin/sdmgen prefix/share/man/man1/sdmgen.1 prefix/share/bash-completion/completions/sdmgen
+present prefix/bin/sdmgen prefix/share/man/man1/sdmgen.1 prefix/share/bash-completion/completions/sdmgen \
+    prefix/share/zsh/site-functions/_sdmgen prefix/share/fish/vendor_completions.d/sdmgen.fish prefix/share/doc/sdmgen/sdmgen.spdx
+for command in $("$program" --help | sed -n '/^commands:/,/^$/s/^  \([a-z]*\) .*/\1/p'); do
+    present "prefix/share/man/man1/sdmgen-$command.1"
+done
 expect 0 - prefix/bin/sdmgen shapes
 expect 0 - prefix/bin/sdmgen info $model
 
@@ -19,8 +23,8 @@ expect 1 '^consume: .*missing\.sdm' by-cmake/consume missing.sdm
 pc=$(dirname "$(find prefix -name sdmgen.pc)")
 # shellcheck disable=SC2046 # flags are words
 PKG_CONFIG_PATH=$pc cc -std=c11 -Wall -Wextra -Werror -o by-pkg-config "$source_folder/examples/consume/consume.c" \
-    $(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs sdmgen) 2>log || bad "pkg-config: $(cat log)"
-expect 0 - env LD_LIBRARY_PATH="$(dirname "$pc")" ./by-pkg-config $model
+    $(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs sdmgen) "-Wl,-rpath,$(PKG_CONFIG_PATH=$pc pkg-config --variable=libdir sdmgen)" 2>log || bad "pkg-config: $(cat log)"
+expect 0 - ./by-pkg-config $model
 
 # The command that examples/statistical/README.md shows.
 cp "$source_folder/examples/statistical/make_labyrinth.c" .

@@ -14,19 +14,19 @@ crc() {
 # The model's own grid, however it is asked for, has the same values; every second voxel of a finer grid is one of it.
 own=$(crc)
 [ "$own" = "$(crc --size 16,14,12)" ] || bad 'size of the model: other values'
-[ "$own" = "$(crc --spacing 0.8)" ] || bad 'spacing of the model: other values'
-expect 0 - sdmgen generate $model -p a=4.2 --spacing 0.4 -o fine.nrrd -o fine.npy --jacobian j.npy --gradient g.npy --json
+[ "$own" = "$(crc --spacing 0.9)" ] || bad 'spacing of the model: other values'
+expect 0 - sdmgen generate $model -p a=4.2 --spacing 0.45 -o fine.nrrd -o fine.npy --jacobian j.npy --gradient g.npy --json
 has '"size": \[31, 27, 23\]'
 present fine.nrrd fine.npy j.npy g.npy
 [ "$(wc -c <j.npy)" -ge $((4 * 31 * 27 * 23 * 4)) ] || bad 'j.npy is too small'
-[ "$(crc --spacing 0.4)" = "$(crc --spacing 0.4 --threads 1)" ] || bad 'the values depend on the number of threads'
-[ "$own" != "$(crc --spacing 0.4)" ] || bad 'a finer grid has the values of the model'
+[ "$(crc --spacing 0.45)" = "$(crc --spacing 0.45 --threads 1)" ] || bad 'the values depend on the number of threads'
+[ "$own" != "$(crc --spacing 0.45)" ] || bad 'a finer grid has the values of the model'
 expect 0 - sdmgen generate $model --size 9,8,7 --spacing 0.3,0.2,0.1 --origin 0,0,1 --direction 0,1,0,-1,0,0,0,0,1 -o turned.nrrd --json
 has '"size": \[9, 8, 7\], "spacing": \[0.3, 0.2, 0.1\], "origin": \[0, 0, 1\]'
 grep -aq 'space directions: (0,-0.3' turned.nrrd || bad 'the direction is not in the file'
-expect 0 - sdmgen generate $model -p a=4.2 --spacing 0.4 --check
+expect 0 - sdmgen generate $model -p a=4.2 --spacing 0.45 --check
 has 'error near the surface'
-expect 0 'computed by the exact engine' sdmgen generate $model -p a=4.2 --spacing 0.4 --max-error 1e-6 -o e.npy
+expect 0 'computed by the exact engine' sdmgen generate $model -p a=4.2 --spacing 0.45 --max-error 1e-6 -o e.npy
 
 # Level sets come from bands; with another output besides, from whole maps. Both are the same.
 if sdmgen generate $model -p a=4.2 --spacing 0.1 -o band.vdb --quiet 2>err; then
@@ -48,7 +48,7 @@ expect 0 - sdmgen generate $model -p a=4.2 --points points.csv -o one.csv --outs
 printf '90,1,1\n' >far.csv
 expect 5 'point 0 .*outside of the box' sdmgen generate $model --points far.csv -o x.csv
 expect 2 'distance and gradient only' sdmgen generate $model --points points.csv --columns triangle -o x.csv
-expect 2 'do not apply' sdmgen generate $model --points points.csv --spacing 0.4 -o x.csv
+expect 2 'do not apply' sdmgen generate $model --points points.csv --spacing 0.45 -o x.csv
 expect 2 'an output is needed' sdmgen generate $model --points points.csv
 expect 2 'belongs to --points' sdmgen generate $model --columns distance -o x.npy
 absent x.csv
@@ -58,8 +58,8 @@ expect 5 'the grid leaves the box.*bound, exact' sdmgen generate $model --size 3
 expect 0 - sdmgen generate $model --size 30,30,30 --outside bound -o bound.npy
 expect 0 - sdmgen generate $model --size 30,30,30 --outside exact -o exact.npy
 cmp -s bound.npy exact.npy && bad 'bound and exact are the same'
-expect 0 'clamped to it' sdmgen generate $model -p a=7 --policy clamp --spacing 0.4 -o c.npy
-expect 5 "parameter 'a' = 7" sdmgen generate $model -p a=7 --spacing 0.4 -o x.npy
+expect 0 'clamped to it' sdmgen generate $model -p a=7 --policy clamp --spacing 0.45 -o c.npy
+expect 5 "parameter 'a' = 7" sdmgen generate $model -p a=7 --spacing 0.45 -o x.npy
 
 # Times on another grid.
 expect 0 - sdmgen bench network $model --size 40,36,32 --json

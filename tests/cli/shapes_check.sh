@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen shapes check, and what mesh, exact, config and train say about a shape with faults (tests/shape/faulty_shape.h): one line each.
-# Tests: report_survey.c report_audit.c check_family.c cmd_mesh.c
+# Tests: report_survey.c report_audit.c shapes_check.c cmd_mesh.c crash_guard.c callback.c
 . "$(dirname "$0")/common.sh"
 plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
 
@@ -53,30 +53,44 @@ has "^warning +$cuts$"
 present cut.svg
 
 # The other commands say it in one line on stderr (and that the mesh overlaps itself).
-expect 0 "$inside_out" sdmgen mesh --shape faulty -O fault=handle -o x.ply --plugin "$plugin"
-expect 0 "$inside_out" sdmgen mesh --shape faulty -O fault=handle --audit --plugin "$plugin"
+expect 0 "warning: $inside_out" sdmgen mesh --shape faulty -O fault=handle -o x.ply --plugin "$plugin" -q
+expect 4 "error: $inside_out" sdmgen mesh --shape faulty -O fault=handle --audit -o y.ply --plugin "$plugin"
+present y.ply
 has '^parts inside out +1$'
 has '^volume of the union +124\.875 mm\^3$'
 has '^  2 +12 +8 \.\. 15 +inside out +no +yes +-0\.5 '
 expect 0 - sdmgen mesh --shape faulty --audit --plugin "$plugin"
 has '^volume +125\.5 mm\^3, the sum over all triangles: overlaps count twice$'
 has '^volume of the union +125\.375 mm\^3$'
+has '^fine: the mesh is closed; it overlaps itself, and the union counts$'
+expect 3 'error: the mesh is not closed: on 3 edges' sdmgen mesh --shape faulty -O fault=open --audit --plugin "$plugin"
+expect 0 'warning: the mesh is open: 3 boundary edges' sdmgen mesh --shape faulty -O fault=open -o open.ply --plugin "$plugin" -q
+expect 3 'not closed' sdmgen mesh --mesh open.ply --json
+has '"verdict": "broken"'
+expect 0 - sdmgen info open.ply
+printf 'OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 2 1\n' >flat.off
+expect 4 'encloses no volume' sdmgen mesh --mesh flat.off --audit
 told() {
     [ "$(grep -Ec "$1" err)" -eq 1 ] || bad "not told once: $1: $(cat err)"
 }
 for command in "exact --shape faulty -O fault=handle -o x.nrrd" "config good.yaml shape.options.fault=handle" \
-    "train good.yaml shape.options.fault=handle --out run"; do
+    "train good.yaml shape.options.fault=handle --out run" "phantom --shape faulty -O fault=handle --size 32,32,32 --spacing 0.4 -o ct.nrrd" \
+    "fit --shape faulty -O fault=handle ct.nrrd --rotation 0,0,0 --spacing 0.8 --max-iterations 1 --force"; do
     # shellcheck disable=SC2086
-    sdmgen $command --plugin "$plugin" >out 2>err || bad "$command: $(cat err)"
+    sdmgen $command --plugin "$plugin" >out 2>err
+    [ $? -eq 0 ] || [ "${command%% *}" = fit ] || bad "$command: $(cat err)"
     told 'part 2 of 2 .* is inside out and overlaps another'
 done
 sdmgen config good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" >out 2>err || bad 'config of a grid that cuts'
 told "$cuts"
-sdmgen config good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" -q >out 2>err || bad 'config -q'
-[ ! -s err ] || bad "notices in spite of -q: $(cat err)"
+expect 0 "^sdmgen: warning: $cuts" sdmgen config good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" -q
+sdmgen exact --shape faulty -O fault=handle --certify -o z.nrrd --plugin "$plugin" >out 2>err
+[ $? -eq 4 ] || bad "exact --certify of a part that is inside out: $(cat err)"
+told '^sdmgen: error: signs: [0-9]+ voxels are in a part of the mesh that is inside out'
+present z.nrrd
 
 # Mending a file: --turn-parts.
-expect 0 'is inside out and overlaps another.*--turn-parts reverses it' sdmgen mesh --mesh x.ply --json
+expect 4 'is inside out and overlaps another.*--turn-parts reverses it' sdmgen mesh --mesh x.ply --json
 near "$(json union_volume_mm3)" 124.875 1e-9
 near "$(json parts_inside_out)" 1 0
 expect 0 'parts turned: 1' sdmgen mesh --mesh x.ply --turn-parts -o mended.ply
@@ -100,4 +114,18 @@ expect 2 'x\.ply' sdmgen shapes check torus -o x.ply
 expect 1 'missing\.yaml' sdmgen shapes check missing.yaml
 expect 2 'either --shape NAME or --mesh FILE' sdmgen mesh --audit
 expect 2 'p and -O need --shape' sdmgen mesh --mesh mended.ply -p a=1 --audit
+# A plug-in that ends the program: one line names it, the callback and the parameters; no file is left.
+for fault in crash abort exit; do
+    case $fault in
+    crash) reason='the plug-in used memory that is not its own' ;;
+    abort) reason='the plug-in called abort\(\), or damaged memory' ;;
+    exit) reason='the plug-in called exit\(\), which it must not' ;;
+    esac
+    expect 3 "shape 'faulty', mesh\(\) at size=2.5 reach=1.5: $reason" \
+        sdmgen mesh --shape faulty -O fault=$fault --plugin "$plugin" -o ended.ply
+    expect 3 "shape 'faulty', mesh\(\) at .*: $reason" sdmgen shapes check faulty -O fault=$fault --plugin "$plugin" --samples 4
+done
+absent ended.ply
+expect 0 - sdmgen mesh --shape faulty -O fault=crash -p size=1.5 --plugin "$plugin" -o fine.ply
+
 finish

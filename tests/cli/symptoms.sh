@@ -17,7 +17,7 @@ unknown() { # unknown PROGRAM: the pieces of the messages that PROGRAM does not 
 
 # keys and options in the whole page
 sdmgen config --keys >keys
-sdmgen help --man | sed 's/\\-/-/g' >options
+sdmgen help --markdown >options
 grep -oE '`(shape|grid|network|data|train|output)\.[a-z_]+' "$page" | tr -d '`' | sort -u | while read -r key; do
     grep -Eq "^ *$key( |$)" keys || echo "$key"
 done >wrong

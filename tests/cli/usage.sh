@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The command line itself: help, unknown words, bad values, texts generated from the table of options.
-# Tests: cmd_help.c command_line.c help.c main.c option_table.c terminal.c
+# Tests: cmd_help.c command_line.c help.c help_completion.c help_man.c main.c option_table.c terminal.c
 . "$(dirname "$0")/common.sh"
 
 expect 0 - sdmgen --version
@@ -42,17 +42,57 @@ expect 2 'threads: empty value' sdmgen shapes --threads=
 # An error while writing to standard output gives exit code 1.
 expect 1 'cannot write to standard output' bash -c '"$0" shapes >/dev/full' "$program"
 
+# Progress and messages for programs: each line on stderr is a JSON object; 3D Slicer's elements are on stdout.
+slow=(exact --shape torus --size 36,36,12 --spacing 0.6 --method naive --threads 1 --json)
+sdmgen "${slow[@]}" --progress json >out 2>err || bad "exact --progress json: $(cat err)"
+[ "$(tail -n 1 err)" = '{"progress": 1, "title": "done", "text": ""}' ] || bad "last line of the progress: $(tail -n 1 err)"
+! grep -Evq '^\{"progress": [0-9.e-]+, "title": "[a-z]+", "text": "[^"]*"\}$' err || bad "other lines in: $(cat err)"
+expect 2 '^\{"error": "exact: an output is needed.*"\}$' sdmgen exact --shape torus --progress json
+expect 2 '^\{"error": "exact: unknown option --shap; did you mean --shape\?"\}$' sdmgen exact --progress json --shap
+expect 0 - sdmgen "${slow[@]}" --progress slicer
+has '^<filter-progress>0\.[0-9]+</filter-progress>$'
+has '^<filter-progress>1\.000</filter-progress>$'
+expect 0 - sdmgen "${slow[@]}" --progress slicer --quiet
+! grep -q filter out || bad 'progress with --quiet'
+
+# With closed stdout or stderr, files hold what belongs into them and nothing else.
+expect 0 - sdmgen mesh --shape torus -O edge=1 -o open.ply
+sdmgen mesh --shape torus -O edge=1 -o closed.ply >&- 2>&-
+cmp -s open.ply closed.ply || bad 'stdout and stderr closed: another file'
+sdmgen config "$source_folder/tests/cli/tiny.yaml" --dump >&- 2>&- && bad 'a result that cannot be printed counts as success'
+
+# A file that is replaced keeps its permissions.
+chmod 600 open.ply
+expect 0 - sdmgen mesh --shape torus -O edge=1 -o open.ply
+[ "$(stat -c %a open.ply)" = 600 ] || bad "permissions became $(stat -c %a open.ply)"
+
 # Texts generated from the table of options.
-expect 0 - sdmgen help --completion
+expect 0 - sdmgen help --completion bash
 cp out completion.bash
 expect 0 - bash -n completion.bash
 expect 0 - bash -c '. ./completion.bash; COMP_WORDS=(sdmgen eval --sam); COMP_CWORD=2; _sdmgen; echo "${COMPREPLY[@]}"'
 has '^--samples$'
 expect 0 - bash -c '. ./completion.bash; COMP_WORDS=(sdmgen exact --sign w); COMP_CWORD=3; _sdmgen; echo "${COMPREPLY[@]}"'
 has '^winding$'
+expect 0 - sdmgen help --completion fish
+cp out sdmgen.fish
+expect 0 - sdmgen help --completion zsh
+cp out _sdmgen
+has '^#compdef sdmgen$'
+expect 2 "completion 'csh': need one of bash\|zsh\|fish" sdmgen help --completion csh
+# in the shells themselves, where they are installed
+if command -v fish >/dev/null; then
+    expect 0 - env HOME="$PWD" fish --no-config -c 'source sdmgen.fish; complete -C "sdmgen exact --sign w"; complete -C "sdmgen exper"'
+    has '^winding'
+    has '^experiment'
+fi
+if command -v zsh >/dev/null; then expect 0 - zsh -n _sdmgen; fi
+expect 0 - sdmgen help exact --man
+has '^\.TH SDMGEN\\-EXACT 1'
+has '^\.B "\\-\\-keep\\-overlap"$'
 expect 0 - sdmgen help --man
 has '^\.TH SDMGEN 1'
-has '^\.B "\\-\\-keep\\-overlap"$'
+has '^\.BR sdmgen\\-exact \(1\)$'
 
 # The reference in the documentation equals the generated text.
 expect 0 - sdmgen help --markdown

@@ -316,6 +316,10 @@ static void grids_convert_coordinates(void **state)
     sdm_grid g = sdm_grid_centred(n, 0.2, (const double[]){1, 2, 3});
     assert_int_equal(sdm_grid_check(&g, &e), SDM_OK);
     assert_int_equal(sdm_grid_count(&g), 120000);
+    size_t voxel = 0; // x is fastest
+    for (int64_t z = 0; z < 40; z++)
+        for (int64_t y = 0; y < 50; y++)
+            for (int64_t x = 0; x < 60; x++) assert_int_equal(sdm_grid_voxel(&g, x, y, z), voxel++);
     double w[3], i[3];
     sdm_grid_world(&g, (const double[]){29.5, 24.5, 19.5}, w);
     assert_true(fabs(w[0] - 1) < 1e-12 && fabs(w[1] - 2) < 1e-12 && fabs(w[2] - 3) < 1e-12);

@@ -47,7 +47,7 @@ sed '/^#include "sdm\/fit.h"/d; s/ sdm\/grid.h / /' "$all" >"$work/less.h"
 # the example in its first comment compiles
 {
     printf '#include "sdm/sdmgen.h"\n#include <stdio.h>\n#include <stdlib.h>\nint main(void) {\n'
-    sed -n '/default parameters:$/,/\*\//{ s/^ \*//; s/ \*\/$//; /:$/d; p; }' "$all"
+    sed -n '/distance at a point:$/,/\*\//{ s/^ \*//; s/ \*\/$//; /:$/d; p; }' "$all"
     printf 'return 0; }\n'
 } >"$work/example.c"
 grep -q 'sdm_generate(model' "$work/example.c" || { echo "no example in sdm/sdmgen.h"; exit 1; }

@@ -323,6 +323,14 @@ static void test_mistakes_are_named(void **state)
          "float z\n"
          "end_header\n123456789012",
          "more elements declared"},
+        {".ply", PLY_HEAD PLY_FACE "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 2 1\n",
+         ":14: more elements than the header declares"},
+        {".ply",
+         "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar "
+         "y\nproperty uchar z\nend_header\nabcdefg",
+         "4 bytes behind the last element"},
+        {".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 2 1\n",
+         ":7: more lines than 3 vertices and 1 polygons"},
         {".off", "OF\n", ":1: not an OFF"},
         {".off", "OFF\n2000000000 1 0\n0 0 0\n", "cannot fit"},
         {".off", "OFF\n3 1 0\n0 0 0\n1 0\n", ":4: 2 numbers on the line"},

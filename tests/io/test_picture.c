@@ -333,9 +333,10 @@ static void test_text_is_aligned(void **state)
     int box[4];
     sdm_canvas *c;
     assert_int_equal(sdm_canvas_create("test_picture_t.png", 4, 4, &c, NULL), SDM_OK);
-    const double width = sdm_canvas_text_width(c, 20, "HHHHH");
-    assert_true(sdm_canvas_text_width(c, 10, "mm\xC2\xB2") > sdm_canvas_text_width(c, 10, "mm"));
-    assert_true(fabs(sdm_canvas_text_width(c, 10, "HHHHH") - width / 2) < 0.01);
+    const double width = sdm_canvas_text_width(c, 20, false, "HHHHH");
+    assert_true(sdm_canvas_text_width(c, 10, false, "mm\xC2\xB2") >
+                sdm_canvas_text_width(c, 10, false, "mm"));
+    assert_true(fabs(sdm_canvas_text_width(c, 10, false, "HHHHH") - width / 2) < 0.01);
     sdm_canvas_discard(c);
 
     /* Capital letters stand on the base line with the given height, aligned at the point. */

@@ -102,6 +102,51 @@ static void test_gallery(void **state)
     sdm_mesh_dispose(&m);
 }
 
+/* Titles of parameters over narrow panels stay within their panels: in lines of at most `room`
+ * characters, all parameters if they fit into two lines, else as many as fit and "...". */
+static void test_long_titles_are_broken(void **state)
+{
+    (void)state;
+    static const char *const TITLES[] = {
+        "short", "width=1.234 height=2.345 length=3.456 edge=4.567",
+        "a1=1.234 a2=2.345 a3=3.456 a4=4.567 a5=5.678 a6=6.789 a7=7.891 a8=8.912 a9=9.123"};
+    const size_t room = 38; // a panel is 220 pixels wide at least
+    sdm_error err;
+    sdm_mesh m = {0};
+    double values[4];
+    square_append(&m, values, 1, 0, 1);
+    for (int i = 0; i < 4; i++) m.vert[3 * i] *= 0.01; // narrow
+    for (size_t k = 0; k < 3; k++) {
+        char said[256] = "";
+        const sdm_picture_surface s = {TITLES[k], &m, NULL};
+        if (sdm_picture_gallery("test_titles.svg", &s, 1, "", &err)) fail_msg("%s", err.text);
+        FILE *f = fopen("test_titles.svg", "r");
+        assert_non_null(f);
+        char line[4096];
+        int lines = 0;
+        while (fgets(line, sizeof line, f)) {
+            char *begin = strstr(line, "<text "), *end = strstr(line, "</text>");
+            if (!begin || !end || !strstr(begin, "\"middle\"") || strstr(begin, "mm<")) continue;
+            *end = '\0';
+            begin = strchr(begin, '>') + 1;
+            assert_true(strlen(begin) <= room);
+            snprintf(said + strlen(said), sizeof said - strlen(said), "%s%s", lines++ ? " " : "",
+                     begin);
+        }
+        fclose(f);
+        assert_int_equal(lines, k == 0 ? 1 : 2);
+        if (k < 2) {
+            assert_string_equal(said, TITLES[k]);
+        } else {
+            const size_t kept = strlen(said) - 4;
+            assert_string_equal(said + kept, " ...");
+            assert_memory_equal(said, TITLES[k], kept);
+            assert_true(TITLES[k][kept] == ' ' && kept > 40);
+        }
+    }
+    sdm_mesh_dispose(&m);
+}
+
 static void test_wrong_arguments_are_refused(void **state)
 {
     (void)state;
@@ -132,6 +177,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_hidden_parts_colours_and_scale),
         cmocka_unit_test(test_gallery),
+        cmocka_unit_test(test_long_titles_are_broken),
         cmocka_unit_test(test_wrong_arguments_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -605,6 +605,9 @@ static void file_keeps_everything(void **state)
     assert_string_equal(i->config, "seed: 77\n");
     assert_int_equal(i->n_params, P);
     assert_string_equal(i->params[2].name, "p2");
+    assert_int_equal(sdm_model_param_index(m, "p2"), 2);
+    assert_int_equal(sdm_model_param_index(m, "p"), -1);
+    assert_int_equal(sdm_model_param_index(m, NULL), -1);
     assert_true(i->params[2].min == -3 && i->params[2].max == 4 && i->params[2].def == 0.5);
     assert_int_equal(i->n_options, 2);
     assert_string_equal(i->option_names[1], "ear");

@@ -4,6 +4,8 @@
 #define SDM_TEST_FAULTY_SHAPE_H
 
 #include <math.h>
+#include <signal.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sdm/shape.h"
@@ -12,7 +14,9 @@ static const sdm_param FAULTY_PARAMS[] = {{"size", "mm", 1, 3, 2.5, "edge of the
                                           {"reach", "mm", 1, 2, 1.5, "length of the handle"}};
 static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
-     "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike", "x"}};
+     "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
+     "exit",
+     "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
 static inline void faulty_box(sdm_mesh_out *out, size_t box, const double low[3],
@@ -38,6 +42,9 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     const int is_large = p[0] > 2;
     // in parentheses: cmocka defines a macro fail()
     if (!strcmp(fault, "fail") && is_large) return (host->fail)(host, "too large");
+    if (!strcmp(fault, "crash") && is_large) raise(SIGSEGV);
+    if (!strcmp(fault, "abort") && is_large) abort();
+    if (!strcmp(fault, "exit") && is_large) exit(0);
     const size_t boxes = !strcmp(fault, "sizes") && is_large ? 3 : 2;
     const size_t less = !strcmp(fault, "open");
     const int failed = host->reserve(host, out, 8 * boxes, 12 * boxes - less);

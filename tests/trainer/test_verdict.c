@@ -147,22 +147,44 @@ static void grades(void **state)
 {
     (void)state;
     static const struct {
-        double voxels, dice;
+        double voxels, dice, cut;
         sdm_grade grade;
-    } cases[] = {{0.049, 0.981, SDM_GRADE_GOOD},   {0.051, 0.981, SDM_GRADE_USABLE},
-                 {0.049, 0.979, SDM_GRADE_USABLE}, {0.19, 0.91, SDM_GRADE_USABLE},
-                 {0.21, 0.91, SDM_GRADE_POOR},     {0.19, 0.89, SDM_GRADE_POOR}};
+    } cases[] = {{0.049, 0.981, 0, SDM_GRADE_GOOD},      {0.051, 0.981, 0, SDM_GRADE_USABLE},
+                 {0.049, 0.979, 0, SDM_GRADE_USABLE},    {0.19, 0.91, 0, SDM_GRADE_USABLE},
+                 {0.21, 0.91, 0, SDM_GRADE_POOR},        {0.19, 0.89, 0, SDM_GRADE_POOR},
+                 {0.049, 0.981, 0.04, SDM_GRADE_GOOD},   {0.049, 0.981, 0.06, SDM_GRADE_USABLE},
+                 {0.049, 0.981, 0.49, SDM_GRADE_USABLE}, {0.049, 0.981, 0.51, SDM_GRADE_POOR}};
     const sdm_config c = config_of(NULL, 0);
     const verdict_input in = {.config = &c};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         sdm_verdict v = figures();
         v.rmse_voxel_mm = cases[i].voxels * v.voxel_mm;
         v.dice = cases[i].dice;
+        v.cut = cases[i].cut;
         trainer_verdict_decide(&in, &v);
         assert_int_equal(v.grade, cases[i].grade);
         // without any measured part
         assert_true(!v.limited && !v.key[0] && isnan(v.at_best_mm));
+        assert_int_equal(strstr(v.sentence, "The grid cuts") == v.sentence, cases[i].cut > 0);
     }
+}
+
+// Shapes that leave the grid come first in the sentence; what limits the others follows.
+static void grid_cuts(void **state)
+{
+    (void)state;
+    const sdm_config c = config_of(NULL, 0);
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500};
+    sdm_verdict v = figures();
+    v.part_mm2[SDM_CAUSE_BASES] = 1e-4;
+    v.cut = 0.123;
+    trainer_verdict_decide(&in, &v);
+    assert_true(strstr(v.sentence, "cuts 12 % of the shapes") && strstr(v.sentence, "grid: auto"));
+    assert_true(strstr(v.sentence, "raise network.rank from 8 to 16"));
+    v.cut = 1;
+    trainer_verdict_decide(&in, &v);
+    assert_non_null(strstr(v.sentence, "cuts all shapes"));
+    assert_int_equal(v.grade, SDM_GRADE_POOR);
 }
 
 // Errors of 4, 3 and 2 mm at the steps 0, 60 and 90: a third of 3 mm in the last third of the
@@ -225,8 +247,9 @@ static void evaluations_are_due(void **state)
     assert_true(trainer_evaluation_due(&t, 110.1));
 }
 
-/* A sphere with the given radius on a grid with the given spacing. */
-static surface_check check_sphere(double radius, double spacing)
+/* A sphere with the given radius on a grid with the given spacing around it, and, unless it is 0,
+ * another sphere on the same grid. */
+static surface_check check_sphere(double radius, double spacing, double other)
 {
     sdm_instance *sphere;
     sdm_error e = {0};
@@ -234,7 +257,7 @@ static surface_check check_sphere(double radius, double spacing)
     if (sdm_instance_create(sdm_registry_find(registry, "ellipsoid", NULL), fine, 1, NULL, &sphere,
                             &e))
         fail_msg("%s", e.text);
-    double p[3] = {radius, radius, radius};
+    double p[6] = {radius, radius, radius, other, other, other};
     const int64_t n = (int64_t)ceil(2 * radius / spacing) + 6;
     const double first = -0.5 * spacing * (double)(n - 1) + 0.13 * spacing;
     const sdm_grid grid = {.n = {n, n, n},
@@ -245,7 +268,7 @@ static surface_check check_sphere(double radius, double spacing)
                        .grid = &grid,
                        .n_params = 3,
                        .seed = 5,
-                       .n_holdout = 1,
+                       .n_holdout = other > 0 ? 2 : 1,
                        .holdout_params = p};
     surface_check check[2];
     for (int threads = 1; threads <= 2; threads++)
@@ -260,13 +283,16 @@ static surface_check check_sphere(double radius, double spacing)
 static void surface_of_a_sphere(void **state)
 {
     (void)state;
-    const surface_check large = check_sphere(3, 0.5);
+    const surface_check large = check_sphere(3, 0.5, 0);
     const double mean = 0.5 * 0.5 / (6 * 3);
     assert_true(large.rms_mm > mean && large.rms_mm < 1.3 * mean);
     assert_true(large.thin == 0);
     // a ball of one voxel does not fit into a sphere of 0.8 voxels
-    const surface_check small = check_sphere(1, 1.25);
+    const surface_check small = check_sphere(1, 1.25, 0);
     assert_true(small.thin == 1 && small.rms_mm > 0.1);
+    // the margin of the grid is between 2.5 and 3.5 voxels
+    assert_true(large.cut == 0 && small.cut == 0);
+    assert_true(check_sphere(3, 0.5, 3.2).cut == 0 && check_sphere(2, 0.5, 3.9).cut == 0.5);
 }
 
 static sdm_train_report train(const char *const *overrides, size_t n)
@@ -375,15 +401,11 @@ int main(int argc, char **argv)
     const struct CMUnitTest slow[] = {cmocka_unit_test(advice_helps)};
     if (argc > 1) return cmocka_run_group_tests(slow, set_up, tear_down);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(largest_part_limits),
-        cmocka_unit_test(length_of_the_training),
-        cmocka_unit_test(grid_limits),
-        cmocka_unit_test(grades),
-        cmocka_unit_test(error_falls_in_the_last_third),
-        cmocka_unit_test(evaluations_are_due),
-        cmocka_unit_test(surface_of_a_sphere),
-        cmocka_unit_test(parts_add_up),
-        cmocka_unit_test(progress_is_true),
+        cmocka_unit_test(largest_part_limits), cmocka_unit_test(length_of_the_training),
+        cmocka_unit_test(grid_limits),         cmocka_unit_test(grades),
+        cmocka_unit_test(grid_cuts),           cmocka_unit_test(error_falls_in_the_last_third),
+        cmocka_unit_test(evaluations_are_due), cmocka_unit_test(surface_of_a_sphere),
+        cmocka_unit_test(parts_add_up),        cmocka_unit_test(progress_is_true),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

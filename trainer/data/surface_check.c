@@ -1,10 +1,11 @@
-/* Interpolates exact maps at points of the exact surface. */
+/* Interpolates exact maps at points of the exact surface, and counts shapes that the grid cuts. */
 #include "surface_check.h"
 
 #include <math.h>
 
 #include "sdm/exact.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 #include "streams.h"
@@ -117,6 +118,13 @@ static sdm_status check_surface(const dataset *d, const sdm_exact *e, size_t sha
     return status;
 }
 
+static bool is_cut(const sdm_mesh *m, const sdm_grid *g)
+{
+    for (size_t v = 0; v < m->n_vert; v++)
+        if (sdm_grid_beyond(g, m->vert + 3 * v, NULL) > 0) return true;
+    return false;
+}
+
 sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check *out,
                                  sdm_error *err)
 {
@@ -124,17 +132,21 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
     surface_sums sums = {0};
     sdm_mesh mesh = {0};
     float *map = NULL;
+    size_t cut = 0;
     sdm_status s = SDM_ALLOC(&map, sdm_grid_count(d->grid), "surface", err);
-    for (size_t i = 0; i < SHAPES && i < d->n_holdout && !s; i++) {
+    for (size_t i = 0; i < d->n_holdout && !s; i++) {
         sdm_exact *e = NULL;
         s = sdm_instance_mesh(d->shape, d->holdout_params + i * d->n_params, &mesh, err);
-        if (!s) s = sdm_exact_create(&mesh, &opts, &e, err);
+        if (!s) cut += is_cut(&mesh, d->grid);
+        if (s || i >= SHAPES) continue;
+        s = sdm_exact_create(&mesh, &opts, &e, err);
         if (!s) s = check_surface(d, e, i, map, &sums, err);
         sdm_exact_free(e);
     }
     sdm_mesh_dispose(&mesh);
     sdm_free(map);
     *out = (surface_check){.rms_mm = sums.n > 0 ? sqrt(sums.square / sums.n) : NAN,
-                           .thin = sums.n > 0 ? sums.thin / sums.n : NAN};
+                           .thin = sums.n > 0 ? sums.thin / sums.n : NAN,
+                           .cut = d->n_holdout ? (double)cut / (double)d->n_holdout : 0};
     return s;
 }

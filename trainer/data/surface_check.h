@@ -11,9 +11,13 @@ typedef struct surface_check {
     /* Fraction of the surface where no ball with the radius of a voxel fits into the shape: there
        it is thinner than two voxels, or has an edge or a corner. */
     double thin;
+    /* Fraction of all held-out shapes with vertices beyond the outer voxel centres: their surfaces
+       end open at the border of the grid. */
+    double cut;
 } surface_check;
 
-/* Compares a few held-out shapes at random points of their surfaces that lie inside the grid. Both
-   figures are NaN if there is no such point. [n_threads threads; the same bits for any number] */
+/* Compares a few held-out shapes at random points of their surfaces that lie inside the grid;
+   rms_mm and thin are NaN if there is no such point. `cut` is of all held-out shapes. [n_threads
+   threads; the same bits for any number] */
 sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check *out,
                                  sdm_error *err);

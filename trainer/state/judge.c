@@ -122,8 +122,8 @@ static const char *advise_part(const verdict_input *in, sdm_verdict *v)
 static sdm_grade grade_of(const sdm_verdict *v)
 {
     const double voxels = v->rmse_voxel_mm / v->voxel_mm;
-    if (voxels <= 0.05 && v->dice >= 0.98) return SDM_GRADE_GOOD;
-    return voxels <= 0.2 && v->dice >= 0.9 ? SDM_GRADE_USABLE : SDM_GRADE_POOR;
+    if (voxels <= 0.05 && v->dice >= 0.98 && v->cut <= 0.05) return SDM_GRADE_GOOD;
+    return voxels <= 0.2 && v->dice >= 0.9 && v->cut <= 0.5 ? SDM_GRADE_USABLE : SDM_GRADE_POOR;
 }
 
 /* *limit = the largest part, or the grid. Returns false if nothing was measured. */
@@ -180,9 +180,9 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
     snprintf(v->sentence, sizeof v->sentence, "%s%s%s%s%s.", what, share, change, also, result);
 }
 
-void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
+/* Sets the limit, the key and the sentence about them. */
+static void decide_limit(const verdict_input *in, sdm_verdict *v)
 {
-    v->grade = grade_of(v);
     v->at_best_mm = NAN;
     v->limited = find_limit(in, v, &v->limit);
     if (!v->limited) {
@@ -194,6 +194,24 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
         if (v->part_mm2[i] > 0 && i != (int)v->limit) rest += v->part_mm2[i];
     if (v->limit != SDM_CAUSE_GRID) v->at_best_mm = sqrt(rest);
     write_sentence(in, advise_part(in, v), v);
+}
+
+/* Begins the sentence with the shapes that the grid cuts: no key of the network mends them. */
+static void tell_cut(sdm_verdict *v)
+{
+    char rest[sizeof v->sentence], share[32] = "all";
+    memcpy(rest, v->sentence, sizeof rest);
+    if (v->cut < 1) snprintf(share, sizeof share, "%.2g %% of the", fmin(99, 100 * v->cut));
+    snprintf(v->sentence, sizeof v->sentence,
+             "The grid cuts %s shapes, their surfaces end open: grid: auto holds them. %.400s",
+             share, rest);
+}
+
+void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
+{
+    v->grade = grade_of(v);
+    decide_limit(in, v);
+    if (v->cut > 0) tell_cut(v);
 }
 
 /* Distributes the error of the model over its causes. */
@@ -225,7 +243,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
 {
     error_measures m = {
         .network = {NAN, NAN}, .bases = {NAN, NAN}, .modes = NAN, .motion_mm = NAN, .warp_mm = NAN};
-    surface_check surface = {NAN, NAN};
+    surface_check surface = {NAN, NAN, 0};
     history h = {0};
     const dataset *d = &t->data;
     sdm_status s = t->kind->parts(t, &m, err);
@@ -242,6 +260,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                          .motion_mm = m.motion_mm,
                          .warp_mm = m.warp_mm,
                          .thin = surface.thin,
+                         .cut = surface.cut,
                          .saved_seconds = t->saved_seconds,
                          .fall = fmax(trainer_history_fall(&h, SDM_PHASE_MODE_FIT, floor),
                                       trainer_history_fall(&h, SDM_PHASE_REFINE, floor))};

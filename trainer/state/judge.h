@@ -6,8 +6,9 @@
 
 /* Errors of the finished model that sdm_accuracy does not have. */
 typedef struct model_errors {
-    double rmse_voxel_mm;  /* within a voxel of the surface */
-    double dice, dice_min; /* mean and smallest over the held-out shapes */
+    double rmse_voxel_mm; /* root mean square error of the voxels within a voxel of the surface */
+    double dice;          /* Dice coefficient: mean over the held-out shapes */
+    double dice_min;      /* Dice coefficient: smallest of a held-out shape */
 } model_errors;
 
 /* Measures the parts of the error and fills *out. t->accuracy must be set. */

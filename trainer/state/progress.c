@@ -57,8 +57,8 @@ void trainer_pace_start(trainer *t, double unit_maps)
     t->pace = (trainer_pace){.unit_maps = unit_maps, .seconds = {now, now}};
 }
 
-/* Units of work a second since the earlier of two times; NaN before the first unit. The times move
- * on only when units have been finished, so a rate never falls to 0 between two slow steps. */
+/* Returns the units of work finished per second, over the last two to four seconds; NaN: none yet.
+ * A step may take longer than that: until it ends, the rate is that of a longer time, never 0. */
 static double pace_rate(trainer_pace *p, double now)
 {
     static const double LENGTH = 2;

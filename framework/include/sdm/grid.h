@@ -34,6 +34,10 @@ SDM_API sdm_status sdm_grid_check(const sdm_grid *g, sdm_error *err);
 /* Number of voxels. The grid must have passed sdm_grid_check(). [any thread] */
 SDM_API size_t sdm_grid_count(const sdm_grid *g);
 
+/* Index of voxel (i, j, k), along x, y, z, in a map: values[sdm_grid_voxel(g, i, j, k)]. The voxel
+ * must lie in the grid. [any thread] */
+SDM_API size_t sdm_grid_voxel(const sdm_grid *g, int64_t i, int64_t j, int64_t k);
+
 /* World position (mm) of a continuous index, and the inverse. [any thread] */
 SDM_API void sdm_grid_world(const sdm_grid *g, const double index[3], double world[3]);
 SDM_API void sdm_grid_index(const sdm_grid *g, const double world[3], double index[3]);

@@ -76,6 +76,10 @@ SDM_API void sdm_model_free(sdm_model *m);
 /* The description, owned by the model. [any thread] */
 SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
 
+/* Index of a parameter in the parameter vectors of the model; -1 if there is none of this name.
+   [any thread] */
+SDM_API int sdm_model_param_index(const sdm_model *m, const char *name);
+
 /* The functions below evaluate the network in the calling thread, without allocation. `scratch` is
    memory of the caller, 64-byte aligned; its minimum size is the result of the function's
    ..._scratch_bytes(). Concurrent calls need separate scratch memory. Parameters are in the order

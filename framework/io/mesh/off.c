@@ -75,6 +75,11 @@ sdm_status sdm_off_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *e
         s = read_polygon(b, &scan, n[0], err);
         if (s) return s;
     }
+    // a lower count in the header would drop polygons in silence
+    if (sdm_scan_line(&scan))
+        return sdm_fail(err, SDM_E_FORMAT,
+                        "%s:%zu: more lines than %lld vertices and %lld polygons", scan.path,
+                        scan.line, (long long)n[0], (long long)n[1]);
     return SDM_OK;
 }
 

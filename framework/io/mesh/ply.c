@@ -132,6 +132,22 @@ static sdm_status read_element(body *y, const sdm_ply_element *element, sdm_erro
     return SDM_OK;
 }
 
+/* Refuses bytes behind the last element, white space excepted: a count in the header may be too
+ * low, and elements would be missing in silence. */
+static sdm_status check_rest(body *y, sdm_error *err)
+{
+    if (y->h.ascii) {
+        const char *word = sdm_scan_token(&y->scan, &y->line);
+        return word ? fail_here(y, err, "more elements than the header declares") : SDM_OK;
+    }
+    const uint8_t *at = y->at;
+    while (at < y->end && (*at == '\n' || *at == '\r' || *at == ' ')) at++;
+    if (at == y->end) return SDM_OK;
+    return sdm_fail(err, SDM_E_FORMAT,
+                    "%s: byte %zu: %zu bytes behind the last element that the header declares",
+                    y->b->path, (size_t)(y->at - y->start), bytes_left(y));
+}
+
 sdm_status sdm_ply_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *err)
 {
     body y = {.b = b, .scan = {.at = (char *)data, .end = (char *)data + size, .path = b->path}};
@@ -140,7 +156,7 @@ sdm_status sdm_ply_read(sdm_builder *b, uint8_t *data, size_t size, sdm_error *e
     y.at = (const uint8_t *)y.scan.at;
     y.end = data + size;
     for (size_t i = 0; i < y.h.n_elements && !s; i++) s = read_element(&y, &y.h.element[i], err);
-    return s;
+    return s ? s : check_rest(&y, err);
 }
 
 sdm_status sdm_ply_write(sdm_outfile *f, const sdm_mesh *m, sdm_error *err)

@@ -321,11 +321,11 @@ static double set_font(sdm_canvas *c, double size, bool bold, const char *clean)
     return extents.x_advance;
 }
 
-double sdm_canvas_text_width(sdm_canvas *c, double size, const char *text)
+double sdm_canvas_text_width(sdm_canvas *c, double size, bool bold, const char *text)
 {
     char clean[TEXT_MAX + 4];
     clean_text(text, clean);
-    return set_font(c, size, false, clean);
+    return set_font(c, size, bold, clean);
 }
 
 /* Adds a <text> element to an SVG file; the halo is a stroke below the letters. */

@@ -79,8 +79,8 @@ typedef struct sdm_type {
 /* Draws UTF-8 text with its base line at (x, y). Malformed bytes and control characters become '?';
  * the text is cut after 500 bytes. */
 void sdm_canvas_text(sdm_canvas *c, double x, double y, sdm_type type, const char *text);
-/* Width of regular text whose capital letters are `size` high. */
-double sdm_canvas_text_width(sdm_canvas *c, double size, const char *text);
+/* Width of text whose capital letters are `size` high. */
+double sdm_canvas_text_width(sdm_canvas *c, double size, bool bold, const char *text);
 
 typedef enum sdm_colour_map {
     SDM_MAP_DISTANCE, /* diverging: orange below 0 (inside), blue above */

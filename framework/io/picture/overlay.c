@@ -85,7 +85,7 @@ static void draw_legend(sdm_canvas *c, const overlay *o, double x, double y)
         const char *title = o->maps[m].title ? o->maps[m].title : "";
         sdm_contour_sample(c, x, y - 4.5, 22, LINES[m], RIM);
         sdm_canvas_text(c, x + 30, y, type, title);
-        x += 30 + sdm_canvas_text_width(c, 10, title) + 30;
+        x += 30 + sdm_canvas_text_width(c, 10, false, title) + 30;
     }
 }
 

@@ -1,8 +1,9 @@
-/* One slice of a map on a canvas: colours, contours, scale bar; and colour bars. */
+/* One slice of a map on a canvas: colours, contours, scale bar, title; and colour bars. */
 #include "panel.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 /* Number of colours in the table for a slice. */
 #define SHADES 2048
@@ -144,6 +145,44 @@ void sdm_contour_sample(sdm_canvas *c, double x, double y, double length, sdm_co
     sdm_canvas_line_to(c, x + length, y);
     sdm_canvas_stroke_keep(c, 2 + RIM, rim, RIM_ALPHA);
     sdm_canvas_stroke(c, 2, colour);
+}
+
+/* A line of a title holds at most this many bytes. */
+enum { LINE_MAX = 200 };
+
+/* Fills `line` with as many words of *text as are at most `width` pixels wide, but at least one,
+ * and moves *text behind them. last: there is no further line, so "..." replaces what is left. */
+static void break_line(sdm_canvas *c, sdm_type type, double width, bool last, const char **text,
+                       char line[LINE_MAX])
+{
+    size_t used = 0;
+    for (size_t end = strcspn(*text, " ");; end += 1 + strcspn(*text + end + 1, " ")) {
+        const bool ends = !(*text)[end];
+        char longer[LINE_MAX];
+        snprintf(longer, sizeof longer, "%.*s%s", (int)end, *text, last && !ends ? " ..." : "");
+        if (used && sdm_canvas_text_width(c, type.size, type.bold, longer) > width) break;
+        strcpy(line, longer);
+        used = end;
+        if (ends) break;
+    }
+    *text += used;
+    *text += strspn(*text, " ");
+}
+
+void sdm_panel_title(sdm_canvas *c, sdm_box box, const char *title)
+{
+    const double middle = box.x + box.w / 2.0;
+    sdm_type type = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
+    if (sdm_canvas_text_width(c, type.size, type.bold, title) <= box.w) {
+        sdm_canvas_text(c, middle, box.y - 18, type, title);
+        return;
+    }
+    type = (sdm_type){.size = 9, .align = SDM_CENTRE, .colour = SDM_INK};
+    for (int i = 0; i < 2 && *title; i++) {
+        char line[LINE_MAX];
+        break_line(c, type, box.w, i == 1, &title, line);
+        sdm_canvas_text(c, middle, box.y - 27 + 17 * i, type, line);
+    }
 }
 
 void sdm_panel_scale_bar(sdm_canvas *c, sdm_box box, double pixels_per_mm)

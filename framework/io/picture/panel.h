@@ -21,6 +21,11 @@ void sdm_panel_colours(sdm_canvas *c, sdm_box box, const sdm_slice *s, sdm_colou
 void sdm_panel_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level, double width,
                        sdm_colour colour, sdm_colour rim);
 
+/* Writes the title above the box: one bold line, or, if that is wider than the box, at most two
+   lines of smaller type, broken between words; what does not fit becomes "...". It needs 36 pixels
+   above the box. */
+void sdm_panel_title(sdm_canvas *c, sdm_box box, const char *title);
+
 /* Draws a bar that is a round number of mm long in the lower left corner; none if the box is too
    narrow. */
 void sdm_panel_scale_bar(sdm_canvas *c, sdm_box box, double pixels_per_mm);

@@ -100,7 +100,7 @@ static void power_of_ten(sdm_canvas *c, double y, int exponent)
     sdm_type type = {.size = 7, .align = SDM_RIGHT, .colour = SDM_INK};
     sdm_canvas_text(c, area.x - 10, y - 1, type, text);
     type.size = 10;
-    sdm_canvas_text(c, area.x - 12 - sdm_canvas_text_width(c, 7, text), y + 6, type, "10");
+    sdm_canvas_text(c, area.x - 12 - sdm_canvas_text_width(c, 7, false, text), y + 6, type, "10");
 }
 
 /* Draws ticks, with labels at the powers of ten (every second, third ... of them when the axis
@@ -205,7 +205,7 @@ static void draw_legend(sdm_canvas *c, const sdm_curve *curves, size_t n)
     int rows = 0;
     for (size_t i = 0; i < n; i++)
         if (curves[i].title && curves[i].title[0]) {
-            widest = fmax(widest, sdm_canvas_text_width(c, 10, curves[i].title));
+            widest = fmax(widest, sdm_canvas_text_width(c, 10, false, curves[i].title));
             rows++;
         }
     if (!rows) return;

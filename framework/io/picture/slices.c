@@ -128,7 +128,7 @@ static void draw_legend(sdm_canvas *c, const layout *l, double x, double y)
         double at = x - total / 2;
         for (size_t i = 0; i < l->n_levels; i++) {
             snprintf(text, sizeof text, "%g mm", (double)l->levels[i]);
-            const double w = sdm_canvas_text_width(c, 9, text);
+            const double w = sdm_canvas_text_width(c, 9, false, text);
             if (pass) {
                 sdm_contour_sample(c, at, y - 4.5, 18, level_colour(i), i ? DARK : SDM_WHITE);
                 sdm_canvas_text(c, at + 25, y, type, text);

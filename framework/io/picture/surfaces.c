@@ -260,15 +260,14 @@ static int row_height(const scene *sc)
 static sdm_status draw_scene(const scene *sc, sdm_canvas *c, int bar_top, const char *caption,
                              sdm_error *err)
 {
-    const sdm_type title = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
     const double unit = sc->limit < 0.1 ? 1000 : 1;
     char text[160];
     sdm_status s = SDM_OK;
     for (size_t k = 0; k < sc->n && !s; k++) {
         const int left = SIDE + (int)(k % sc->columns) * (sc->width + GAP);
         int top = TOP + (int)(k / sc->columns) * row_height(sc);
-        sdm_canvas_text(c, left + sc->width / 2.0, top - 18, title,
-                        sc->surfaces[k].title ? sc->surfaces[k].title : "");
+        const sdm_box first = {left, top, sc->width, sc->height[sc->first_view]};
+        sdm_panel_title(c, first, sc->surfaces[k].title ? sc->surfaces[k].title : "");
         for (int v = sc->first_view; v < N_VIEWS && !s; v++) {
             const sdm_box box = {left, top, sc->width, sc->height[v]};
             s = draw_panel(sc, c, k, v, box, err);

@@ -10,10 +10,10 @@
  *                         sdm/builtin_shapes.h  adds the built-in shapes to a registry
  *   a mesh                sdm/mesh.h            triangles; audit of a mesh
  *                         sdm/meshfile.h        .ply .stl .obj .off files
- *   a grid                sdm/grid.h            voxels and their places in space
+ *   a grid                sdm/grid.h            voxels: their places in space and in arrays
  *                         sdm/pose.h            rotation and translation of a shape
  *   an exact map          sdm/exact.h           distances of a mesh, at points and on grids
- *   a map by a network    sdm/model.h           opens a model file
+ *   a map by a network    sdm/model.h           opens a model file; its parameters by name
  *                         sdm/runtime.h         maps and derivatives at given parameters
  *                         sdm/field.h           the same on any grid, at points, as a narrow band
  *                         sdm/check.h           error of a map
@@ -30,17 +30,26 @@
  * In brackets: the CMake target of the library with the functions; all others are in
  * sdmgen::sdmgen. sdm/vdb.h is included where it is installed.
  *
- * The map of a trained network at its default parameters:
+ * For many points of one map, sdm_field_create() computes the map once and sdm_field_points() reads
+ * it. The map of a trained network, and the distance at a point:
  *
  *   sdm_error err = {0};
  *   sdm_model *model = NULL;
  *   if (sdm_model_open("model.sdm", &model, &err)) { fputs(err.text, stderr); return 1; }
  *   const sdm_model_info *info = sdm_model_get_info(model);
- *   double *p = malloc(info->n_params * sizeof *p);
- *   float *values = malloc(sdm_grid_count(&info->grid) * sizeof *values);
+ *   double *p = malloc(info->n_params * sizeof *p);                       // the parameters
  *   for (size_t i = 0; i < info->n_params; i++) p[i] = info->params[i].def;
- *   if (sdm_generate(model, p, NULL, values, NULL, &err)) fputs(err.text, stderr);
- *   sdm_model_free(model); // values[nz][ny][nx]: distances in mm, negative inside */
+ *   const int radius = sdm_model_param_index(model, "radius");            // -1: no such parameter
+ *   if (radius >= 0) p[radius] = 3;
+ *   float *values = malloc(sdm_grid_count(&info->grid) * sizeof *values); // mm, negative inside
+ *   sdm_status s = sdm_generate(model, p, NULL, values, NULL, &err);
+ *   if (!s) printf("%g mm at voxel (4, 5, 6)\n", values[sdm_grid_voxel(&info->grid, 4, 5, 6)]);
+ *   const double x[3] = {1, 2, 0.5};                                      // LPS, mm
+ *   float value, gradient[3];
+ *   if (!s) s = sdm_generate_points(model, p, NULL, x, 1, &value, gradient, NULL, NULL, &err);
+ *   if (!s) printf("%g mm at (1, 2, 0.5)\n", value);
+ *   if (s) fputs(err.text, stderr);
+ *   sdm_model_free(model); */
 // clang-format on
 #ifndef SDM_SDMGEN_H
 #define SDM_SDMGEN_H

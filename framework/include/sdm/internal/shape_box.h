@@ -22,6 +22,11 @@ extern "C" {
 sdm_status sdm_shape_box(const sdm_instance *shape, const double (*range)[2], size_t samples,
                          uint64_t seed, double low[3], double high[3], sdm_error *err);
 
+/* Returns how far the point x (mm) lies beyond the outer voxel centres of the grid along the axis
+ * where it is farthest, in mm; 0: within them. beyond[axis][side], unless NULL, is raised to the
+ * distance below the first voxel (side 0) and above the last one (side 1). [any thread] */
+double sdm_grid_beyond(const sdm_grid *g, const double x[3], double beyond[3][2]);
+
 /* Voxels between the box and the boundary of the grid. */
 #define SDM_GRID_MARGIN 3
 

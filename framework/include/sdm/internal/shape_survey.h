@@ -12,9 +12,11 @@ extern "C" {
 /* Zero-initialised: the shape's own ranges and distributions, no samples, no grid, the OpenMP
  * default of threads, the whole survey. */
 typedef struct sdm_survey_opts {
-    const double (*range)[2];             /* [n_params]; NULL: those of the shape */
-    const sdm_distribution *distribution; /* [n_params], on the ranges; NULL: those of the shape */
-    size_t samples;                       /* random shapes: Sobol' points of the distributions */
+    /* [n_params] lowest and highest value of each parameter; NULL: the ranges of the shape */
+    const double (*range)[2];
+    /* [n_params] distribution of each parameter within its range; NULL: the shape's own */
+    const sdm_distribution *distribution;
+    size_t samples; /* random shapes: Sobol' points of the distributions */
     uint64_t seed;
     const sdm_grid *grid; /* NULL: nothing is compared with a grid */
     bool brief;           /* only meshes and their audits: no lines, velocities and repetitions */

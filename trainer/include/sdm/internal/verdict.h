@@ -10,10 +10,11 @@
 extern "C" {
 #endif
 
-/* What a model is good for, by its error within a voxel of the surface and by its Dice overlap. */
+/* What a model is good for, by its error within a voxel of the surface, by its Dice overlap, and by
+   the fraction of the shapes that the grid cuts. */
 typedef enum sdm_grade {
-    SDM_GRADE_GOOD = 0, /* at most a twentieth of a voxel, Dice at least 0.98 */
-    SDM_GRADE_USABLE,   /* at most a fifth of a voxel, Dice at least 0.9 */
+    SDM_GRADE_GOOD = 0, /* at most a twentieth of a voxel, Dice at least 0.98, 5 % cut at most */
+    SDM_GRADE_USABLE,   /* at most a fifth of a voxel, Dice at least 0.9, half of the shapes cut */
     SDM_GRADE_POOR
 } sdm_grade;
 
@@ -51,6 +52,8 @@ typedef struct sdm_verdict {
     double motion_mm, warp_mm; /* `template`: frames and amplitudes, and warp, at the vertices */
     double thin; /* fraction of the surface where the shape is thinner than two voxels or has an
                     edge */
+    double cut;  /* fraction of the held-out shapes whose surfaces leave the grid: there they end
+                    open */
     double saved_seconds; /* that train.patience has saved */
     bool limited;         /* false: nothing that could be measured limits the model */
     sdm_cause limit;

@@ -1,6 +1,7 @@
-/* Surveys a family of shapes and prints what spoils maps, derivatives and trainings. */
+/* sdmgen shapes check: surveys a family of shapes and prints what spoils maps, derivatives and
+ * trainings. */
 #define _XOPEN_SOURCE 700 // realpath()
-#include "check_family.h"
+#include "shapes_command.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -11,13 +12,15 @@
 #include "inputs/setup.h"
 #include "report/files.h"
 #include "report/json_values.h"
+#include "report/report_audit.h"
 #include "report/report_survey.h"
 #include "report/terminal.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
-enum { SAMPLES = 128, DRAWN = 9, TITLE_MAX = 36 };
+enum { SAMPLES = 128, DRAWN = 9, TITLE_MAX = 200 };
 
 typedef struct check {
     const cli_args *args;
@@ -104,7 +107,7 @@ static sdm_status open_shape(check *c, sdm_error *err)
 
 static const char *weight_name(sdm_status weight)
 {
-    return weight == SDM_E_MESH ? "broken" : weight == SDM_E_QUALITY ? "warning" : "note";
+    return weight ? cli_verdict_name(weight) : "note";
 }
 
 static void print_line(void *user, sdm_status weight, const char *line)
@@ -190,7 +193,7 @@ static sdm_status print_json(const check *c, sdm_error *err)
     sdm_json j = {0};
     sdm_json_open(&j, NULL, '{');
     sdm_json_text(&j, "shape", sdm_instance_shape(c->survey.shape)->name);
-    sdm_json_text(&j, "verdict", verdict ? weight_name(verdict) : "fine");
+    sdm_json_text(&j, "verdict", cli_verdict_name(verdict));
     sdm_json_int(&j, "shapes", (int64_t)f->n);
     sdm_json_int(&j, "corners", (int64_t)f->n_corners);
     sdm_json_int(&j, "samples", (int64_t)f->n_samples);
@@ -219,19 +222,7 @@ static sdm_status print_json(const check *c, sdm_error *err)
     return s;
 }
 
-/* mm by which each vertex lies beyond the grid; 0 within it. */
-static void measure_beyond(const sdm_mesh *m, const sdm_grid *g, double *mm)
-{
-    for (size_t v = 0; v < m->n_vert; v++) {
-        double index[3];
-        sdm_grid_index(g, m->vert + 3 * v, index);
-        mm[v] = 0;
-        for (int a = 0; a < 3; a++)
-            mm[v] = fmax(mm[v], g->spacing[a] * fmax(-index[a], index[a] - (double)(g->n[a] - 1)));
-    }
-}
-
-/* Writes the first parameters of shape `index`, as many as fit over a picture. */
+/* Writes the first parameters of shape `index`, as many as there is room for. */
 static const char *title_of(const check *c, size_t index, char title[TITLE_MAX])
 {
     const sdm_shape_survey *f = &c->survey.found;
@@ -269,7 +260,9 @@ static sdm_status draw(const check *c, const char *path, sdm_error *err)
             sdm_instance_mesh(c->survey.shape, f->p + shape * f->n_params, &mesh[n], NULL))
             continue;
         if (colour) s = SDM_ALLOC(&beyond[n], mesh[n].n_vert, "distances beyond the grid", err);
-        if (!s && colour) measure_beyond(&mesh[n], c->survey.grid, beyond[n]);
+        if (!s && colour)
+            for (size_t v = 0; v < mesh[n].n_vert; v++)
+                beyond[n][v] = sdm_grid_beyond(c->survey.grid, mesh[n].vert + 3 * v, NULL);
         surface[n] = (sdm_picture_surface){title_of(c, shape, title[n]), &mesh[n], beyond[n]};
         n++;
     }
@@ -300,7 +293,7 @@ static sdm_status give_verdict(const check *c, sdm_error *err)
     return SDM_OK;
 }
 
-sdm_status cli_check_family(const cli_args *args, sdm_error *err)
+sdm_status cli_shapes_check(const cli_args *args, sdm_error *err)
 {
     check c = {.args = args};
     sdm_status s = SDM_OK;

@@ -1,0 +1,78 @@
+/* Signal handlers and an exit handler that name the plug-in whose callback ended the program. */
+#define _XOPEN_SOURCE 700 // sigaltstack()
+#include "crash_guard.h"
+
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "sdm/internal/callback.h"
+#include "terminal.h"
+
+/* Prints "sdmgen: error: shape 'mug', mesh() at r=2 h=3: REASON" and ends the program. snprintf()
+ * is no function for signal handlers by the standard; the C libraries' own work there for short
+ * texts without locks or memory, and the alternative is a message without numbers. */
+static void end_program(const sdm_callback *c, const char *reason)
+{
+    char line[1024];
+    size_t n = (size_t)snprintf(line, sizeof line, "sdmgen: error: shape '%s', %s()", c->shape,
+                                c->function);
+    for (size_t i = 0; i < c->n && n + 100 < sizeof line; i++)
+        n += (size_t)snprintf(line + n, sizeof line - n, "%s %.32s=%.6g", i ? "" : " at",
+                              c->params[i].name, c->values[i]);
+    n += (size_t)snprintf(line + n, sizeof line - n, ": %s\n", reason);
+    const ssize_t put = write(STDERR_FILENO, line, n < sizeof line ? n : sizeof line - 1);
+    (void)put;
+    _exit(CLI_EXIT_INPUT);
+}
+
+static const char *reason_of(int signal_number)
+{
+    switch (signal_number) {
+    case SIGSEGV:
+        return "the plug-in used memory that is not its own (segmentation fault)";
+    case SIGBUS:
+        return "the plug-in used memory that does not exist (bus error)";
+    case SIGFPE:
+        return "the plug-in divided an integer by zero";
+    case SIGILL:
+        return "the plug-in ran an instruction that this processor does not have";
+    default:
+        return "the plug-in called abort(), or damaged memory";
+    }
+}
+
+static const int signals[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+enum { N_SIGNALS = sizeof signals / sizeof *signals };
+static struct sigaction before[N_SIGNALS]; // what the signals did before
+
+static void on_crash(int signal_number)
+{
+    const sdm_callback *c = sdm_callback_running();
+    if (c) end_program(c, reason_of(signal_number));
+    // not a plug-in: the instruction runs into the fault again, or abort() goes on, as ever
+    for (size_t i = 0; i < N_SIGNALS; i++)
+        if (signals[i] == signal_number) sigaction(signal_number, &before[i], NULL);
+}
+
+static void on_exit_call(void)
+{
+    const sdm_callback *c = sdm_callback_running();
+    if (c) end_program(c, "the plug-in called exit(), which it must not: it returns an error");
+}
+
+void cli_guard_callbacks(void)
+{
+    static char stack[1 << 16]; // the handler needs one of its own when the stack has overflowed
+    const stack_t own = {.ss_sp = stack, .ss_size = sizeof stack};
+    sigaltstack(&own, NULL);
+    struct sigaction action;
+    memset(&action, 0, sizeof action);
+    action.sa_handler = on_crash;
+    action.sa_flags = SA_ONSTACK;
+    sigemptyset(&action.sa_mask);
+    for (size_t i = 0; i < N_SIGNALS; i++) sigaction(signals[i], &action, &before[i]);
+    (void)atexit(on_exit_call);
+}

@@ -9,7 +9,7 @@
 #include "fit/data/blur.h"
 #include "fit/data/cavity.h"
 #include "fit/data/soft_labels.h"
-#include "fit/judge/verdict.h"
+#include "fit/judge/judgement.h"
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
@@ -66,7 +66,7 @@ sdm_fit_opts sdm_fit_defaults(void)
         .prior_sd = 1,
         .margin = 1.5,
         .least_inside = 0.5,
-        .beside = 0.2,
+        .beside = 0.4,
         .max_iterations = 60,
         .max_polish_iterations = 0,
         .eps = 1e-4,

@@ -1,6 +1,6 @@
 /* The verdict of a fit: robust noise, right fits that pass, wrong ones that are refused with a
  * reason, the mirror image.
- * Tests: blob.c mirror.c misfit.c noise.c residuals.c verdict.c */
+ * Tests: blob.c judgement.c mirror.c misfit.c noise.c residuals.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,6 +1,6 @@
 /* The checks, each a figure and a limit. The most basic ones come first: their texts are the most
  * helpful ones. */
-#include "verdict.h"
+#include "judgement.h"
 
 #include <math.h>
 #include <stdarg.h>

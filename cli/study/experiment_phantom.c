@@ -134,7 +134,7 @@ sdm_status cli_experiment_phantom_make(const cli_experiment_run *run, const cli_
     if (s) return s;
     for (int i = 0; i < 3; i++) middle[i] = 0.5 * (min[i] + max[i]);
     if (method->wrong == SDM_EXPERIMENT_MOVED)
-        for (int i = 0; i < 3; i++) off_mm = fmax(off_mm, 0.5 * (max[i] - min[i]));
+        for (int i = 0; i < 3; i++) off_mm = fmax(off_mm, max[i] - min[i]);
     out->start_pose = perturb_pose(e, off_mm, seed, &out->pose, middle);
     s = make_grid(e, off_mm, min, max, &out->grid, err);
     const size_t n = s ? 0 : sdm_grid_count(&out->grid);

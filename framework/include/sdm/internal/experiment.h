@@ -77,7 +77,7 @@ typedef enum sdm_experiment_fit {
 typedef enum sdm_experiment_wrong {
     SDM_EXPERIMENT_RIGHT = 0,
     SDM_EXPERIMENT_MIRRORED, /* the image is the mirror image */
-    SDM_EXPERIMENT_MOVED,    /* the start lies beside the shape, by half of its size */
+    SDM_EXPERIMENT_MOVED,    /* the start lies beside the shape, by its size */
     SDM_EXPERIMENT_ABSENT    /* the image does not hold the shape */
 } sdm_experiment_wrong;
 

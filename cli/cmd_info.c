@@ -4,6 +4,7 @@
 
 #include "commands.h"
 #include "inputs/setup.h"
+#include "inputs/vdb_child.h"
 #include "report/files.h"
 #include "report/json_values.h"
 #include "report/report_audit.h"
@@ -12,7 +13,6 @@
 #include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
 #include "sdm/model.h"
-#include "sdm/vdb.h"
 
 static void print_model(const char *path, const sdm_model_info *m)
 {
@@ -164,7 +164,7 @@ static sdm_status info_vdb(const cli_args *args, const char *path, sdm_error *er
 {
 #ifdef SDM_HAVE_VDB
     char *text = NULL;
-    sdm_status s = sdm_vdb_verify(path, &text, err);
+    sdm_status s = cli_vdb_verify(path, &text, err);
     if (!s && args->json) {
         sdm_json j = {0};
         sdm_json_open(&j, NULL, '{');

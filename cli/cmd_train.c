@@ -72,6 +72,12 @@ static sdm_status look_at_model(const char *model_path, const sdm_instance *shap
     return s;
 }
 
+/* The kind that network.kind: auto has trained and not kept. */
+static const char *other_kind(const sdm_train_report *r)
+{
+    return r->other_kind == SDM_NETWORK_POD ? "pod" : "template";
+}
+
 static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
                                 const cli_timing *times, sdm_error *err)
 {
@@ -92,6 +98,13 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         sdm_json_int(&j, "maps", r->samples);
         sdm_json_real(&j, "ms_network", times->ms_network);
         sdm_json_real(&j, "ms_exact", times->ms_exact);
+        if (r->compared) {
+            sdm_json_open(&j, "other", '{');
+            sdm_json_text(&j, "kind", other_kind(r));
+            sdm_json_real(&j, "rmse_mm", r->other.rmse_mm);
+            sdm_json_real(&j, "rmse_near_mm", r->other.rmse_near_mm);
+            sdm_json_close(&j, '}');
+        }
         sdm_json_open(&j, "verdict", '{');
         sdm_verdict_json(&j, &r->verdict);
         sdm_json_real(&j, "saved_seconds", r->verdict.saved_seconds);
@@ -111,6 +124,9 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
            (long long)a->samples, a->mse_mm2, a->rmse_mm, a->near_mm, a->rmse_near_mm,
            a->max_abs_mm);
     cli_print_two("  time        ", times);
+    if (r->compared)
+        printf("  auto        trained %s, too: RMSE %.5f mm, near the surface %.5f mm; not kept\n",
+               other_kind(r), r->other.rmse_mm, r->other.rmse_near_mm);
     cli_print_verdict(&r->verdict);
     return SDM_OK;
 }

@@ -128,13 +128,13 @@ static const sdm_field GRID[] = {
 };
 
 static const sdm_field NETWORK[] = {
-    CHOICE(
-        "kind", network.kind, SDM_KIND_CHOICES, "auto",
-        "auto: pod or template, whichever has the smaller error in a short trial; template: exact "
-        "maps of the shape's parts, carried along with the parts, and a correction by pod; pod: "
-        "basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
-        "3-D convolutional encoder-decoder; deepsdf, imnet: one distance per point, evaluated "
-        "at every voxel"),
+    CHOICE("kind", network.kind, SDM_KIND_CHOICES, "auto",
+           "auto: pod or template, or one after the other, and the better one is kept; template: "
+           "exact "
+           "maps of the shape's parts, carried along with the parts, and a correction by pod; pod: "
+           "basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
+           "3-D convolutional encoder-decoder; deepsdf, imnet: one distance per point, evaluated "
+           "at every voxel"),
     BY_KIND(
         INT, "depth", network.depth, 0, 16, "layers", DEPTH,
         "number of hidden layers (pod: of the MLP, 0: polynomials only); sdmnn: number of levels"),

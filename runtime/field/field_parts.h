@@ -88,7 +88,7 @@ static inline float field_value(const sdm_field *f, const field_place *p)
     return p->outside ? field_bound(d, field_square(p->beyond)) : d;
 }
 
-/* Whether the exact engine computes every value. */
+/* Does the exact engine compute all values of this field, and the network none? */
 static inline bool field_is_exact(const sdm_field *f)
 {
     return f->result.source == SDM_SOURCE_EXACT;

@@ -35,7 +35,7 @@ void trainer_pace_start(trainer *t, double unit_maps);
 void trainer_report(trainer *t, double fraction, bool now);
 
 /* Sends a notice of one line to the message callback. */
-void trainer_message(trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
+void trainer_message(const trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
 
 /* true if the caller wants the run to stop. [any thread] */
 bool trainer_cancelled(const trainer *t);
@@ -58,6 +58,9 @@ sdm_status trainer_metric(trainer *t, double rate, sdm_error *err);
 
 /* Appends a line with the verdict, without times unless the budget is a time. */
 sdm_status trainer_metric_verdict(trainer *t, const sdm_verdict *v, sdm_error *err);
+
+/* Writes metrics.jsonl anew; a trial writes nothing. */
+sdm_status trainer_metrics_write(const trainer *t, sdm_error *err);
 
 /* For a training loop: counts a step and reports progress. */
 void trainer_step_done(trainer *t);

@@ -63,12 +63,18 @@ typedef struct sdm_train_report {
     int64_t steps, samples;
     double seconds;
     sdm_verdict verdict;
+    /* network.kind: auto has trained another kind, too, which was worse; its accuracy. */
+    bool compared;
+    sdm_network_kind other_kind;
+    sdm_accuracy other;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled
    in), metrics.jsonl, checkpoint.sdmc (removed at the end of the run), model.sdm, loss.png.
-   resume: continues from the checkpoint in `folder`; SDM_E_CONFIG if the checkpoint's configuration
-   differs in more than budget and output. hooks and report may be NULL. */
+   network.kind: auto may train two kinds, one after the other: model.sdm is first that of the
+   first, at the end that of the better one, and so are config.yaml and loss.png. resume: continues
+   from the checkpoint in `folder`; SDM_E_CONFIG if the checkpoint's configuration differs in more
+   than budget and output. hooks and report may be NULL. */
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder,
                      bool resume, const sdm_train_hooks *hooks, sdm_train_report *report,
                      sdm_error *err);

@@ -66,7 +66,7 @@ sdm_fit_opts sdm_fit_defaults(void)
         .prior_sd = 1,
         .margin = 1.5,
         .least_inside = 0.5,
-        .beside = 0.4,
+        .beside = 0.3,
         .max_iterations = 60,
         .max_polish_iterations = 0,
         .eps = 1e-4,

@@ -13,6 +13,8 @@
 #define BEYOND 3.0
 // smallest sd of a unit's mean, as a share: errors of the maps and of the scale of the shares
 #define MEAN_SD_MIN 0.02
+// rms error of the place of a surface that labels show, in voxels
+#define LABEL_ERROR 0.12
 // relative uncertainty of the variance of the noise
 #define NOISE_UNCERTAINTY 0.2
 // standard normal deviate that noise exceeds once in a thousand fits
@@ -68,7 +70,7 @@ typedef struct unit_mean {
     double mean, variance;
 } unit_mean;
 
-static unit_mean unit_measure(const fit_residuals *r, const member *m, size_t n)
+static unit_mean unit_measure(const fit_residuals *r, const member *m, size_t n, double least)
 {
     double sum = 0, variance = 0;
     for (size_t k = 0; k < n; k++) {
@@ -76,7 +78,7 @@ static unit_mean unit_measure(const fit_residuals *r, const member *m, size_t n)
         variance += r->sd[m[k].sample] * r->sd[m[k].sample];
     }
     const double one = 1 / (double)n, shared = (1 - one) * mean_correlation(r, m, n);
-    return (unit_mean){sum * one, variance * one * (one + shared) + MEAN_SD_MIN * MEAN_SD_MIN};
+    return (unit_mean){sum * one, variance * one * (one + shared) + least * least};
 }
 
 /* Points: the sd of every distance is the robust scatter within the units, which a displacement of
@@ -145,12 +147,15 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
     if (!s && points) s = points_scatter(r, m, n, err);
     double volume = 0;
     for (size_t i = 0; i < r->n; i++) volume += r->expected[i];
+    // labels show the place of the surface to 0.12 of their voxels
+    const bool labels = p->given_labels || p->target->kind == SDM_FIT_LABEL;
+    const double least = labels ? fmax(LABEL_ERROR / r->edge[0], MEAN_SD_MIN) : MEAN_SD_MIN;
     const double factor = points ? points_volume_factor(p) : 1;
     for (size_t from = 0, to; from < n && !s; from = to) {
         for (to = from; to < n && m[to].unit == m[from].unit; to++) {
         }
         if (to - from < 2) continue;
-        const unit_mean u = unit_measure(r, m + from, to - from);
+        const unit_mean u = unit_measure(r, m + from, to - from, least);
         const double z2 = u.mean * u.mean / u.variance;
         const int side = m[from].unit & 1;
         out->n_units[side]++;

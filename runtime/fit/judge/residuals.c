@@ -28,10 +28,28 @@ static bool is_labels(const fit_problem *p)
     return p->given_labels || p->target->kind == SDM_FIT_LABEL;
 }
 
+// share of the inside that the shape predicts; where the field is the distance: the edge of labels
+// or of the point spread
 static double predicted_share(const fit_problem *p, double field)
 {
     if (p->maps.share) return fmin(fmax(field, 0), 1);
-    return 1 / (1 + exp(fmin(field / p->state.l_ref, 700)));
+    if (is_labels(p)) return fmin(fmax(0.5 - field / p->target->grid.spacing[0], 0), 1);
+    return 0.5 * erfc(field / p->opts->blur * 0.70710678118654752);
+}
+
+// by how much the mean of all outside tissues at sample i differs from that of the main one
+static double outside_shift(const fit_problem *p, size_t i)
+{
+    const fit_observation *o = &p->observation;
+    const float *local = fit_sample_weights(&p->samples, i);
+    double sum = 0;
+    size_t main = o->n_in;
+    for (size_t k = o->n_in; k < o->n_tissues; k++)
+        if (o->tissue[k].weight > o->tissue[main].weight) main = k;
+    for (size_t k = o->n_in; k < o->n_tissues; k++)
+        sum += (o->tissue[k].mean - o->tissue[main].mean) *
+               (local ? exp((double)local[k - o->n_in]) : o->tissue[k].weight);
+    return sum;
 }
 
 // whether sample i lies inside (side 1) or outside (side 0), at most `limit` from pure
@@ -76,6 +94,9 @@ static void shares_fill(const fit_problem *p, fit_residuals *r, double *list)
     for (size_t i = 0; i < r->n; i++) {
         r->residual[i] = ((double)s->value[i] - r->middle[0]) / contrast - r->expected[i];
         r->sd[i] = 1;
+        // inside the surface, what remains of the outside is that of all its tissues
+        if (r->expected[i] > 0.5)
+            r->residual[i] -= (1 - r->expected[i]) * outside_shift(p, i) / contrast;
     }
 }
 

@@ -18,6 +18,8 @@
 // empty and missing volumes up to this share of that of the shape are below what labels, points and
 // the grids of maps resolve
 #define VOLUME_MIN 0.05
+// the same for images with the older observation model, which is biased where they are blurred
+#define VOLUME_MIN_BIASED 0.2
 // a shape whose blob has this Dice coefficient is a blob itself
 #define BLOB_ALIKE 0.9
 
@@ -141,7 +143,8 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, sdm_fit_ver
 {
     const bool points = p->target->kind == SDM_FIT_POINTS;
     const char *what = points ? "points" : is_image(p) ? "image" : "labels";
-    const double most = fmax(p->opts->tolerance, VOLUME_MIN),
+    const bool biased = is_image(p) && !p->maps.share;
+    const double most = fmax(p->opts->tolerance, biased ? VOLUME_MIN_BIASED : VOLUME_MIN),
                  beside = is_image(p) ? fmax(p->opts->beside, most) : most;
     add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
         "%.0f %% of the volume of the shape is empty in the %s, allowed %.0f %% (tolerance)",

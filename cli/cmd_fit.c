@@ -105,6 +105,10 @@ static void print_notices(const cli_fit *f)
     if (r->n_exact_outside)
         cli_notice("%zu maps outside of the trained range were made by the exact engine",
                    r->n_exact_outside);
+    if (f->opts.cavity > 0 && !r->n_cavity)
+        cli_notice("--cavity %g left nothing out: the widest space like the inside holds a ball of "
+                   "%.3g mm",
+                   f->opts.cavity, r->widest_space);
     if (r->n_nan)
         cli_notice("%zu voxels are NaN%s and were ignored", r->n_nan,
                    r->n_cavity ? " or in wide spaces (--cavity)" : "");

@@ -298,6 +298,8 @@ sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err)
     // the command
     memset(args, 0, sizeof *args);
     set_defaults(args);
+    args->argc = argc;
+    args->argv = argv;
     if (argc < 2) return sdm_fail(err, SDM_E_ARG, "a command is needed; see sdmgen --help");
     args->command = cli_find_command(argv[1], err);
     if (!args->command) return SDM_E_ARG;

@@ -108,6 +108,8 @@ typedef struct cli_fit_args {
  * the commands that have the options. */
 struct cli_args {
     const cli_command *command;
+    int argc; /* the command line as given, owned by main() */
+    char *const *argv;
     cli_list files; /* positional arguments */
     cli_list plugins, params, options, outputs;
     bool quiet, json, help;

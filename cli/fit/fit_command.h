@@ -39,6 +39,7 @@ typedef struct cli_fit {
     sdm_volume image;
     float *mask;    /* [nz][ny][nx] labels, 1 inside, 0 outside; NULL: the target is no label map */
     double *points; /* [n_points][3] mm; NULL: the target is a volume */
+    bool of_surface; /* the points were spread over the surface of a mesh */
     sdm_fit_target target;
 
     sdm_fit_opts opts;
@@ -143,5 +144,9 @@ void cli_fit_print(const cli_fit *f);
 
 /* Adds the result as one JSON object. */
 void cli_fit_json(const cli_fit *f, sdm_json *json);
+
+/* Adds the members "command", the command line that repeats the fit, and "inputs", the files that
+ * it read with their checksums (CRC-64/XZ). */
+void cli_fit_json_repeat(const cli_fit *f, sdm_json *json);
 
 void cli_fit_dispose(cli_fit *f);

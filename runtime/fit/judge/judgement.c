@@ -33,7 +33,7 @@ const char *sdm_fit_check_name(sdm_fit_check_kind kind)
         [SDM_FIT_CHECK_MISSING] = "missing",       [SDM_FIT_CHECK_INSIDE] = "inside",
         [SDM_FIT_CHECK_OUTSIDE] = "outside",       [SDM_FIT_CHECK_GIVEN] = "given values",
         [SDM_FIT_CHECK_BOUNDS] = "bounds",         [SDM_FIT_CHECK_BLOB] = "blob",
-        [SDM_FIT_CHECK_MIRROR] = "mirror image"};
+        [SDM_FIT_CHECK_KEPT_POSE] = "kept pose",   [SDM_FIT_CHECK_MIRROR] = "mirror image"};
     return kind >= 0 && kind < SDM_FIT_N_CHECKS ? names[kind] : NULL;
 }
 

@@ -28,6 +28,7 @@
 #define SDM_FIT_H
 
 #include "sdm/grid.h"
+#include "sdm/mesh.h"
 #include "sdm/model.h"
 #include "sdm/pose.h"
 #include "sdm/registry.h"
@@ -157,7 +158,8 @@ typedef struct sdm_fit_opts {
        estimated unless keep_appearance is set */
     double point_sd;
     /* points: degrees of freedom of Student's t for the distances, > 0; small values tolerate
-       outliers */
+       outliers. Besides, a share of the points, estimated unless keep_appearance is set, may lie
+       anywhere: their distances are spread evenly over the size of the shape */
     double point_dof;
 
     /* [n_params] start values of the parameters; NULL: the defaults of the shape */
@@ -281,6 +283,8 @@ typedef enum sdm_fit_check_kind {
        moments in the same place, per unknown of the shape; not for shapes that are ellipsoids
        nearly */
     SDM_FIT_CHECK_BLOB,
+    /* with keep_pose: gain of a free pose in log-likelihood, as of independent samples */
+    SDM_FIT_CHECK_KEPT_POSE,
     /* the shape against its mirror image, see sdm_fit_compare() */
     SDM_FIT_CHECK_MIRROR,
     SDM_FIT_N_CHECKS
@@ -390,8 +394,8 @@ typedef struct sdm_fit_result {
     double noise_factor;
     /* error near the surface of the maps of the last phase, mm: that of the network on held-out
        data, 0 for exact maps; with a label map and partial volume, also that of the voxels of the
-       labels (0.12 of one) and of the maps (0.03 of one). The covariance includes it. NaN as
-       inside_share */
+       labels (0.12 of one) and of the maps (0.03 of one); with points that of the maps (0.01 of
+       one). The covariance includes it. NaN as inside_share */
     double model_error_mm;
     /* partial volume: sd of the point spread, mm; other fits: 0 */
     double blur;
@@ -408,6 +412,21 @@ typedef struct sdm_fit_result {
        search for the start */
     double seconds, seconds_network, seconds_exact, seconds_search;
 
+    /* points: share of outliers, points that lie anywhere; other targets: 0 */
+    double outliers;
+    /* rigid motions that the target does not determine, such as "rotation about the axis (0, 0, 1)
+       through (1, 2, 3) mm" (LPS) of a shape that is symmetric about this axis; empty: none. The
+       fit leaves the pose where the search has it along these, and the covariance holds an angle
+       that may be any. With a prior of the rotation (translation) the prior decides */
+    char open_motions[512];
+    /* keep_pose: what a fit from here with a free pose does: rms motion of the surface along its
+       normal, mm, and gain in log posterior density, as of independent samples (about 3 for the
+       true pose). 0 where the pose is estimated */
+    double kept_pose_motion, kept_pose_gain;
+    /* with sdm_fit_opts.cavity: radius (mm) of the widest ball in a space of the image that looks
+       like the inside; else 0. A smaller cavity leaves out such spaces */
+    double widest_space;
+
     /* whether and why the fit is to be trusted; sdm_fit() gives SDM_E_QUALITY where it failed */
     sdm_fit_verdict verdict;
 } sdm_fit_result;
@@ -421,6 +440,15 @@ typedef struct sdm_fit_result {
 SDM_API sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
                            const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err);
 SDM_API void sdm_fit_dispose(sdm_fit_result *r);
+
+/* points[n][3] = points on the surface of a mesh (mm), for a fit to the mesh: its vertices are
+   dense where it bends and absent from flat faces, and would weigh these places accordingly. The
+   points lie evenly on the boundary of the union of the mesh's volumes (sdm_exact_surface()):
+   surface of one part inside another has none. Each triangle has its share of the area to within
+   one point. The same bits for any number of threads. Errors of sdm_exact_create(); SDM_E_MESH: no
+   area. [any thread] */
+SDM_API sdm_status sdm_fit_surface_points(const sdm_mesh *mesh, size_t n, int n_threads,
+                                          double *points, sdm_error *err);
 
 /* Fits the mirror image of the shape: the shape of source to the target reflected in the world's x,
    from the start pose reflected in the shape's y about the centroid of the shape. Parameters,

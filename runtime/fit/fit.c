@@ -493,11 +493,12 @@ static sdm_status judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err)
                          .grade = SDM_FIT_FAILED,
                          .figure = r->kept_pose_gain,
                          .limit = KEPT_POSE_GAIN};
-    snprintf(f.text, sizeof f.text,
-             "the kept pose does not match the data: free, it moves the surface by %.2g mm and "
-             "explains the data better by %.3g (log-likelihood of independent samples); correct the "
-             "pose, or do not keep it",
-             r->kept_pose_motion, r->kept_pose_gain);
+    snprintf(
+        f.text, sizeof f.text,
+        "the kept pose does not match the data: free, it moves the surface by %.2g mm and "
+        "explains the data better by %.3g (log-likelihood of independent samples); correct the "
+        "pose, or do not keep it",
+        r->kept_pose_motion, r->kept_pose_gain);
     sdm_fit_verdict_add(&r->verdict, &f);
     return s == SDM_OK || s == SDM_E_QUALITY ? sdm_fail(err, SDM_E_QUALITY, "%s", f.text) : s;
 }

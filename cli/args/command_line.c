@@ -226,6 +226,7 @@ static void set_phantom_defaults(cli_phantom_args *p)
 static void set_fit_defaults(cli_fit_args *f)
 {
     const cli_fit_args none = {.image_model = "partial",
+                               .mirror = "auto",
                                .start_centre = {NAN, NAN, NAN},
                                .start_axis = {NAN, NAN, NAN},
                                .region = {NAN, NAN, NAN, NAN, NAN, NAN},
@@ -240,6 +241,8 @@ static void set_fit_defaults(cli_fit_args *f)
                                .tissue_field = NAN,
                                .label_close = NAN,
                                .least_inside = NAN,
+                               .tolerance = NAN,
+                               .beside = NAN,
                                .prior_sd = NAN,
                                .prior_rotation = NAN,
                                .prior_translation = NAN,

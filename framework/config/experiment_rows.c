@@ -77,6 +77,26 @@ static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mista
             n_networks);
 }
 
+/* Sets shown_row of every row from the key `shows` of its method. */
+static void find_shown(sdm_experiment *e, sdm_mistakes *mistakes)
+{
+    for (size_t i = 0; i < e->n_methods; i++) {
+        const sdm_experiment_method *m = &e->methods[i];
+        size_t from = i;
+        if (*m->shows)
+            for (from = 0; from < e->n_methods; from++)
+                if (e->methods[from].fit && !strcmp(e->methods[from].name, m->shows)) break;
+        if (from == e->n_methods) {
+            sdm_mistakes_add(mistakes, m->mark,
+                             "method '%s': shows: no method with fit is named '%s'", m->name,
+                             m->shows);
+            from = i;
+        }
+        for (size_t row = i; row < e->n_rows; row += e->n_methods)
+            e->rows[row].shown_row = row - i + from;
+    }
+}
+
 /* Records a mistake if two rows have the same folder. */
 static void check_folders(const sdm_experiment *e, sdm_mistakes *m)
 {
@@ -152,6 +172,7 @@ sdm_status sdm_experiment_finish(sdm_experiment *e, sdm_reader *r, sdm_error *er
             make_row(e, &e->methods[i], e->n_variants ? &e->variants[v] : NULL,
                      &e->rows[e->n_rows++]);
     find_networks(e, sdm_fields_given(r, "fit", "model")->mark, r->mistakes);
+    find_shown(e, r->mistakes);
     check_folders(e, r->mistakes);
     attach_references(e, r->mistakes);
     if (*e->experiment.baseline)

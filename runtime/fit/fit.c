@@ -10,6 +10,7 @@
 #include "fit/data/blur.h"
 #include "fit/data/cavity.h"
 #include "fit/data/soft_labels.h"
+#include "fit/judge/judgement.h"
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
@@ -84,6 +85,7 @@ sdm_fit_opts sdm_fit_defaults(void)
         .prior_sd = 1,
         .margin = 1.5,
         .least_inside = 0.5,
+        .beside = 0.3,
         .max_iterations = 60,
         .max_polish_iterations = 0,
         .eps = 1e-4,
@@ -421,15 +423,6 @@ static void report(fit_problem *p, sdm_fit_result *out)
     out->seconds_exact = p->maps.seconds_exact;
 }
 
-// mean of the tissue with the largest weight
-static double main_mean(const sdm_fit_law *law, size_t n)
-{
-    size_t most = 0;
-    for (size_t i = 1; i < n; i++)
-        if (law[i].weight > law[most].weight) most = i;
-    return law[most].mean;
-}
-
 // the unknown that moves most in the last iterations, in its standard deviations (*most)
 static size_t most_restless(const fit_problem *p, const sdm_fit_result *r, double *most)
 {
@@ -481,52 +474,33 @@ static sdm_status not_converged(const fit_problem *p, const sdm_fit_result *r, s
                     r->n_iterations, r->reason, moves);
 }
 
-// returns SDM_E_QUALITY with the first reason to distrust the fit; the most basic reasons come
-// first
-static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
+// the verdict, with the unknown that keeps the fit from converging, and the pose that was kept
+static sdm_status judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err)
 {
-    const sdm_fit_opts *o = p->opts;
-    const sdm_fit_appearance *a = &r->appearance, *b = &o->appearance;
-    if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {
-        // images: evidence and contrast
-        const double in = main_mean(a->inside, a->n_inside),
-                     out = main_mean(a->outside, a->n_outside);
-        const bool darker = main_mean(b->inside, b->n_inside) < main_mean(b->outside, b->n_outside);
-        if (!(r->evidence > 0))
-            return sdm_fail(
-                err, SDM_E_QUALITY,
-                "the image shows no such shape near the start: explaining it without one is better "
-                "by %.3g (log-likelihood of independent voxels); check the start pose, and whether "
-                "the inside is %s than the outside in this image",
-                -r->evidence, darker ? "darker" : "brighter");
-        // the sign of the contrast must be that of the start
-        if ((in < out) != darker)
-            return sdm_fail(
-                err, SDM_E_QUALITY,
-                "the contrast is the opposite of the start's: inside %.4g, outside %.4g, but the "
-                "start says that the inside is %s; give tissue values of this kind of image",
-                in, out, darker ? "darker" : "brighter");
+    sdm_error unrest = {0};
+    sdm_status s = sdm_fit_judge(p, r, err);
+    for (size_t i = 0; i < r->verdict.n_findings && !r->converged; i++) {
+        sdm_fit_finding *f = &r->verdict.findings[i];
+        if (f->kind != SDM_FIT_CHECK_CONVERGED) continue;
+        (void)not_converged(p, r, &unrest);
+        if (err && s == SDM_E_QUALITY && !strcmp(err->text, f->text)) *err = unrest;
+        snprintf(f->text, sizeof f->text, "%.239s", unrest.text);
     }
-    // the shape must not be a cavity itself, nor leave the image
-    const double widest = sdm_fit_inradius(&p->maps);
-    if (r->n_cavity && !(widest < o->cavity))
-        return sdm_fail(err, SDM_E_QUALITY,
-                        "the fitted shape holds a ball of %.3g mm, but spaces that hold one of "
-                        "%.3g mm were left out (cavity): give a radius above that of the shape",
-                        widest, o->cavity);
-    if (!(r->inside_share >= o->least_inside))
-        return sdm_fail(err, SDM_E_QUALITY,
-                        "only %.0f %% of the shape lies in the image, need %.0f %% (least_inside)",
-                        100 * r->inside_share, 100 * o->least_inside);
-    if (!r->converged) return not_converged(p, r, err);
     const double voxel = longest_edge(&p->maps.grid);
-    if (r->kept_pose_gain > KEPT_POSE_GAIN && r->kept_pose_motion > KEPT_POSE_VOXELS * voxel)
-        return sdm_fail(err, SDM_E_QUALITY,
-                        "the kept pose does not match the data: free, it moves the surface by %.2g "
-                        "mm and explains the data better by %.3g (log-likelihood of independent "
-                        "samples); correct the pose, or do not keep it",
-                        r->kept_pose_motion, r->kept_pose_gain);
-    return SDM_OK;
+    if (!(r->kept_pose_gain > KEPT_POSE_GAIN && r->kept_pose_motion > KEPT_POSE_VOXELS * voxel))
+        return s;
+    sdm_fit_finding f = {.kind = SDM_FIT_CHECK_KEPT_POSE,
+                         .grade = SDM_FIT_FAILED,
+                         .figure = r->kept_pose_gain,
+                         .limit = KEPT_POSE_GAIN};
+    snprintf(
+        f.text, sizeof f.text,
+        "the kept pose does not match the data: free, it moves the surface by %.2g mm and "
+        "explains the data better by %.3g (log-likelihood of independent samples); correct the "
+        "pose, or do not keep it",
+        r->kept_pose_motion, r->kept_pose_gain);
+    sdm_fit_verdict_add(&r->verdict, &f);
+    return s == SDM_OK || s == SDM_E_QUALITY ? sdm_fail(err, SDM_E_QUALITY, "%s", f.text) : s;
 }
 
 // computes the covariance, the share of the shape in the image, and the evidence
@@ -615,6 +589,7 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     if (!s) accept_small_steps(&p, out);
     if (out->n_params && (!s || s == SDM_E_QUALITY)) report(&p, out);
     if (!s) s = judge(&p, out, err);
+    if (s) out->verdict.grade = SDM_FIT_FAILED;
     if (s && err && !*out->reason) snprintf(out->reason, sizeof out->reason, "%.255s", err->text);
     problem_dispose(&p);
     sdm_free(values);

@@ -64,7 +64,7 @@ check() {
         rooms("framework/geom/", "memory simd exactly mesh solid features map sign layers points methods .")
         rooms("framework/nn/", "kernels fine model pod template point sdmnn open")
         rooms("framework/io/", ". mesh image picture")
-        rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit vdb")
+        rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit/judge fit vdb")
         rooms("trainer/", "numerics data state pod fine template direct .")
         rooms("cli/", "args report inputs shapes phantom fit study .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", "."); rooms("shapes/", ".")

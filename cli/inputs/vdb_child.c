@@ -1,10 +1,11 @@
 /* Runs sdm_vdb_verify() in a child process with limits of memory and time; its result comes back
  * through a pipe. */
-#define _DEFAULT_SOURCE // mallopt() and sysconf(_SC_NPROCESSORS_ONLN)
+#define _DEFAULT_SOURCE // sysconf(_SC_NPROCESSORS_ONLN)
 #include "vdb_child.h"
 
 #include <errno.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -17,8 +18,18 @@
 #include <malloc.h>
 #endif
 
+#include "report/terminal.h"
+#include "sdm/internal/clock.h"
 #include "sdm/memory.h"
 #include "sdm/vdb.h"
+
+#if defined(__SANITIZE_ADDRESS__)
+#define SANITIZED 1 // gcc
+#elif defined(__has_feature)
+#define SANITIZED __has_feature(address_sanitizer) // clang
+#else
+#define SANITIZED 0
+#endif
 
 #define MEGABYTE UINT64_C(1048576)
 
@@ -49,7 +60,8 @@ static uint64_t bytes_now(void)
 
 static void set_limit(int resource, uint64_t value)
 {
-    const struct rlimit limit = {(rlim_t)value, (rlim_t)value};
+    // a second more to the hard limit: the signal at the soft one tells time from other reasons
+    const struct rlimit limit = {(rlim_t)value, (rlim_t)value + 1};
     setrlimit(resource, &limit);
 }
 
@@ -57,7 +69,7 @@ static void set_limit(int resource, uint64_t value)
  * need terabytes of it. */
 static void limit_child(limits most)
 {
-#ifndef __SANITIZE_ADDRESS__
+#if !SANITIZED
 #ifdef __GLIBC__
     (void)mallopt(M_ARENA_MAX, 1);
 #endif
@@ -94,10 +106,33 @@ _Noreturn static void child(const char *path, limits most, int to_parent)
     _exit(sent ? 0 : 1);
 }
 
-static bool receive(int fd, void *data, size_t size)
+/* The child, as its parent sees it. */
+typedef struct reader {
+    pid_t pid;
+    int fd;          /* end of the pipe */
+    double deadline; /* time after which it is ended, by sdm_clock() */
+    bool late;       /* it was ended for that */
+} reader;
+
+/* Waits until something can be read. Ends the child and returns false after an interrupt or the
+ * deadline: a child that waits for ever uses no processor time. */
+static bool wait_for(reader *r)
+{
+    for (;;) {
+        struct pollfd p = {.fd = r->fd, .events = POLLIN};
+        if (poll(&p, 1, 200) > 0) return true;
+        r->late = sdm_clock() > r->deadline;
+        if (!r->late && !cli_is_interrupted()) continue;
+        kill(r->pid, SIGKILL);
+        return false;
+    }
+}
+
+static bool receive(reader *r, void *data, size_t size)
 {
     for (char *at = data; size;) {
-        const ssize_t got = read(fd, at, size);
+        if (!wait_for(r)) return false;
+        const ssize_t got = read(r->fd, at, size);
         if (got < 0 && errno == EINTR) continue;
         if (got <= 0) return false;
         at += got, size -= (size_t)got;
@@ -106,27 +141,33 @@ static bool receive(int fd, void *data, size_t size)
 }
 
 /* The message for a child that ended without an answer. */
-static sdm_status explain(const char *path, int ended, limits most, sdm_error *err)
+static sdm_status explain(const char *path, const reader *r, int ended, limits most, sdm_error *err)
 {
-    if (WIFSIGNALED(ended) && (WTERMSIG(ended) == SIGXCPU || WTERMSIG(ended) == SIGKILL))
+    const sdm_status s = cli_check_interrupt(err);
+    if (s) return s;
+    if (r->late)
+        return sdm_fail(err, SDM_E_IO, "%s: reading it does not end: is the disk there?", path);
+    if (WIFSIGNALED(ended) && WTERMSIG(ended) == SIGXCPU)
         return sdm_fail(err, SDM_E_FORMAT, "%s: damaged: reading it takes more than %llu s", path,
                         (unsigned long long)most.seconds);
+    if (WIFSIGNALED(ended) && WTERMSIG(ended) == SIGKILL)
+        return sdm_fail(err, SDM_E_IO, "%s: the process that read it was killed", path);
     return sdm_fail(err, SDM_E_FORMAT, "%s: damaged: OpenVDB crashes while it reads the file",
                     path);
 }
 
-static sdm_status read_answer(const char *path, int from_child, limits most, bool *complete,
-                              char **text, sdm_error *err)
+static sdm_status read_answer(const char *path, reader *r, limits most, bool *complete, char **text,
+                              sdm_error *err)
 {
     answer a = {0};
     char *said = NULL;
-    *complete = receive(from_child, &a, sizeof a);
+    *complete = receive(r, &a, sizeof a);
     if (!*complete) return SDM_OK;
     if (a.length > 64 * MEGABYTE)
         return sdm_fail(err, SDM_E_FORMAT, "%s: damaged: its texts are too long", path);
     sdm_status s = SDM_ALLOC(&said, a.length + 1, "description of the file", err);
     if (s) return s;
-    *complete = receive(from_child, said, a.length);
+    *complete = receive(r, said, a.length);
     if (*complete && a.status == SDM_E_NOMEM)
         s = sdm_fail(err, SDM_E_FORMAT,
                      "%s: damaged: it asks for more than %llu MB of memory, which a file of its "
@@ -173,10 +214,11 @@ sdm_status cli_vdb_verify(const char *path, char **text, sdm_error *err)
         return s;
     }
     bool complete = false;
-    s = read_answer(path, ends[0], most, &complete, text, err);
+    reader r = {.pid = pid, .fd = ends[0], .deadline = sdm_clock() + 60.0 * (double)most.seconds};
+    s = read_answer(path, &r, most, &complete, text, err);
     close(ends[0]);
     int ended = 0;
     while (waitpid(pid, &ended, 0) < 0 && errno == EINTR) {
     }
-    return s || complete ? s : explain(path, ended, most, err);
+    return s || complete ? s : explain(path, &r, ended, most, err);
 }

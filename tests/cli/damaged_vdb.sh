@@ -11,7 +11,7 @@ harm=0
 for i in $(seq 150); do
     at=$(((i * 7919 + i * i * 104729) % (size - 40)))
     "$damage" whole.vdb flipped.vdb $at $((1 << i % 8)) || bad "damage_vdb failed at $at"
-    timeout -s KILL 20 "$program" info flipped.vdb >out 2>err
+    timeout -s KILL 300 "$program" info flipped.vdb >out 2>err
     code=$?
     case $code in
     0) [ ! -s err ] || bad "byte $at: $(cat err)" ;;
@@ -23,9 +23,9 @@ done
 [ $harm -gt 0 ] || bad 'no file was harmful: the test does not test'
 
 mkfifo pipe.vdb
-expect 1 'pipe.vdb: not a regular file' timeout -s KILL 20 "$program" info pipe.vdb
+expect 1 'pipe.vdb: not a regular file' timeout -s KILL 300 "$program" info pipe.vdb
 ln -s /dev/zero zero.vdb
-expect 1 'zero.vdb: not a regular file' timeout -s KILL 20 "$program" verify zero.vdb
+expect 1 'zero.vdb: not a regular file' timeout -s KILL 300 "$program" verify zero.vdb
 expect 1 'missing.vdb: cannot open' sdmgen info missing.vdb
 
 # a disk that is full: its own message, and no file

@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/setup.sh
-packages+=(debhelper dpkg-dev lintian mmdebstrap)
+packages+=(debhelper dh-python dpkg-dev lintian mmdebstrap python3)
 install_packages
 work=$(mktemp -d "${TMPDIR:-/tmp}/sdmgen-packages.XXXXXX")
 trap 'rm -rf "$work"' EXIT
@@ -34,7 +34,7 @@ fi
 
 say "using the packages in a bare system"
 mkdir "$work/repository"
-(cd "$work/first" && cp ./*.deb sdmgen/examples/consume/* sdmgen/tests/cli/tiny.yaml sdmgen/.ci/packages_user.sh "$work/repository")
+(cd "$work/first" && cp ./*.deb sdmgen/examples/consume/* sdmgen/tests/cli/tiny.yaml sdmgen/.ci/packages_user.sh sdmgen/.ci/packages_user.py "$work/repository")
 mmdebstrap --quiet --variant=apt --include=gcc,libc6-dev,cmake,make \
     --customize-hook="copy-in $work/repository /opt" --customize-hook='chroot "$1" bash /opt/repository/packages_user.sh' \
     bookworm /dev/null

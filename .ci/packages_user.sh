@@ -12,5 +12,6 @@ sdmgen verify map.vdb
 cmake -S . -B build >/dev/null
 cmake --build build >/dev/null
 build/consume run/model.sdm
+python3 packages_user.py
 apt-get purge -y -qq '*sdmgen*' >/dev/null
 [ ! -e /usr/share/sdmgen ] || { echo "the packages leave /usr/share/sdmgen behind" >&2 && exit 1; }

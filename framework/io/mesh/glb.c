@@ -1,5 +1,5 @@
-/* Writes a mesh as binary glTF 2.0: a header, the JSON that describes the scene, and one buffer with
-   the positions, the targets and the triangles. */
+/* Writes a mesh as binary glTF 2.0: a header, the JSON that describes the scene, and one buffer
+   with the positions, the targets and the triangles. */
 #include "sdm/internal/glb.h"
 
 #include <math.h>
@@ -192,13 +192,14 @@ sdm_status sdm_glb_write(const char *path, const sdm_mesh *mesh, const sdm_glb_t
     describe_accessors(&j, mesh, targets, n);
     describe_buffer(&j, mesh, n);
     sdm_json_close(&j, '}');
-    sdm_status s = j.text.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the glTF scene")
-                                 : SDM_OK;
+    sdm_status s =
+        j.text.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the glTF scene") : SDM_OK;
     if (!s && buffer + j.text.size + 64 > UINT32_MAX)
-        s = sdm_fail(err, SDM_E_UNSUPPORTED,
-                     "a mesh of %zu vertices and %zu triangles with %zu targets needs more than the "
-                     "4 GB of a .glb file",
-                     mesh->n_vert, mesh->n_tri, n);
+        s = sdm_fail(
+            err, SDM_E_UNSUPPORTED,
+            "a mesh of %zu vertices and %zu triangles with %zu targets needs more than the "
+            "4 GB of a .glb file",
+            mesh->n_vert, mesh->n_tri, n);
     if (!s) s = sdm_outfile_open(path, &f, err);
     if (!s) s = write_file(f, mesh, targets, n, &j.text, buffer, err);
     sdm_json_dispose(&j);

@@ -19,7 +19,8 @@ static sdm_onnx_value scale(const sdm_model *m, sdm_onnx *g, sdm_onnx_value para
     }
     return sdm_onnx_node2(
         g, "Mul",
-        sdm_onnx_node2(g, "Sub", params, sdm_onnx_floats(g, "centres of the ranges", 1, &n, centre)),
+        sdm_onnx_node2(g, "Sub", params,
+                       sdm_onnx_floats(g, "centres of the ranges", 1, &n, centre)),
         sdm_onnx_floats(g, "2 / widths of the ranges", 1, &n, factor));
 }
 

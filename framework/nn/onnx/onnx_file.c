@@ -189,10 +189,11 @@ sdm_status sdm_onnx_write(sdm_onnx *g, const char *path, sdm_onnx_value result,
     model_tail(g, &tail);
     const uint64_t total = head.size + tensors + g->main.size + tail.size;
     if (total > INT32_MAX)
-        s = sdm_fail(err, SDM_E_UNSUPPORTED,
-                     "the ONNX file would have %llu bytes, and the format allows 2147483647: export "
-                     "a smaller network",
-                     (unsigned long long)total);
+        s = sdm_fail(
+            err, SDM_E_UNSUPPORTED,
+            "the ONNX file would have %llu bytes, and the format allows 2147483647: export "
+            "a smaller network",
+            (unsigned long long)total);
     if (!s) s = sdm_outfile_open(path, &f, err);
     if (!s) s = write_parts(f, g, &head, &tail, err);
     sdm_proto_dispose(&head);

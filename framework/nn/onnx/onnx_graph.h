@@ -1,5 +1,6 @@
-/* A network as a graph of ONNX operators (opset 13), and its file. A kind of network appends tensors
-   (its weights) and nodes (operators); the file is written at the end, weights piece by piece.
+/* A network as a graph of ONNX operators (opset 13), and its file. A kind of network appends
+   tensors (its weights) and nodes (operators); the file is written at the end, weights piece by
+   piece.
 
    Values of the graph are numbers. Batches: a value may have the dimension N, the number of maps,
    which is only known when the graph runs. Running out of memory is reported by
@@ -29,7 +30,8 @@ void *sdm_onnx_memory(sdm_onnx *g, size_t count, size_t size);
 typedef void (*sdm_onnx_fill)(const void *user, size_t item, float *to);
 
 /* A tensor of floats dims[n_dims], n_dims <= SDM_ONNX_MAX_DIMS, which `fill` computes when the file
-   is written; `user` must live as long as the graph. `what` describes it for readers of the file. */
+   is written; `user` must live as long as the graph. `what` describes it for readers of the file.
+ */
 sdm_onnx_value sdm_onnx_weights(sdm_onnx *g, const char *what, size_t n_dims, const size_t *dims,
                                 sdm_onnx_fill fill, const void *user);
 
@@ -67,8 +69,8 @@ sdm_onnx_value sdm_onnx_activate(sdm_onnx *g, int kind, sdm_onnx_value from);
 /* A loop over the first dimension of `over`: the nodes between the two calls belong to its body and
    may use all values of the graph. sdm_onnx_loop_begin() returns the current slice of `over`, which
    has the dimensions dims[n_dims]. sdm_onnx_loop_end() returns the slices `result` of all rounds,
-   joined along the new dimension `axis`; a slice has the dimensions dims[n_dims], 0 for N. Loops are
-   not nested. */
+   joined along the new dimension `axis`; a slice has the dimensions dims[n_dims], 0 for N. Loops
+   are not nested. */
 sdm_onnx_value sdm_onnx_loop_begin(sdm_onnx *g, sdm_onnx_value over, size_t n_dims,
                                    const size_t *dims);
 sdm_onnx_value sdm_onnx_loop_end(sdm_onnx *g, sdm_onnx_value result, size_t n_dims,

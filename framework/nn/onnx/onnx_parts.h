@@ -24,10 +24,10 @@ typedef struct onnx_memory {
 struct sdm_onnx {
     size_t n_params;
     uint32_t n_values;
-    sdm_proto main, body;  /* the nodes of the graph and of the loop that is open */
-    sdm_proto *nodes;      /* main or body: where nodes are appended */
-    sdm_proto attributes;  /* of the next node */
-    sdm_proto metadata;    /* fields of ModelProto */
+    sdm_proto main, body;       /* the nodes of the graph and of the loop that is open */
+    sdm_proto *nodes;           /* main or body: where nodes are appended */
+    sdm_proto attributes;       /* of the next node */
+    sdm_proto metadata;         /* fields of ModelProto */
     sdm_onnx_value over, slice; /* of the loop that is open */
     size_t slice_n_dims, slice_dims[SDM_ONNX_MAX_DIMS];
     onnx_tensor *tensors;

@@ -90,7 +90,8 @@ static void fill_basis(const void *user, size_t item, float *to)
         float *row = to + o * p->rank;
         read_row(m->type, m->basis, m->weights_at[p->block], m->wide ? m->wide[p->block] : 0,
                  k->rank, o, row);
-        for (size_t i = 0; i < k->rank && m->type == SDM_POD_I8; i++) row[i] *= m->factor[coefficient + i];
+        for (size_t i = 0; i < k->rank && m->type == SDM_POD_I8; i++)
+            row[i] *= m->factor[coefficient + i];
     }
 }
 
@@ -109,11 +110,11 @@ static sdm_onnx_value legendre(sdm_onnx *g, sdm_onnx_value x, size_t degree)
         all[k] = sdm_onnx_node2(g, "Mul", p[1], sdm_onnx_scalar(g, sqrt(2 * dk + 1)));
         if (k == degree) break;
         // (k + 1) P(k+1) = (2k + 1) x P(k) - k P(k-1)
-        const sdm_onnx_value next = sdm_onnx_node2(
-            g, "Sub",
-            sdm_onnx_node2(g, "Mul", sdm_onnx_node2(g, "Mul", x, p[1]),
-                           sdm_onnx_scalar(g, (2 * dk + 1) / (dk + 1))),
-            sdm_onnx_node2(g, "Mul", p[0], sdm_onnx_scalar(g, dk / (dk + 1))));
+        const sdm_onnx_value next =
+            sdm_onnx_node2(g, "Sub",
+                           sdm_onnx_node2(g, "Mul", sdm_onnx_node2(g, "Mul", x, p[1]),
+                                          sdm_onnx_scalar(g, (2 * dk + 1) / (dk + 1))),
+                           sdm_onnx_node2(g, "Mul", p[0], sdm_onnx_scalar(g, dk / (dk + 1))));
         p[0] = p[1], p[1] = next;
     }
     sdm_onnx_set_int(g, "axis", 0);
@@ -126,8 +127,7 @@ static sdm_onnx_value polynomials(const pod_network *m, sdm_onnx *g, sdm_onnx_va
 {
     const sdm_pod_arch *a = &m->arch;
     const size_t total = max_size(a->n_terms, 1 + a->n_inputs), n = a->n_params,
-                 degree = max_size(a->degree, a->input_degree),
-                 n_factors = n < degree ? n : degree;
+                 degree = max_size(a->degree, a->input_degree), n_factors = n < degree ? n : degree;
     const sdm_onnx_value values = legendre(g, x, degree);
     sdm_onnx_value phi = 0;
     for (size_t f = 0; f < n_factors; f++) {
@@ -156,8 +156,7 @@ static sdm_onnx_value mlp(const pod_network *m, sdm_onnx *g, sdm_onnx_value h)
         const size_t dims[] = {a->width, sdm_pod_layer_inputs(a, l)};
         h = sdm_onnx_node2(g, "MatMul", sdm_onnx_weights(g, "layer", 2, dims, fill_layer, user), h);
         h = sdm_onnx_node2(
-            g, "Add", h,
-            sdm_onnx_floats(g, "bias", 2, (const size_t[]){a->width, 1}, m->bias[l]));
+            g, "Add", h, sdm_onnx_floats(g, "bias", 2, (const size_t[]){a->width, 1}, m->bias[l]));
         h = sdm_onnx_activate(g, a->activation, h);
     }
     return h;
@@ -228,8 +227,8 @@ static sdm_onnx_value decode_bucket(const pod_network *m, sdm_onnx *g, const buc
     }
     const sdm_onnx_value inputs = sdm_onnx_gather(
         g, rows, sdm_onnx_indices(g, "coefficients", 2, (const size_t[]){b->n, rank}, index), 0);
-    const sdm_onnx_value basis = sdm_onnx_weights(
-        g, "bases", 3, (const size_t[]){b->n, outputs, rank}, fill_basis, b);
+    const sdm_onnx_value basis =
+        sdm_onnx_weights(g, "bases", 3, (const size_t[]){b->n, outputs, rank}, fill_basis, b);
     return sdm_onnx_reshape(g, sdm_onnx_node2(g, "MatMul", basis, inputs), 2,
                             (const int64_t[]){(int64_t)(b->n * outputs), -1});
 }
@@ -244,7 +243,8 @@ static sdm_onnx_value decode_level(const pod_network *m, sdm_onnx *g, size_t lev
     if (!p || !parts) return 0;
     size_t n_parts = 0, row = 0;
     for (size_t i = 0, end; i < n; i = end) {
-        for (end = i; end < n && p[end].rank == p[i].rank && p[end].outputs == p[i].outputs; end++) {
+        for (end = i; end < n && p[end].rank == p[i].rank && p[end].outputs == p[i].outputs;
+             end++) {
             at[p[end].block - first] = (int32_t)row;
             row += p[end].outputs;
         }
@@ -259,8 +259,8 @@ static sdm_onnx_value decode_level(const pod_network *m, sdm_onnx *g, size_t lev
 static int32_t *rows_below(const pod_network *m, sdm_onnx *g, size_t level, const int32_t *at)
 {
     const size_t first = m->arch.levels.first[level], end = m->arch.levels.first[level + 1];
-    int32_t *row_of = sdm_onnx_memory(
-        g, m->coefficients_at[level] - m->coefficients_at[level - 1], sizeof *row_of);
+    int32_t *row_of = sdm_onnx_memory(g, m->coefficients_at[level] - m->coefficients_at[level - 1],
+                                      sizeof *row_of);
     for (size_t b = first; b < end && row_of; b++)
         for (size_t o = 0; o < m->outputs[b]; o++)
             row_of[m->blocks[m->blocks[b].child].coefficient + o] = at[b - first] + (int32_t)o;
@@ -283,8 +283,7 @@ static sdm_onnx_value collect_voxels(const sdm_model *model, sdm_onnx *g, const 
         const size_t voxels = sdm_pod_block_voxels(k);
         for (size_t v = 0; v < voxels; v++) {
             const size_t x = k->at[0] + v % k->size[0], y = k->at[1] + v / k->size[0] % k->size[1],
-                         z = k->at[2] + v / k->size[0] / k->size[1],
-                         voxel = (z * ny + y) * nx + x;
+                         z = k->at[2] + v / k->size[0] / k->size[1], voxel = (z * ny + y) * nx + x;
             row_of[voxel] = at[m->leaves[i].block] + (int32_t)v;
             mean[voxel] = from[v];
         }

@@ -46,8 +46,7 @@ static void choose_at(targets *t)
         const sdm_param *p = &t->shape->params[i];
         const double up = p->max - p->def, down = p->def - p->min;
         t->at[i] = up >= down ? p->max : p->min;
-        if (t->distribution[i].kind == SDM_DISTRIBUTION_NORMAL &&
-            t->distribution[i].deviation < up)
+        if (t->distribution[i].kind == SDM_DISTRIBUTION_NORMAL && t->distribution[i].deviation < up)
             t->at[i] = p->def + t->distribution[i].deviation;
     }
 }
@@ -127,8 +126,7 @@ static sdm_status prepare(targets *t, bool *linear, sdm_error *err)
     s = sdm_instance_mesh(shape->instance, t->p, &t->base, err);
     if (!s) s = SDM_ALLOC(&t->delta, t->n * 3 * t->base.n_vert, "morph targets", err);
     if (s) return s;
-    for (size_t j = 0; j < 3 * t->base.n_vert; j++)
-        t->size = fmax(t->size, fabs(t->base.vert[j]));
+    for (size_t j = 0; j < 3 * t->base.n_vert; j++) t->size = fmax(t->size, fabs(t->base.vert[j]));
     return check_linear(t, linear, err);
 }
 

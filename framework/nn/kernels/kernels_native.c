@@ -142,9 +142,9 @@ void sdm_panel_row_i8(size_t n_wide, size_t k, const int8_t *panels, size_t row,
         const size_t size = i < wide ? 2 : 1;
         for (size_t q = i; q < i + 2 && q < k; q++) {
             const int8_t *from = panel + (row % SDM_PANEL * 2 + q - i) * size;
-            int16_t v = *from;
-            if (size == 2) memcpy(&v, from, size);
-            w[q] = v;
+            int16_t two = 0;
+            memcpy(&two, from, size);
+            w[q] = size == 2 ? (float)two : (float)*from;
         }
         panel += 2 * SDM_PANEL * size;
     }

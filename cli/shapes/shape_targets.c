@@ -1,5 +1,5 @@
 /* A shape as binary glTF with a morph target for each of its parameters. */
-#include "shapes/shape_targets.h"
+#include "shape_targets.h"
 
 #include <math.h>
 #include <string.h>

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "model_text.h"
-#include "onnx/onnx_graph.h"
+#include "onnx/onnx.h"
 #include "sdm/internal/container.h"
 #include "sdm/model.h"
 

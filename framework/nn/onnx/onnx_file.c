@@ -24,33 +24,6 @@ static double item_bytes(const onnx_tensor *t)
     return n;
 }
 
-// ValueInfoProto: name 1, type 2 (tensor_type 1 (elem_type 1, shape 2 (dim 1 (dim_value 1,
-// dim_param 2))))
-void onnx_describe(sdm_proto *graph, unsigned field, const char *name, size_t n_dims,
-                   const size_t *dims)
-{
-    sdm_proto shape = {0}, tensor = {0}, type = {0}, value = {0};
-    for (size_t i = 0; i < n_dims; i++) {
-        sdm_proto dim = {0};
-        if (dims[i])
-            sdm_proto_int(&dim, 1, dims[i]);
-        else
-            sdm_proto_text(&dim, 2, "N");
-        sdm_proto_message(&shape, 1, &dim);
-        sdm_proto_dispose(&dim);
-    }
-    sdm_proto_int(&tensor, 1, ONNX_FLOAT);
-    sdm_proto_message(&tensor, 2, &shape);
-    sdm_proto_message(&type, 1, &tensor);
-    sdm_proto_text(&value, 1, name);
-    sdm_proto_message(&value, 2, &type);
-    sdm_proto_message(graph, field, &value);
-    sdm_proto_dispose(&shape);
-    sdm_proto_dispose(&tensor);
-    sdm_proto_dispose(&type);
-    sdm_proto_dispose(&value);
-}
-
 // *head = the fields of a tensor up to its elements, which follow. TensorProto: dims 1, data_type
 // 2, name 8, raw_data 9, doc_string 12
 static void tensor_head(const onnx_tensor *t, sdm_proto *head)

@@ -1,7 +1,7 @@
-/* The inside of a graph (onnx_graph.h), for the files of this folder. */
+/* The inside of a graph (onnx.h), for the files of this folder. */
 #pragma once
 
-#include "onnx_graph.h"
+#include "onnx.h"
 
 /* Types of elements, as in onnx.proto. */
 enum { ONNX_FLOAT = 1, ONNX_INT32 = 6, ONNX_INT64 = 7 };

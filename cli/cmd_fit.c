@@ -84,22 +84,31 @@ static sdm_status fit_shape(cli_fit *f, sdm_error *err)
     f->opts.cancelled = cli_interrupted;
     f->opts.user = &w;
     cli_progress_start(&w.bar);
-    const sdm_status s = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
-    cli_progress_end(&w.bar, !s || s == SDM_E_QUALITY);
+    f->doubt.status = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
+    sdm_status s = SDM_OK;
+    if (!f->doubt.status || f->doubt.status == SDM_E_QUALITY) s = cli_fit_mirror(f, err);
+    cli_progress_end(&w.bar, !s && (!f->doubt.status || f->doubt.status == SDM_E_QUALITY));
     f->found = f->result.objective && f->result.params;
-    f->doubt.status = s;
-    if (!s || s == SDM_E_QUALITY) return SDM_OK;
-    return sdm_fail(err, s, "%s: %s", f->path, f->doubt.text);
+    if (s || !f->doubt.status || f->doubt.status == SDM_E_QUALITY) return s;
+    return sdm_fail(err, f->doubt.status, "%s: %s", f->path, f->doubt.text);
 }
 
 static void print_notices(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
+    if (*f->side && f->given_shape)
+        cli_notice("%s=%s fits better than its mirror image, by %.3g (log-likelihood); -O %s=... "
+                   "states the side",
+                   f->mirror, f->side, f->better, f->mirror);
     if (f->start_clamped || r->start_clamped)
         cli_notice("the start parameters were clamped to their range");
     if (r->n_exact_outside)
         cli_notice("%zu maps outside of the trained range were made by the exact engine",
                    r->n_exact_outside);
+    if (f->opts.cavity > 0 && !r->n_cavity)
+        cli_notice("--cavity %g left nothing out: the widest space like the inside holds a ball of "
+                   "%.3g mm",
+                   f->opts.cavity, r->widest_space);
     if (r->n_nan)
         cli_notice("%zu voxels are NaN%s and were ignored", r->n_nan,
                    r->n_cavity ? " or in wide spaces (--cavity)" : "");

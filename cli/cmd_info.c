@@ -4,6 +4,7 @@
 
 #include "commands.h"
 #include "inputs/setup.h"
+#include "inputs/vdb_child.h"
 #include "report/files.h"
 #include "report/json_values.h"
 #include "report/report_audit.h"
@@ -12,7 +13,6 @@
 #include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
 #include "sdm/model.h"
-#include "sdm/vdb.h"
 
 static void print_model(const char *path, const sdm_model_info *m)
 {
@@ -44,6 +44,7 @@ static void print_model(const char *path, const sdm_model_info *m)
         a->q50_mm, a->q90_mm, a->q99_mm);
     printf("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
            (long long)m->train_samples, (unsigned long long)m->seed, m->version);
+    if (m->fine_width) printf("fine level   %zu units a layer (docs/grids.md)\n", m->fine_width);
     printf("file         %zu bytes, weights %zu bytes, checksum %016llx\n", m->file_bytes,
            m->weight_bytes, (unsigned long long)m->checksum);
 }
@@ -100,6 +101,7 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     sdm_json_int(&j, "train_samples", m->train_samples);
     sdm_json_int(&j, "file_bytes", (int64_t)m->file_bytes);
     sdm_json_int(&j, "weight_bytes", (int64_t)m->weight_bytes);
+    sdm_json_int(&j, "fine_width", (int64_t)m->fine_width);
     sdm_json_text(&j, "checksum", checksum);
     sdm_json_text(&j, "config", m->config ? m->config : "");
     sdm_json_close(&j, '}');
@@ -164,7 +166,7 @@ static sdm_status info_vdb(const cli_args *args, const char *path, sdm_error *er
 {
 #ifdef SDM_HAVE_VDB
     char *text = NULL;
-    sdm_status s = sdm_vdb_verify(path, &text, err);
+    sdm_status s = cli_vdb_verify(path, &text, err);
     if (!s && args->json) {
         sdm_json j = {0};
         sdm_json_open(&j, NULL, '{');

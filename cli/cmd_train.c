@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "commands.h"
 #include "inputs/config_shape.h"
@@ -15,34 +14,6 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 #include "study/evaluate.h"
-
-/* Refuses a folder with a model or a checkpoint, unless --resume or --force is given. */
-static sdm_status check_folder(const cli_args *args, const char *folder, sdm_error *err)
-{
-    static const struct {
-        const char *name, *content;
-    } files[] = {{"model.sdm", "a trained model"},
-                 {"checkpoint.sdmc", "the checkpoint of a training"}};
-    if (args->resume && args->force)
-        return sdm_fail(err, SDM_E_ARG, "train: --resume and --force exclude each other");
-    bool there[2];
-    for (size_t i = 0; i < 2; i++) {
-        char path[SDM_PATH_TEXT_MAX + 32];
-        snprintf(path, sizeof path, "%s/%s", folder, files[i].name);
-        there[i] = !access(path, F_OK);
-    }
-    if (args->force || (!there[0] && !there[1])) return SDM_OK;
-    if (!there[1])
-        return sdm_fail(err, SDM_E_ARG,
-                        "%s holds %s and no checkpoint to continue from: start again with --force, "
-                        "or choose --out DIR",
-                        folder, files[0].content);
-    if (args->resume) return SDM_OK;
-    return sdm_fail(
-        err, SDM_E_ARG,
-        "%s holds %s: continue with --resume, start again with --force, or choose --out DIR",
-        folder, files[there[0] ? 0 : 1].content);
-}
 
 /* Draws slices exact | network | error at the default parameters of the model. */
 static sdm_status write_picture(const sdm_model *model, const sdm_instance *shape,
@@ -72,6 +43,12 @@ static sdm_status look_at_model(const char *model_path, const sdm_instance *shap
     return s;
 }
 
+/* The kind that network.kind: auto has trained and not kept. */
+static const char *other_kind(const sdm_train_report *r)
+{
+    return r->other_kind == SDM_NETWORK_POD ? "pod" : "template";
+}
+
 static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
                                 const cli_timing *times, sdm_error *err)
 {
@@ -92,6 +69,13 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         sdm_json_int(&j, "maps", r->samples);
         sdm_json_real(&j, "ms_network", times->ms_network);
         sdm_json_real(&j, "ms_exact", times->ms_exact);
+        if (r->compared) {
+            sdm_json_open(&j, "other", '{');
+            sdm_json_text(&j, "kind", other_kind(r));
+            sdm_json_real(&j, "rmse_mm", r->other.rmse_mm);
+            sdm_json_real(&j, "rmse_near_mm", r->other.rmse_near_mm);
+            sdm_json_close(&j, '}');
+        }
         sdm_json_open(&j, "verdict", '{');
         sdm_verdict_json(&j, &r->verdict);
         sdm_json_real(&j, "saved_seconds", r->verdict.saved_seconds);
@@ -111,6 +95,9 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
            (long long)a->samples, a->mse_mm2, a->rmse_mm, a->near_mm, a->rmse_near_mm,
            a->max_abs_mm);
     cli_print_two("  time        ", times);
+    if (r->compared)
+        printf("  auto        trained %s, too: RMSE %.5f mm, near the surface %.5f mm; not kept\n",
+               other_kind(r), r->other.rmse_mm, r->other.rmse_near_mm);
     cli_print_verdict(&r->verdict);
     return SDM_OK;
 }
@@ -141,7 +128,7 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     if (!s && args->out && strlen(args->out) >= sizeof config->output.folder)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
-    if (!s) s = check_folder(args, config->output.folder, err);
+    if (!s) s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);
     if (!s) s = train_network(args, config, shape, err);
     sdm_instance_free(shape);
     sdm_registry_free(registry);

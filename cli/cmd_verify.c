@@ -5,10 +5,10 @@
 
 #include "commands.h"
 #include "inputs/setup.h"
+#include "inputs/vdb_child.h"
 #include "report/files.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
-#include "sdm/vdb.h"
 #include "sdm/volume.h"
 #include "study/evaluate.h"
 
@@ -21,7 +21,7 @@ static sdm_status verify_vdb(const cli_args *args, const char *path, sdm_error *
 {
 #ifdef SDM_HAVE_VDB
     char *text = NULL;
-    const sdm_status s = sdm_vdb_verify(path, &text, err);
+    const sdm_status s = cli_vdb_verify(path, &text, err);
     if (s) return s;
     const bool whole = strstr(text, "whole map") != NULL;
     sdm_free(text);

@@ -1,10 +1,11 @@
-# Installs four shared libraries (libsdmgen: libc, libm and OpenMP alone; libsdmgen_image: zlib; libsdmgen_picture: cairo;
-# libsdmgen_vdb: OpenVDB), the public headers, a CMake package, pkg-config files, configs and documentation.
+# Installs five shared libraries (libsdmgen: libc, libm and OpenMP alone; libsdmgen_image: zlib; libsdmgen_picture: cairo;
+# libsdmgen_vdb: OpenVDB; libsdmgen_training: libyaml, cairo), the public headers, a CMake package, pkg-config files, configs and
+# documentation.
 include(CMakePackageConfigHelpers)
 
 # folders of the headers, for users of the installed package and of the build folder
 set(SDM_USER_HEADERS $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-foreach(folder framework runtime shapes)
+foreach(folder framework runtime shapes trainer)
   list(APPEND SDM_USER_HEADERS $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/${folder}/include>)
 endforeach()
 
@@ -16,7 +17,8 @@ function(sdm_library target language)
   add_library(${target} SHARED ${objects})
   set_target_properties(${target} PROPERTIES OUTPUT_NAME ${LIB_OUTPUT} EXPORT_NAME ${LIB_EXPORT}
     LINKER_LANGUAGE ${language} VERSION ${PROJECT_VERSION}
-    SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} INSTALL_RPATH "$ORIGIN")
+    SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} INSTALL_RPATH "$ORIGIN"
+    BUILD_RPATH_USE_ORIGIN ON) # the files of the build folder can be copied, too
   target_include_directories(${target} INTERFACE ${SDM_USER_HEADERS})
   target_link_libraries(${target} PRIVATE sdm_flags ${LIB_LINK})
   if(NOT SDM_SANITIZE)
@@ -43,6 +45,13 @@ if(SDM_VDB)
   sdm_library(sdmgen_vdb CXX OUTPUT sdmgen_vdb EXPORT vdb PARTS sdm_vdb LINK sdmgen_shared
     OpenVDB::openvdb)
   target_link_libraries(sdmgen_vdb INTERFACE sdmgen_shared)
+endif()
+if(TARGET sdm_trainer)
+  # the training needs functions that libsdmgen does not export: it has its own, hidden copies of them
+  sdm_library(sdmgen_training C OUTPUT sdmgen_training EXPORT training PARTS sdm_config sdm_trainer
+    LINK sdmgen_shared sdm_picture sdm_shape sdm_io sdm_geom sdm_nn sdm_core PkgConfig::YAML ${SDM_LIBM})
+  target_link_options(sdmgen_training PRIVATE LINKER:--exclude-libs,ALL)
+  target_link_libraries(sdmgen_training INTERFACE sdmgen_shared)
 endif()
 
 # the same object files as a static library
@@ -71,15 +80,19 @@ target_compile_features(sdmgen_plugin INTERFACE c_std_11)
 install(TARGETS sdmgen_plugin EXPORT sdmgenTargets)
 
 # headers for users; those in internal/ are between the parts of the project
-foreach(folder framework runtime shapes)
+foreach(folder framework runtime shapes trainer)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder}/include/sdm
       DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h"
-      PATTERN internal EXCLUDE PATTERN vdb.h EXCLUDE)
+      PATTERN internal EXCLUDE PATTERN vdb.h EXCLUDE PATTERN train_file.h EXCLUDE)
   endif()
 endforeach()
 if(SDM_VDB)
   install(FILES ${PROJECT_SOURCE_DIR}/runtime/include/sdm/vdb.h
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sdm)
+endif()
+if(TARGET sdmgen_training)
+  install(FILES ${PROJECT_SOURCE_DIR}/trainer/include/sdm/train_file.h
     DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sdm)
 endif()
 
@@ -115,6 +128,9 @@ if(SDM_PICTURE)
 endif()
 if(SDM_VDB)
   sdm_pkgconfig(sdmgen-vdb sdmgen_vdb "OpenVDB level sets from signed distance maps" sdmgen)
+endif()
+if(TARGET sdmgen_training)
+  sdm_pkgconfig(sdmgen-training sdmgen_training "Training of networks for signed distance maps" sdmgen)
 endif()
 
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/configs ${PROJECT_SOURCE_DIR}/examples

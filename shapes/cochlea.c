@@ -414,4 +414,5 @@ const sdm_shape sdm_shape_cochlea = {
     .mesh = cochlea_mesh,
     .velocity = cochlea_velocity,
     .distance = cochlea_distance,
+    .mirror = "ear",
 };

@@ -2,8 +2,6 @@
 #include "race.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <string.h>
 
 #include "data/dataset_fill.h"
 #include "sdm/internal/clock.h"
@@ -15,11 +13,22 @@
 
 enum { HOLDOUT = 32, MAPS = 384, MAPS_MAX = 1024 };
 
+/* With an error of this part of a voxel no other kind is tried. */
+static const double ENOUGH = 1.0 / 500;
+
+/* Training improves the score of `pod` over that of its trial by a factor of at most 11 in all
+   families measured (docs/notes/network.md): where its trial is worse than the template by more
+   than this, it is not trained. */
+static const double HOPELESS = 15;
+
+/* Part of the budget for a template that is trained before `pod`. */
+static const double TEMPLATE_SHARE = 1.0 / 3;
+
 /* A kind of network in the race. */
 typedef struct entrant {
     sdm_network_kind kind;
-    const char *name;
     bool finished; /* false: the shape does not allow this kind */
+    bool ready;    /* it needs no training */
     sdm_accuracy accuracy;
     double seconds;
     trainer run; /* its trial; run.kind is NULL without one */
@@ -81,7 +90,7 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
     sdm_error reason = {0};
     sdm_status s = trainer_set_up(r, &reason);
     if (s == SDM_E_UNSUPPORTED && e->kind != SDM_NETWORK_POD) {
-        trainer_message(t, "auto: %s is left out: %s", e->name, reason.text);
+        trainer_message(t, "auto: %s is left out: %s", trainer_turn_name(e->kind), reason.text);
         s = SDM_OK;
     } else {
         if (s && err) *err = reason;
@@ -96,89 +105,80 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
         e->finished = !s;
     }
     e->seconds = trainer_seconds(r);
+    e->ready = r->data.only_holdout;
     r->metrics = NULL;
     sdm_text_dispose(&metrics);
     return s;
 }
 
-/* Figure of merit, mm: the error near the surface counts most, the error far from it a tenth. */
-static double merit(const sdm_accuracy *a)
+/* Runs the trial of an entrant and tells its result. */
+static sdm_status try_kind(trainer *t, sdm_config *config, entrant *e, sdm_error *err)
 {
-    return sqrt(a->rmse_near_mm * a->rmse_near_mm + 0.01 * a->mse_mm2);
+    size_t n_params;
+    sdm_instance_params(t->shape, &n_params);
+    trial_config(t->config, n_params, e->kind, config);
+    const sdm_status s = trial(t, config, e, err);
+    if (!s && e->finished)
+        trainer_message(t,
+                        "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere (trial on "
+                        "%lld maps, %.0f s)",
+                        trainer_turn_name(e->kind), e->accuracy.rmse_near_mm, e->accuracy.rmse_mm,
+                        (long long)config->data.start, e->seconds);
+    return s;
 }
 
-/* Appends a line with the result to t->metrics. */
-static sdm_status add_record(const trainer *t, const entrant *e, size_t n, const entrant *best,
-                             sdm_error *err)
+/* Decides which kinds are trained; returns the reason. */
+static const char *decide(const entrant *carried, const entrant *pod, training_turns *out)
 {
-    char key[64];
-    sdm_json j = {0};
-    sdm_json_open(&j, NULL, '{');
-    sdm_json_text(&j, "phase", "auto");
-    sdm_json_text(&j, "kind", best->name);
-    for (size_t i = 0; i < n; i++) {
-        if (!e[i].finished) continue;
-        snprintf(key, sizeof key, "%s_rmse_mm", e[i].name);
-        sdm_json_real(&j, key, e[i].accuracy.rmse_mm);
-        snprintf(key, sizeof key, "%s_rmse_near_mm", e[i].name);
-        sdm_json_real(&j, key, e[i].accuracy.rmse_near_mm);
+    *out = (training_turns){.n = 1, .kind = {SDM_NETWORK_TEMPLATE}, .chosen = true, .share = 1};
+    if (!carried->finished) {
+        out->kind[0] = SDM_NETWORK_POD;
+        return "the only kind left";
     }
-    sdm_json_close(&j, '}');
-    if (!j.text.failed) sdm_text_add(t->metrics, "%s\n", j.text.data);
-    const bool failed = j.text.failed || t->metrics->failed;
-    sdm_json_dispose(&j);
-    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : SDM_OK;
+    if (!pod->finished) return "hardly any error is left";
+    const double ratio = trainer_score(&pod->accuracy) / trainer_score(&carried->accuracy);
+    if (ratio > HOPELESS) return "training does not make up for such a difference";
+    if (ratio <= 1) {
+        out->kind[0] = SDM_NETWORK_POD;
+        return "the better one, and training improves it most";
+    }
+    out->n = 2, out->kind[1] = SDM_NETWORK_POD;
+    out->share = carried->ready ? 1 : TEMPLATE_SHARE;
+    return carried->ready
+               ? "ready, then pod is trained, and the better one is kept"
+               : "trained with a third of the budget, then pod, and the better one is kept";
 }
 
 /* Hands the design and the maps of the entrant on to the training. */
-static void hand_on(entrant *e, trainer *t)
+static void hand_on(entrant *e, trial_gain *gain)
 {
-    t->design = e->run.design;
-    t->tried = e->run.data;
+    *gain = (trial_gain){e->run.design, e->run.data};
     e->run.design = NULL;
     e->run.data = (dataset){0};
 }
 
-sdm_status trainer_race(trainer *t, sdm_config *out, sdm_error *err)
+sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, trial_gain gain[2],
+                        sdm_error *err)
 {
-    // with an error this small near the surface no other kind is tried
-    const double enough = t->config->grid.spacing[0] / 500;
-    entrant e[] = {{.kind = SDM_NETWORK_TEMPLATE, .name = "template"},
-                   {.kind = SDM_NETWORK_POD, .name = "pod"}};
-    const size_t n = sizeof e / sizeof *e;
-    size_t n_params;
-    sdm_instance_params(t->shape, &n_params);
-    entrant *best = NULL;
-    sdm_status s = SDM_OK;
-    for (size_t i = 0; i < n && !s; i++) {
-        if (i + 1 == n && !best) {
-            best = &e[i]; // the only kind left: no trial
-            break;
-        }
-        trial_config(t->config, n_params, e[i].kind, out);
-        s = trial(t, out, &e[i], err);
-        if (s || !e[i].finished) {
-            entrant_dispose(&e[i]);
-            continue;
-        }
-        trainer_message(t,
-                        "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere (trial on "
-                        "%lld maps, %.0f s)",
-                        e[i].name, e[i].accuracy.rmse_near_mm, e[i].accuracy.rmse_mm,
-                        (long long)out->data.start, e[i].seconds);
-        const bool better = !best || merit(&e[i].accuracy) < merit(&best->accuracy);
-        entrant *worse = better ? best : &e[i];
-        if (better) best = &e[i];
-        if (worse) entrant_dispose(worse);
-        if (merit(&best->accuracy) < enough) break;
-    }
+    entrant e[] = {{.kind = SDM_NETWORK_TEMPLATE}, {.kind = SDM_NETWORK_POD}};
+    turn_figures figures[2];
+    size_t n = 0;
+    sdm_status s = try_kind(t, scratch, &e[0], err);
+    const bool done =
+        e[0].finished && trainer_score(&e[0].accuracy) < ENOUGH * t->config->grid.spacing[0];
+    if (!s && e[0].finished && !done) s = try_kind(t, scratch, &e[1], err);
     if (!s) {
-        *out = *t->config;
-        sdm_config_choose_kind(out, best->kind);
-        trainer_message(t, "auto: network.kind is %s", best->name);
-        s = add_record(t, e, n, best, err);
-        if (!s && best->finished) hand_on(best, t);
+        const char *reason = decide(&e[0], &e[1], out);
+        trainer_message(t, "auto: network.kind is %s: %s", trainer_turn_name(out->kind[0]), reason);
+        for (size_t i = 0; i < 2; i++)
+            if (e[i].finished) figures[n++] = (turn_figures){e[i].kind, &e[i].accuracy};
+        s = trainer_turns_record(t->metrics, out->kind[0], out->n > 1 ? &out->kind[1] : NULL,
+                                 figures, n, err);
     }
-    for (size_t i = 0; i < n; i++) entrant_dispose(&e[i]);
+    for (int i = 0; i < out->n && !s; i++) {
+        entrant *winner = out->kind[i] == e[0].kind ? &e[0] : &e[1];
+        if (winner->finished) hand_on(winner, &gain[i]);
+    }
+    for (size_t i = 0; i < 2; i++) entrant_dispose(&e[i]);
     return s;
 }

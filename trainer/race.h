@@ -1,14 +1,20 @@
-/* The choice of the kind of network (network.kind: auto) by short trials on the shape's own maps.
- */
+/* The choice of the kinds of network to train (network.kind: auto) by short trials on the shape's
+   own maps. */
 #pragma once
 
 #include "state/kind.h"
 
-/* *out = *t->config with a kind of network, and with the defaults of this kind for all keys that
-   have the defaults of `auto`. Each kind that the shape allows is trained on the same few hundred
-   exact maps (bases and least squares, no steps) and measured on held-out shapes; the result is
-   sent to the message callback and appended to t->metrics. The design of the chosen kind and its
-   maps are handed on in t->design and t->tried. The choice depends on
-   configuration, shape and seed only. t: config, shape, folder, hooks and n_threads are set.
-   SDM_E_CANCELLED and the errors of a training. */
-sdm_status trainer_race(trainer *t, sdm_config *out, sdm_error *err);
+/* What a trial hands on to the training of its kind. */
+typedef struct trial_gain {
+    void *design; /* trainer.design; NULL: none */
+    dataset maps; /* trainer.tried */
+} trial_gain;
+
+/* Fills *out with the kinds to train. Each kind that the shape allows is trained on the same few
+   hundred exact maps (bases and least squares, no steps) and measured on held-out shapes; the
+   results are sent to the message callback and appended to t->metrics. gain[i] = what the trial of
+   out->kind[i] hands on; the caller owns the maps also after an error. The choice depends on
+   configuration, shape and seed only. t: config, shape, folder, hooks and n_threads are set;
+   scratch: memory for a configuration. SDM_E_CANCELLED and the errors of a training. */
+sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, trial_gain gain[2],
+                        sdm_error *err);

@@ -1,224 +1,174 @@
-/* A training run from beginning to end: maps, network, training, model file. */
+/* A run: the choice of the kinds of network, one training or two, the better model. */
 #include <math.h>
-#include <stdio.h>
 
-#include "data/dataset_fill.h"
 #include "race.h"
 #include "sdm/internal/clock.h"
+#include "sdm/internal/file.h"
 #include "sdm/internal/team.h"
 #include "sdm/internal/text.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
-#include "set_up.h"
 #include "state/checkpoint.h"
 #include "state/export_model.h"
-#include "state/kind.h"
-#include "state/new_samples.h"
 #include "state/progress.h"
+#include "training.h"
 
-static void fill_report(void *user, size_t done, size_t all)
+/* Less than this part of the budget is no use for a second kind. */
+static const double ENOUGH_LEFT = 0.25;
+
+typedef struct run {
+    const sdm_config *asked;
+    sdm_config *settled; /* of the present training */
+    training_turns turns;
+    trial_gain gain[2]; /* of the trials, by turn */
+    sdm_text metrics;
+    bool resume; /* the present training goes on from its checkpoint */
+} run;
+
+/* *t = what all trainings of the run have in common. */
+static void trainer_init(run *r, const sdm_instance *shape, const char *folder,
+                         const sdm_train_hooks *hooks, trainer *t)
 {
-    trainer *t = user;
-    t->pace.done = (int64_t)done;
-    trainer_report(t, trainer_start_fraction(t), done == all);
+    *t = (trainer){.config = r->asked,
+                   .shape = shape,
+                   .folder = folder,
+                   .n_threads = sdm_threads(r->asked->threads),
+                   .started = sdm_clock(),
+                   .loss = NAN,
+                   .heldout_mse = NAN,
+                   .evaluated_step = -1,
+                   .metrics = &r->metrics,
+                   .turns = &r->turns};
+    if (hooks) t->hooks = *hooks;
 }
 
-static bool fill_cancelled(void *user) { return trainer_cancelled(user); }
-
-/* true when the computation of the data has used half of a time budget. */
-static bool fill_enough(void *user) { return trainer_start_fraction(user) > 0.5; }
-
-/* Makes all maps needed before training. resumed: exactly as many as the interrupted run made, else
- * as many as the time budget allows. */
-static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
+/* Settles which kinds are trained: with network.kind: auto by a race, or as the checkpoint says. */
+static sdm_status settle(run *r, trainer *t, sdm_error *err)
 {
-    const size_t start = t->data.n_start;
-    const fill_hooks hooks = {.report = fill_report,
-                              .cancelled = fill_cancelled,
-                              .enough = resumed ? NULL : fill_enough,
-                              .user = t};
-    t->phase = SDM_PHASE_DATA;
-    trainer_pace_start(t, 1);
-    t->data.known = t->tried.n_voxels ? &t->tried : NULL;
-    const sdm_status s = trainer_dataset_fill(&t->data, t->n_threads, &hooks, err);
-    t->data.known = NULL;
-    trainer_dataset_dispose(&t->tried);
-    if (s) return s;
-    if (t->data.n_start < start)
-        trainer_message(t,
-                        "half of the budget is over after %zu of %zu random maps: training starts "
-                        "with these (lower "
-                        "data.start or raise "
-                        "train.minutes)",
-                        t->data.n_start, start);
-    return trainer_check_grid(t, err);
-}
-
-/* Prepares everything for the first step: maps, network, producer. A resumed run makes the n_taken
- * random samples of the checkpoint again. */
-static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_error *err)
-{
-    sdm_status s = train_make_maps(t, resumed, err);
-    t->phase = SDM_PHASE_BASES;
-    trainer_pace_start(t, 0);
-    trainer_report(t, trainer_start_fraction(t), true);
-    if (!s) s = t->kind->begin(t, err);
-    if (!s) s = trainer_samples_start(t, err);
-    if (!s && resumed) s = trainer_samples_retake(t, n_taken, err);
-    if (s == SDM_E_CANCELLED)
-        s = sdm_fail(err, s, "stopped on request before the training began: %s is as it was",
-                     t->folder);
-    return s;
-}
-
-/* Runs all steps from set-up to trained weights. config: the open temporary file of config.yaml. It
-   is committed, and the files of an older run are removed, only after all checks of the
-   configuration: until then the folder stays as it was. */
-static sdm_status train_run(trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
-{
+    r->turns = (training_turns){.n = 1, .kind = {r->asked->network.kind}, .share = 1};
+    if (r->asked->network.kind != SDM_NETWORK_AUTO) return SDM_OK;
     bool found = false;
-    sdm_status s = trainer_set_up(t, err);
-    if (!s && resume) {
-        s = trainer_checkpoint_read(t, &found, err);
-        if (!s && !found)
-            trainer_message(t, "no checkpoint in %s: training starts from the beginning",
-                            t->folder);
-    }
-    if (s) return s;
-    const sdm_phase from = t->phase;
-    const double resumed_seconds = trainer_seconds(t);
-    s = train_prepare(t, found, t->data.n_taken, err);
-    if (!s && !resume) s = trainer_checkpoint_clear_folder(t, err);
-    if (!s) s = sdm_outfile_commit(config, err);
-    if (s) return s;
-
-    if (found) {
-        // the time in which the maps were made again does not count
-        t->started += trainer_seconds(t) - resumed_seconds;
-        t->phase = from;
-    } else {
-        trainer_enter(t, SDM_PHASE_MODE_FIT);
-    }
-    t->last_checkpoint = t->prepared_seconds = trainer_seconds(t);
-    return t->kind->run(t, found, err);
+    const sdm_status s = r->resume ? trainer_checkpoint_turns(t, &r->turns, &found, err) : SDM_OK;
+    // the folder may have been moved
+    trainer_export_path(t, r->turns.first.model_path);
+    return s || found ? s : trainer_race(t, r->settled, &r->turns, r->gain, err);
 }
 
-/* Tells if the run took longer than its budget of time, and why. measured: seconds of the
- * measurement of the model. */
-static void tell_overrun(trainer *t, double measured)
+/* Trains the kind of the present turn. */
+static sdm_status train_turn(run *r, const trainer *common, sdm_train_report *report,
+                             sdm_error *err)
 {
-    const double budget = t->config->train.minutes * 60, over = trainer_seconds(t) - budget;
-    if (!trainer_by_time(t) || over < fmax(1, 0.02 * budget)) return;
-    trainer_message(
-        t,
-        "the run took %.0f s longer than train.minutes: the maps, bases and trials before "
-        "the first step took %.0f s, the measurement of the model %.0f s (lower "
-        "data.start, data.static or data.holdout, or raise train.minutes)",
-        over, t->prepared_seconds, measured);
-}
-
-/* A template is ready as soon as its meshes are measured. Says so if `auto` has chosen it and most
- * of the time is left. */
-static void tell_unused(trainer *t, const sdm_config *asked)
-{
-    const double left = t->config->train.minutes * 60 - trainer_seconds(t);
-    if (asked->network.kind != SDM_NETWORK_AUTO || !trainer_by_time(t) ||
-        t->config->network.kind != SDM_NETWORK_TEMPLATE ||
-        left < 0.5 * t->config->train.minutes * 60)
-        return;
-    trainer_message(t,
-                    "auto: %.0f s of train.minutes were not needed; network.kind=pod trains with "
-                    "all of them, and may reach a smaller error inside parts that overlap and far "
-                    "from the surface",
-                    left);
-}
-
-/* Measures and writes the model. If the model cannot be written, a checkpoint keeps the trained
- * weights. */
-static sdm_status train_finish(trainer *t, sdm_train_report *report, sdm_error *err)
-{
-    const sdm_phase phase = t->phase;
-    const double started = trainer_seconds(t);
-    const size_t lines = t->metrics->size;
-    t->phase = SDM_PHASE_EVALUATE;
-    trainer_report(t, 1, true);
-    const sdm_status s = trainer_export_model(t, report, err);
-    if (!s) {
-        tell_overrun(t, trainer_seconds(t) - started);
-        return trainer_checkpoint_remove(t, err);
-    }
-    t->phase = phase;
-    t->metrics->size = lines;
-    if (s != SDM_E_QUALITY && !trainer_checkpoint_write(t, NULL))
-        trainer_message(t, "a checkpoint is in %s: go on with --resume", t->folder);
+    trial_gain *gain = &r->gain[r->turns.at];
+    trainer t = *common;
+    trainer_turn_config(&r->turns, r->asked, r->settled);
+    t.config = r->settled;
+    t.design = gain->design, t.tried = gain->maps;
+    *gain = (trial_gain){0};
+    const sdm_status s = trainer_training(&t, r->resume, report, err);
+    r->resume = false;
     return s;
 }
 
-/* *c = the configuration of the run: `config`, where network.kind: auto is settled by a race, or on
- * resuming by config.yaml of the interrupted run. */
-static sdm_status train_settle(trainer *t, const sdm_config *config, bool resume, sdm_config *c,
-                               sdm_error *err)
+/* Tells and records that the second kind is trained now. false: there is no budget left for it. */
+static bool begin_second(run *r, const trainer *t)
 {
-    *c = *config;
-    if (config->network.kind != SDM_NETWORK_AUTO) return SDM_OK;
-    char path[SDM_PATH_TEXT_MAX + 32];
-    snprintf(path, sizeof path, "%s/config.yaml", t->folder);
-    sdm_config *before = NULL;
-    sdm_status s = SDM_ALLOC(&before, 1, "configuration", err);
+    const sdm_accuracy *a = &r->turns.first.accuracy;
+    const double left = trainer_turns_left(&r->turns, r->asked);
+    const char *first = trainer_turn_name(r->turns.kind[0]),
+               *second = trainer_turn_name(r->turns.kind[1]);
+    if (left < ENOUGH_LEFT) {
+        trainer_message(t, "auto: %s is kept: hardly any of the budget is left for %s", first,
+                        second);
+        return false;
+    }
+    trainer_message(t,
+                    "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere; %s is trained "
+                    "with %.0f %% of the budget",
+                    first, a->rmse_near_mm, a->rmse_mm, second, 100 * left);
+    const turn_figures figures = {r->turns.kind[0], a};
+    return !trainer_turns_record(&r->metrics, r->turns.kind[1], NULL, &figures, 1, NULL);
+}
+
+/* Compares the two kinds, tells and records which is kept; *report becomes that of the run. */
+static sdm_status keep_better(run *r, trainer *t, sdm_train_report *report, sdm_error *err)
+{
+    const sdm_train_report both[2] = {r->turns.first, *report};
+    const int best = trainer_second_wins(&r->turns, &both[1].accuracy);
+    turn_figures figures[2];
+    for (int i = 0; i < 2; i++) {
+        figures[i] = (turn_figures){r->turns.kind[i], &both[i].accuracy};
+        trainer_message(t, "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere%s",
+                        trainer_turn_name(r->turns.kind[i]), both[i].accuracy.rmse_near_mm,
+                        both[i].accuracy.rmse_mm, i == best ? ": it is kept" : "");
+    }
+    *report = both[best];
+    report->seconds = both[0].seconds + both[1].seconds;
+    report->verdict.saved_seconds = both[1].verdict.saved_seconds;
+    report->compared = true;
+    report->other = both[!best].accuracy;
+    report->other_kind = r->turns.kind[!best];
+    const sdm_status s =
+        trainer_turns_record(&r->metrics, r->turns.kind[best], NULL, figures, 2, err);
+    return s ? s : trainer_metrics_write(t, err);
+}
+
+/* Trains the second kind in the budget that the first has left. If it fails, the first is kept. */
+static sdm_status train_second(run *r, trainer *t, sdm_train_report *report, sdm_error *err)
+{
+    sdm_error reason = {0};
+    sdm_train_report second = {0};
+    t->started = sdm_clock();
+    const sdm_status s = train_turn(r, t, &second, &reason);
+    if (s == SDM_E_CANCELLED) {
+        if (err) *err = reason;
+        return s;
+    }
+    if (!s) {
+        const sdm_status kept = keep_better(r, t, &second, err);
+        *report = second;
+        return kept;
+    }
+    trainer_message(t, "auto: %s is kept, because %s failed: %s",
+                    trainer_turn_name(r->turns.kind[0]), trainer_turn_name(r->turns.kind[1]),
+                    reason.text);
+    *report = r->turns.first;
+    return trainer_checkpoint_remove(t, err);
+}
+
+/* All trainings of the run. */
+static sdm_status train_all(run *r, trainer *t, sdm_train_report *report, sdm_error *err)
+{
+    sdm_status s = settle(r, t, err);
     if (s) return s;
-    const bool found = resume && !sdm_config_read(path, NULL, 0, before, NULL);
-    if (found) sdm_config_choose_kind(c, before->network.kind);
-    sdm_free(before);
-    return found ? SDM_OK : trainer_race(t, c, err);
+    if (r->turns.at == 0) {
+        s = train_turn(r, t, report, err);
+        if (s || r->turns.n == 1) return s;
+        r->turns.first = *report;
+        if (!begin_second(r, t)) return SDM_OK;
+        r->turns.at = 1;
+    }
+    return train_second(r, t, report, err);
 }
 
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder,
                      bool resume, const sdm_train_hooks *hooks, sdm_train_report *report,
                      sdm_error *err)
 {
-    sdm_text metrics = {0};
-    trainer t = {.config = config,
-                 .shape = shape,
-                 .folder = folder,
-                 .started = sdm_clock(),
-                 .loss = NAN,
-                 .heldout_mse = NAN,
-                 .evaluated_step = -1,
-                 .metrics = &metrics};
-    if (hooks) t.hooks = *hooks;
-    t.n_threads = sdm_threads(config->threads);
-    sdm_outfile *resolved = NULL;
-    sdm_config *settled = NULL;
+    run r = {.asked = config, .resume = resume};
+    trainer t;
+    sdm_train_report result = {0};
     sdm_team *team = NULL;
+    trainer_init(&r, shape, folder, hooks, &t);
     const size_t existing = sdm_folder_existing(folder);
     sdm_status s = sdm_make_folder(folder, err);
-    if (!s) s = SDM_ALLOC(&settled, 1, "configuration", err);
+    if (!s) s = SDM_ALLOC(&r.settled, 1, "configuration", err);
     if (!s) s = sdm_team_start(t.n_threads, &team, err);
-    if (!s) s = train_settle(&t, config, resume, settled, err);
-    if (s) {
-        trainer_dataset_dispose(&t.tried);
-        sdm_team_end(team);
-        sdm_free(settled);
-        sdm_text_dispose(&metrics);
-        sdm_folder_remove_empty(folder, existing);
-        return s;
-    }
-    t.config = settled;
-    t.kind = trainer_kind_find(settled->network.kind);
-    s = trainer_export_config(&t, &resolved, err);
-    if (!s) s = train_run(&t, resume, &resolved, err);
-    sdm_outfile_discard(&resolved);
-    trainer_producer_stop(t.producer);
-    t.producer = NULL;
-    if (!s) s = train_finish(&t, report, err);
-    if (!s) tell_unused(&t, config);
+    if (!s) s = train_all(&r, &t, &result, err);
     if (s) sdm_folder_remove_empty(folder, existing);
-    t.kind->dispose(&t);
-    trainer_dataset_dispose(&t.data);
-    trainer_dataset_dispose(&t.tried);
-    sdm_free(t.blocks);
-    sdm_text_dispose(&metrics);
+    if (!s && report) *report = result;
+    for (size_t i = 0; i < 2; i++) trainer_dataset_dispose(&r.gain[i].maps);
+    sdm_text_dispose(&r.metrics);
     sdm_team_end(team);
-    sdm_free(settled);
+    sdm_free(r.settled);
     return s;
 }

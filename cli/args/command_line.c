@@ -226,6 +226,7 @@ static void set_phantom_defaults(cli_phantom_args *p)
 static void set_fit_defaults(cli_fit_args *f)
 {
     const cli_fit_args none = {.image_model = "partial",
+                               .mirror = "auto",
                                .start_centre = {NAN, NAN, NAN},
                                .start_axis = {NAN, NAN, NAN},
                                .region = {NAN, NAN, NAN, NAN, NAN, NAN},
@@ -240,6 +241,8 @@ static void set_fit_defaults(cli_fit_args *f)
                                .tissue_field = NAN,
                                .label_close = NAN,
                                .least_inside = NAN,
+                               .tolerance = NAN,
+                               .beside = NAN,
                                .prior_sd = NAN,
                                .prior_rotation = NAN,
                                .prior_translation = NAN,
@@ -295,6 +298,8 @@ sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err)
     // the command
     memset(args, 0, sizeof *args);
     set_defaults(args);
+    args->argc = argc;
+    args->argv = argv;
     if (argc < 2) return sdm_fail(err, SDM_E_ARG, "a command is needed; see sdmgen --help");
     args->command = cli_find_command(argv[1], err);
     if (!args->command) return SDM_E_ARG;

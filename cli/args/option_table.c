@@ -422,6 +422,16 @@ const cli_option cli_options[] = {
     {"least-inside", 0, CLI_REAL, "F", NULL, 0, 1, ON(CLI_FIT), AT(fit.least_inside),
      "exit code 4 when less than this fraction of the fitted shape lies in the image (default "
      "0.5)"},
+    {"tolerance", 0, CLI_REAL, "F", NULL, 0, 1, ON(CLI_FIT), AT(fit.tolerance),
+     "share of the volume of the shape that the target may contradict, since organs differ from "
+     "the "
+     "model (default 0: residuals must be noise; labels and points 0.05)"},
+    {"beside", 0, CLI_REAL, "F", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.beside),
+     "volume of the inside's material that may lie beside the shape, over that of the shape "
+     "(default 0.3)"},
+    {"mirror", 0, CLI_CHOICE, NULL, "auto|no", 0, 0, ON(CLI_FIT), AT(fit.mirror),
+     "auto: also fit the mirror image of a shape that has one and tell which fits better; a shape "
+     "whose side is not given with -O takes the better one (default auto)"},
 
     /* fits: outputs */
     {"reference", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(fit.reference),

@@ -95,11 +95,12 @@ typedef struct cli_phantom_args {
 typedef struct cli_fit_args {
     bool exact, polish, ras;
     cli_list labels, reference_labels, keep;
-    const char *reference, *label_out, *start_points, *image_model;
+    const char *reference, *label_out, *start_points, *image_model, *mirror;
     double start_centre[3], start_axis[3], region[6];
     int64_t turns, turns_sphere, max_iterations; /* 0: option missing */
     double inside[2], outside[2], air[2];
-    double blur, l_ref, point_sd, margin, cavity, tissue_field, label_close, least_inside;
+    double blur, l_ref, point_sd, margin, cavity, tissue_field, label_close, least_inside,
+        tolerance, beside;
     double prior_sd, prior_rotation, prior_translation, eps;
 } cli_fit_args;
 
@@ -108,6 +109,8 @@ typedef struct cli_fit_args {
  * the commands that have the options. */
 struct cli_args {
     const cli_command *command;
+    int argc; /* the command line as given, owned by main() */
+    char *const *argv;
     cli_list files; /* positional arguments */
     cli_list plugins, params, options, outputs;
     bool quiet, json, help;

@@ -37,6 +37,7 @@ sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err)
                 {"--margin", VOLUMES, !isnan(a->margin)},
                 {"--least-inside", VOLUMES, !isnan(a->least_inside)},
                 {"--image-model labels", VOLUMES, labelled},
+                {"--beside", IMAGES, !isnan(a->beside)},
                 {"--inside", IMAGES, !isnan(a->inside[0])},
                 {"--outside", IMAGES, !isnan(a->outside[0])},
                 {"--air", IMAGES, !isnan(a->air[0])},

@@ -5,6 +5,9 @@
 #include "sdm/fit.h"
 #include "sdm/volume.h"
 
+/* largest number of options -O of a shape whose mirror image is fitted, too */
+enum { CLI_OPTIONS_MAX = 64 };
+
 /* Comparison of the fitted shape with labels, within the field of view of the image. */
 typedef struct cli_overlap {
     bool measured;
@@ -36,9 +39,16 @@ typedef struct cli_fit {
     sdm_volume image;
     float *mask;    /* [nz][ny][nx] labels, 1 inside, 0 outside; NULL: the target is no label map */
     double *points; /* [n_points][3] mm; NULL: the target is a volume */
+    bool of_surface; /* the points were spread over the surface of a mesh */
     sdm_fit_target target;
 
     sdm_fit_opts opts;
+
+    /* fit_mirror.c: the fit of the mirror image of the shape */
+    const char *mirror;        /* option that mirrors the shape; NULL: none is tried */
+    char side[64];             /* its value in the result; "" where the shape is a model's */
+    double better;             /* by how much the result is better; see sdm_fit_compare() */
+    sdm_instance *given_shape; /* the shape of the side that was not taken */
 
     /* fit_compare.c: labels to compare the fitted shape with */
     sdm_grid reference_grid;
@@ -100,6 +110,15 @@ sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err);
 /* After cli_fit_make_map(): fills f->overlap, unless there is no reference or no surface. */
 sdm_status cli_fit_compare(cli_fit *f, sdm_error *err);
 
+/* After the fit: fits the mirror image, too, if the shape has one and --mirror allows it. Takes the
+ * better side if the command line leaves it open; otherwise adds the comparison to the verdict, and
+ * f->doubt where the mirror image is better or as good. */
+sdm_status cli_fit_mirror(cli_fit *f, sdm_error *err);
+
+/* Prints the verdict as text; adds it to a JSON object. */
+void cli_fit_print_verdict(const cli_fit *f);
+void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);
+
 /* Computes f->map and f->surface of the estimate. */
 sdm_status cli_fit_make_map(cli_fit *f, sdm_error *err);
 
@@ -125,5 +144,9 @@ void cli_fit_print(const cli_fit *f);
 
 /* Adds the result as one JSON object. */
 void cli_fit_json(const cli_fit *f, sdm_json *json);
+
+/* Adds the members "command", the command line that repeats the fit, and "inputs", the files that
+ * it read with their checksums (CRC-64/XZ). */
+void cli_fit_json_repeat(const cli_fit *f, sdm_json *json);
 
 void cli_fit_dispose(cli_fit *f);

@@ -41,6 +41,11 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
                   "vector (axis times angle); sd of the rotation: of a small turn after it about "
                   "the axes of the world");
     sdm_json_close(j, '}');
+    sdm_json_text(j, "not_determined_motions", r->open_motions);
+    if (f->opts.keep_pose) {
+        sdm_json_real(j, "kept_pose_motion_mm", r->kept_pose_motion);
+        sdm_json_real(j, "kept_pose_gain", r->kept_pose_gain);
+    }
     // correlation and covariance
     sdm_json_open(j, "unknowns", '[');
     for (size_t i = 0; i < f->n_params; i++) sdm_json_text(j, NULL, f->params[i].name);
@@ -75,6 +80,7 @@ static void add_target(sdm_json *j, const cli_fit *f)
     sdm_json_real(j, "model_error_mm", r->model_error_mm);
     sdm_json_real(j, "log_likelihood", r->log_likelihood);
     if (f->target.kind == SDM_FIT_POINTS) sdm_json_real(j, "point_sd_mm", r->point_sd);
+    if (f->target.kind == SDM_FIT_POINTS) sdm_json_real(j, "outliers", r->outliers);
     if (f->target.kind != SDM_FIT_IMAGE) return;
     sdm_json_text(j, "image_model", f->args->fit.image_model);
     sdm_json_real(j, "evidence", r->evidence);
@@ -128,9 +134,11 @@ void cli_fit_json(const cli_fit *f, sdm_json *j)
     sdm_json_text(j, "shape", f->shape_name);
     if (f->model_path) sdm_json_text(j, "model", f->model_path);
     sdm_json_text(j, "image", f->path);
+    cli_fit_json_repeat(f, j);
     sdm_json_text(j, "kind", cli_fit_kind(f));
     sdm_json_bool(j, "trusted", !f->doubt.status);
     if (f->doubt.status) sdm_json_text(j, "doubt", f->doubt.text);
+    cli_fit_json_verdict(f, j);
     sdm_json_bool(j, "converged", r->converged);
     sdm_json_text(j, "reason", r->reason);
     add_unknowns(j, f);

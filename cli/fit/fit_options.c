@@ -91,6 +91,8 @@ sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err)
     if (!strcmp(a->image_model, "labels")) o->image_model = SDM_FIT_LABELS;
     set_real(a->cavity, &o->cavity);
     set_real(a->least_inside, &o->least_inside);
+    set_real(a->tolerance, &o->tolerance);
+    set_real(a->beside, &o->beside);
     set_real(a->prior_sd, &o->prior_sd);
     set_real(a->prior_rotation, &o->prior_rotation_sd);
     set_real(a->prior_translation, &o->prior_translation_sd);

@@ -65,16 +65,44 @@ static void print_spread(const cli_fit *f)
         voxel, f->source.model ? "--exact " : "", blur);
 }
 
+/* Shortest gradient of a distance whose details are shown, and largest share of the surface with a
+ * shorter one that gives no notice. */
+#define GRADIENT_MIN 0.8
+#define DETAILS_MAX 0.1
+
+/* Share of the surface beside details that the voxels of the maps do not show: there the gradient
+ * of the distance, by differences over two voxels, is clearly shorter than 1. */
+static double detail_share(const cli_fit *f)
+{
+    const sdm_grid *g = &f->map_grid;
+    const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]};
+    double all = 0, bent = 0;
+    for (int64_t k = 1; k + 1 < g->n[2]; k++)
+        for (int64_t j = 1; j + 1 < g->n[1]; j++)
+            for (int64_t i = 1; i + 1 < g->n[0]; i++) {
+                const float *d = f->map + k * step[2] + j * step[1] + i;
+                double square = 0;
+                if (fabs((double)*d) > 0.5 * cli_fit_map_voxel(f)) continue;
+                for (int a = 0; a < 3; a++)
+                    square +=
+                        pow(((double)d[step[a]] - (double)d[-step[a]]) / (2 * g->spacing[a]), 2);
+                all++;
+                bent += square < GRADIENT_MIN * GRADIENT_MIN;
+            }
+    return all > 0 ? bent / all : 0;
+}
+
 /* A notice where the voxels of the maps are larger than half of the largest ball in the shape, or
- * than those of the labels. */
+ * than those of the labels, or where they do not show the details of much of the surface. */
 static void print_coarse(const cli_fit *f)
 {
     const double *h = f->target.grid.spacing, voxel = cli_fit_map_voxel(f);
     double fine = INFINITY, inside = 0;
     for (size_t i = 0; i < sdm_grid_count(&f->map_grid); i++)
         inside = fmin(inside, (double)f->map[i]);
-    const char *beside = "the thickness of the shape";
-    if (voxel > -0.5 * inside) fine = -0.4 * inside;
+    const char *beside = "the details of the shape";
+    if (detail_share(f) > DETAILS_MAX) fine = 0.5 * voxel;
+    if (voxel > -0.5 * inside) fine = -0.4 * inside, beside = "the thickness of the shape";
     if (f->target.kind == SDM_FIT_LABEL &&
         voxel > VOXEL_OVER_LABEL_MAX * fmax(h[0], fmax(h[1], h[2])) && h[0] < fine)
         fine = fmin(h[0], fmin(h[1], h[2])), beside = "those of the labels";
@@ -84,13 +112,21 @@ static void print_coarse(const cli_fit *f)
            voxel, beside, f->source.model ? "--exact " : "", fine);
 }
 
+/* Least share of outliers that is printed. */
+#define OUTLIERS_SHOWN 0.005
+
 /* Prints the number of voxels or points used, the values of the tissues and the evidence. */
 static void print_target(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
     if (f->target.kind == SDM_FIT_POINTS) {
-        printf("points: %zu, standard deviation %.3g mm about the surface\n", r->n_used,
-               r->point_sd);
+        printf(
+            "points: %zu%s, as good as %.3g independent ones, standard deviation %.3g mm about the "
+            "surface",
+            r->n_used, f->of_surface ? " on the surface of the mesh" : "",
+            (double)r->n_used / fmax(r->noise_factor, 1), r->point_sd);
+        if (r->outliers >= OUTLIERS_SHOWN) printf(", %.0f %% outliers", 100 * r->outliers);
+        printf("\n");
         print_coarse(f);
         return;
     }
@@ -129,8 +165,10 @@ void cli_fit_print(const cli_fit *f)
     print_params(f);
     print_vector("rotation", r->pose.rotation, r->sd + f->n_params, "rad");
     print_vector("translation", r->pose.translation, r->sd + f->n_params + 3, "mm");
+    if (*r->open_motions) printf("  not determined by the data: %s\n", r->open_motions);
     print_overlap(f);
     print_target(f);
+    cli_fit_print_verdict(f);
     printf("%s after %zu iterations (%s)\n", r->converged ? "converged" : "NOT CONVERGED",
            r->n_iterations, r->reason);
     printf("  maps         %zu by the network, %zu by the exact engine\n", r->n_network,

@@ -60,5 +60,6 @@ void cli_fit_dispose(cli_fit *f)
     sdm_free(f->params);
     sdm_model_free(f->model);
     sdm_instance_free(f->shape);
+    sdm_instance_free(f->given_shape);
     sdm_registry_free(f->registry);
 }

@@ -3,14 +3,14 @@
 #include <string.h>
 
 #include "fit_command.h"
+#include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "report/files.h"
 #include "report/terminal.h"
-#include "sdm/image.h"
 #include "sdm/memory.h"
 
-/* Largest number of vertices used of a mesh: more make a fit slower but hardly more precise. */
-enum { POINTS_MAX = 50000 };
+/* Number of points on the surface of a mesh: more make a fit slower but hardly more precise. */
+enum { SURFACE_POINTS = 20000 };
 
 void cli_fit_negate_xy(double *points, size_t n)
 {
@@ -50,50 +50,46 @@ static sdm_status use_labels(cli_fit *f, sdm_error *err)
     return s;
 }
 
+/* A notice where the two frames of a file contradict each other. */
+static void notice_frames(const cli_fit *f)
+{
+    const sdm_volume *v = &f->image;
+    if (v->frames_mirrored)
+        cli_notice("%s: sform and qform are mirror images of each other: one of them shows the "
+                   "wrong side; sform is used",
+                   f->path);
+    else if (v->frames_differ_mm > 0)
+        cli_notice("%s: sform and qform place voxels up to %.3g mm apart; sform is used", f->path,
+                   v->frames_differ_mm);
+}
+
 static sdm_status read_volume(cli_fit *f, sdm_error *err)
 {
     sdm_status s = sdm_volume_read(f->path, &f->image, err);
     if (s) return s;
     if (!f->image.placed)
         cli_notice("%s states no frame: the default axes of its format are assumed", f->path);
+    notice_frames(f);
     f->target.grid = f->image.grid;
     return f->args->fit.labels.n ? use_labels(f, err) : use_image(f, err);
 }
 
-/* ---- points ---- */
+/* ---- meshes and points ---- */
 
-static sdm_status read_table(cli_fit *f, sdm_error *err)
-{
-    static const sdm_param columns[3] = {{.name = "x"}, {.name = "y"}, {.name = "z"}};
-    const double none[3] = {NAN, NAN, NAN};
-    return cli_read_rows(f->path, columns, 3, none, &f->points, &f->target.n_points, err);
-}
-
-static sdm_status read_array(cli_fit *f, sdm_error *err)
-{
-    size_t shape[4];
-    int n_dim;
-    const sdm_status s = sdm_npy_read(f->path, &f->points, shape, &n_dim, err);
-    if (s) return s;
-    if (n_dim != 2 || shape[1] != 3)
-        return sdm_fail(err, SDM_E_FORMAT,
-                        "%s: need an array of points, [n][3], not of %d dimensions (last: %zu)",
-                        f->path, n_dim, shape[n_dim - 1]);
-    f->target.n_points = shape[0];
-    return SDM_OK;
-}
-
-/* The vertices of a mesh file; if they exceed POINTS_MAX, every k-th of them. */
-static sdm_status read_vertices(cli_fit *f, sdm_error *err)
+/* The points of a mesh file: of its surface or, if it holds no triangles, its vertices. */
+static sdm_status read_mesh(cli_fit *f, sdm_error *err)
 {
     sdm_mesh mesh = {0};
     sdm_status s = cli_read_mesh(f->path, &mesh, err);
     if (s) return s;
-    const size_t step = 1 + (mesh.n_vert - 1) / POINTS_MAX,
-                 n = mesh.n_vert ? 1 + (mesh.n_vert - 1) / step : 0;
+    const size_t n = mesh.n_tri ? SURFACE_POINTS : mesh.n_vert;
     s = SDM_ALLOC(&f->points, 3 * n, "points", err);
-    for (size_t i = 0; i < n && !s; i++)
-        memcpy(f->points + 3 * i, mesh.vert + 3 * i * step, 3 * sizeof *mesh.vert);
+    if (!s && !mesh.n_tri && n) memcpy(f->points, mesh.vert, 3 * n * sizeof *f->points);
+    if (!s && mesh.n_tri) {
+        s = sdm_fit_surface_points(&mesh, n, f->opts.n_threads, f->points, err);
+        if (s) s = sdm_fail_in(err, s, "%s", f->path);
+        f->of_surface = true;
+    }
     f->target.n_points = n;
     sdm_mesh_dispose(&mesh);
     return s;
@@ -104,9 +100,9 @@ static sdm_status read_points(cli_fit *f, sdm_error *err)
     if (f->args->fit.labels.n)
         return sdm_fail(err, SDM_E_ARG, "fit: --label applies to volumes; %s has no labels",
                         f->path);
-    const sdm_status s = cli_ends_with(f->path, ".csv")   ? read_table(f, err)
-                         : cli_ends_with(f->path, ".npy") ? read_array(f, err)
-                                                          : read_vertices(f, err);
+    const sdm_status s = cli_ends_with_any(f->path, CLI_MESH_ENDINGS)
+                             ? read_mesh(f, err)
+                             : cli_read_points(f->path, &f->points, &f->target.n_points, err);
     if (s) return s;
     for (size_t i = 0; i < 3 * f->target.n_points; i++)
         if (!isfinite(f->points[i]))

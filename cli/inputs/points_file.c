@@ -14,28 +14,62 @@
 
 #define MAX_BYTES ((uint64_t)4 << 30)
 
+/* The columns of x, y and z. */
+typedef struct columns {
+    size_t axis[3]; /* axis of each column */
+} columns;
+
+/* Cuts the next cell off *line and trims it; NULL after the last one. */
+static char *next_cell(char **line)
+{
+    if (!*line) return NULL;
+    char *cell = *line, *comma = strchr(cell, ',');
+    *line = comma ? comma + 1 : NULL;
+    if (comma) *comma = '\0';
+    cell += strspn(cell, " \t\r");
+    size_t length = strlen(cell);
+    while (length > 0 && strchr(" \t\r", cell[length - 1])) cell[--length] = '\0';
+    return cell;
+}
+
+/* Takes the order of the columns from the names x, y and z of a header, in any case; other names
+ * leave x, y, z. */
+static void read_names(char *const cell[3], columns *c)
+{
+    bool found[3] = {false, false, false};
+    size_t axis[3] = {0, 1, 2};
+    for (size_t k = 0; k < 3; k++) {
+        const char *at = strlen(cell[k]) == 1 ? strchr("xXyYzZ", *cell[k]) : NULL;
+        if (!at) return;
+        axis[k] = (size_t)(at - "xXyYzZ") / 2;
+        found[axis[k]] = true;
+    }
+    if (found[0] && found[1] && found[2]) memcpy(c->axis, axis, sizeof axis);
+}
+
 /* Reads the three numbers of one line, which is changed. header: a line without any number is
  * accepted; *is_point is then false. */
-static sdm_status read_line(const char *path, size_t number, char *line, bool header, double x[3],
-                            bool *is_point, sdm_error *err)
+static sdm_status read_line(const char *path, size_t number, char *line, bool header, columns *c,
+                            double x[3], bool *is_point, sdm_error *err)
 {
     size_t n = 0, n_numbers = 0;
+    char *cells[3] = {NULL, NULL, NULL};
     const char *wrong = NULL;
-    for (char *cell = line; cell; n++) {
-        char *comma = strchr(cell, ',');
-        if (comma) *comma = '\0';
-        cell += strspn(cell, " \t\r");
-        size_t length = strlen(cell);
-        while (length > 0 && strchr(" \t\r", cell[length - 1])) cell[--length] = '\0';
+    for (char *cell; (cell = next_cell(&line)); n++) {
         double value;
         const bool good = sdm_parse_real(cell, &value);
         n_numbers += good;
         if (!good && !wrong) wrong = cell;
-        if (good && n < 3) x[n] = value;
-        cell = comma ? comma + 1 : NULL;
+        if (n >= 3) continue;
+        cells[n] = cell;
+        if (good) x[c->axis[n]] = value;
     }
     *is_point = n == 3 && n_numbers == 3;
-    if (*is_point || (header && n_numbers == 0)) return SDM_OK;
+    if (*is_point) return SDM_OK;
+    if (header && n_numbers == 0) {
+        if (n == 3) read_names(cells, c);
+        return SDM_OK;
+    }
     if (wrong)
         return sdm_fail(err, SDM_E_FORMAT,
                         "%s:%zu: '%.100s' is not a finite number; a line is x,y,z", path, number,
@@ -57,6 +91,7 @@ static sdm_status read_csv(const char *path, double **x, size_t *n, sdm_error *e
     // spreadsheets begin the file with a byte order mark
     char *at = (char *)data + (size >= 3 && !memcmp(data, "\xef\xbb\xbf", 3) ? 3 : 0);
     bool header = true;
+    columns order = {{0, 1, 2}};
     while (!s && *at) {
         char *line = at;
         const size_t length = strcspn(line, "\n");
@@ -66,7 +101,7 @@ static sdm_status read_csv(const char *path, double **x, size_t *n, sdm_error *e
         line += strspn(line, " \t\r");
         if (!*line || *line == '#') continue;
         bool is_point;
-        s = read_line(path, number, line, header, *x + 3 * *n, &is_point, err);
+        s = read_line(path, number, line, header, &order, *x + 3 * *n, &is_point, err);
         *n += is_point;
         header = false;
     }
@@ -114,7 +149,7 @@ sdm_status cli_read_points(const char *path, double **x, size_t *n, sdm_error *e
         s = read_vertices(path, x, n, err);
     else
         return sdm_fail(err, SDM_E_ARG,
-                        "--points '%s': its name must end in .csv (x,y,z), .npy ([n][3]) or "
+                        "points '%s': the name must end in .csv (x,y,z), .npy ([n][3]) or "
                         ".ply .stl .obj .off (vertices)",
                         path);
     if (!s && *n == 0) s = sdm_fail(err, SDM_E_FORMAT, "%s: no points", path);

@@ -17,12 +17,14 @@
 static void end_program(const sdm_callback *c, const char *reason)
 {
     char line[1024];
-    size_t n = (size_t)snprintf(line, sizeof line, "sdmgen: error: shape '%s', %s()", c->shape,
-                                c->function);
-    for (size_t i = 0; i < c->n && n + 100 < sizeof line; i++)
+    // names hold no characters that JSON escapes
+    const bool json = cli_get_form() == CLI_FORM_JSON;
+    size_t n = (size_t)snprintf(line, sizeof line, "%sshape '%s', %s()",
+                                json ? "{\"error\": \"" : "sdmgen: error: ", c->shape, c->function);
+    for (size_t i = 0; i < c->n && n + 200 < sizeof line; i++)
         n += (size_t)snprintf(line + n, sizeof line - n, "%s %.32s=%.6g", i ? "" : " at",
                               c->params[i].name, c->values[i]);
-    n += (size_t)snprintf(line + n, sizeof line - n, ": %s\n", reason);
+    n += (size_t)snprintf(line + n, sizeof line - n, ": %s%s\n", reason, json ? "\"}" : "");
     const ssize_t put = write(STDERR_FILENO, line, n < sizeof line ? n : sizeof line - 1);
     (void)put;
     _exit(CLI_EXIT_INPUT);
@@ -48,13 +50,16 @@ static const int signals[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 enum { N_SIGNALS = sizeof signals / sizeof *signals };
 static struct sigaction before[N_SIGNALS]; // what the signals did before
 
-static void on_crash(int signal_number)
+static void on_crash(int signal_number, siginfo_t *info, void *context)
 {
+    (void)context;
     const sdm_callback *c = sdm_callback_running();
     if (c) end_program(c, reason_of(signal_number));
-    // not a plug-in: the instruction runs into the fault again, or abort() goes on, as ever
+    // not a plug-in: the instruction runs into the fault again, as ever; a signal that was sent
+    // does not come again by itself
     for (size_t i = 0; i < N_SIGNALS; i++)
         if (signals[i] == signal_number) sigaction(signal_number, &before[i], NULL);
+    if (info->si_code <= 0) raise(signal_number);
 }
 
 static void on_exit_call(void)
@@ -65,13 +70,13 @@ static void on_exit_call(void)
 
 void cli_guard_callbacks(void)
 {
-    static char stack[1 << 16]; // the handler needs one of its own when the stack has overflowed
+    static char stack[1 << 16]; // of the main thread's handler, whose own stack may have overflowed
     const stack_t own = {.ss_sp = stack, .ss_size = sizeof stack};
     sigaltstack(&own, NULL);
     struct sigaction action;
     memset(&action, 0, sizeof action);
-    action.sa_handler = on_crash;
-    action.sa_flags = SA_ONSTACK;
+    action.sa_sigaction = on_crash;
+    action.sa_flags = SA_SIGINFO | SA_ONSTACK;
     sigemptyset(&action.sa_mask);
     for (size_t i = 0; i < N_SIGNALS; i++) sigaction(signals[i], &action, &before[i]);
     (void)atexit(on_exit_call);

@@ -8,7 +8,7 @@
 typedef struct cli_points_table {
     int column[4]; /* indices of the columns' kinds */
     int n_columns;
-    sdm_exact_at at; /* arrays with n elements; NULL: not wanted */
+    sdm_exact_at at; /* arrays for n points; NULL for an array that no column needs */
     size_t n;
 } cli_points_table;
 

@@ -110,9 +110,14 @@ int cli_report(const sdm_error *err)
 static void print_line(const char *kind, const char *begin, const char *fmt, va_list args)
 {
     if (form == CLI_FORM_JSON) {
-        char text[2048];
-        vsnprintf(text, sizeof text, fmt, args);
-        cli_json_line(kind, text);
+        va_list again;
+        va_copy(again, args);
+        const int length = vsnprintf(NULL, 0, fmt, again);
+        va_end(again);
+        char *text = length < 0 ? NULL : malloc((size_t)length + 1);
+        if (text) vsnprintf(text, (size_t)length + 1, fmt, args);
+        cli_json_line(kind, text ? text : fmt);
+        free(text);
         return;
     }
     fputs(begin, stderr);

@@ -40,11 +40,9 @@ typedef struct bench_points {
 static double triangle_area(const sdm_mesh *m, size_t t)
 {
     const double *p[3];
-    double u[3], v[3], normal[3];
+    double normal[3];
     for (size_t k = 0; k < 3; k++) p[k] = &m->vert[3 * (size_t)m->tri[3 * t + k]];
-    v3_sub(p[1], p[0], u);
-    v3_sub(p[2], p[0], v);
-    v3_cross(u, v, normal);
+    v3_triangle_normal(p[0], p[1], p[2], normal);
     return 0.5 * v3_norm(normal);
 }
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "report/terminal.h"
+#include "sdm/field.h"
 #include "sdm/internal/near.h"
 #include "sdm/internal/sampling.h"
 #include "sdm/internal/threads.h"
@@ -30,6 +31,22 @@ cli_map_maker cli_maker_of_model(const sdm_model *m, const sdm_instance *shape)
         maker.max[i] = info->params[i].max;
         maker.distribution[i] = info->params[i].distribution;
     }
+    return maker;
+}
+
+static sdm_status make_on_grid(const void *user, const double *p, float *values, sdm_error *err)
+{
+    const cli_model_on_grid *on = user;
+    const sdm_generate_opts opts = {.policy = SDM_RANGE_REFUSE, .n_threads = 1};
+    return sdm_generate_grid(on->model, p, &opts, &on->grid, values, NULL, NULL, err);
+}
+
+cli_map_maker cli_maker_on_grid(const cli_model_on_grid *on, const sdm_instance *shape)
+{
+    cli_map_maker maker = cli_maker_of_model(on->model, shape);
+    maker.grid = on->grid;
+    maker.make = make_on_grid;
+    maker.user = on;
     return maker;
 }
 

@@ -54,6 +54,19 @@ typedef struct cli_map_maker {
  * and shape. */
 cli_map_maker cli_maker_of_model(const sdm_model *m, const sdm_instance *shape);
 
+/* A model and the grid of its maps. */
+typedef struct cli_model_on_grid {
+    const sdm_model *model;
+    sdm_grid grid;
+} cli_model_on_grid;
+
+/* The same for maps on another grid; refers to *on. */
+cli_map_maker cli_maker_on_grid(const cli_model_on_grid *on, const sdm_instance *shape);
+
+/* *ms = median time of a map of the maker on one core, over random shapes. */
+sdm_status cli_time_maker(const cli_map_maker *m, uint64_t seed, float *values, double *ms,
+                          sdm_error *err);
+
 /* p[n_params] = random parameters from the maker's distributions, a function of seed and index. */
 void cli_maker_params(const cli_map_maker *m, uint64_t seed, size_t index, double *p);
 

@@ -63,6 +63,22 @@ static sdm_status time_network(const sdm_model *m, uint64_t seed, bool fastest, 
     return SDM_OK;
 }
 
+sdm_status cli_time_maker(const cli_map_maker *m, uint64_t seed, float *values, double *ms,
+                          sdm_error *err)
+{
+    double p[SDM_MAX_PARAMS], each[N_EXACT];
+    for (size_t i = 0; i <= N_EXACT; i++) {
+        cli_maker_params(m, seed, i, p);
+        const double start = cli_thread_clock();
+        sdm_status s = m->make(m->user, p, values, err);
+        if (!s) s = cli_check_interrupt(err);
+        if (s) return s;
+        if (i > 0) each[i - 1] = 1e3 * (cli_thread_clock() - start);
+    }
+    *ms = cli_median(each, N_EXACT);
+    return SDM_OK;
+}
+
 /* BATCH maps, or fewer if the maps are large or slow. */
 static size_t batch_size(const sdm_model *m, double ms_network)
 {

@@ -75,7 +75,9 @@ sdm_status cli_experiment_draw(const cli_experiment_run *run, const cli_experime
                                const float *values, sdm_error *err)
 {
     if (!run->e->experiment.pictures) return SDM_OK;
-    sdm_status s = sdm_make_folder(job->config->output.folder, err);
+    char folder[SDM_PATH_TEXT_MAX];
+    sdm_status s = cli_experiment_path(run, job->index, "", folder, err);
+    if (!s) s = sdm_make_folder(folder, err);
     if (!s) s = draw_slices(run, job, values, err);
     if (!s) s = draw_surfaces(run, job, values, err);
     return s ? s : cli_check_interrupt(err);

@@ -89,32 +89,59 @@ static sdm_status measure_dice(const sdm_fit_source *source, const sdm_fit_resul
     return s;
 }
 
-/* Fits one phantom. A fit that does not converge is a result, not an error; *why then holds the
+/* Refuses a fit of a shape with a mirror image unless it is better than that of the mirror image.
+ */
+static sdm_status check_mirror(const cli_experiment_job *job, const sdm_fit_source *source,
+                               const sdm_fit_target *target, const sdm_fit_opts *opts,
+                               const sdm_fit_result *r, sdm_error *why)
+{
+    if (!sdm_instance_shape(job->shape)->mirror) return SDM_OK;
+    sdm_fit_result mirror = {0};
+    const sdm_status s = sdm_fit_mirrored(source, target, opts, &mirror, why);
+    const double better = sdm_fit_compare(r, &mirror);
+    sdm_fit_dispose(&mirror);
+    if (s && s != SDM_E_QUALITY) return s;
+    if (better > SDM_FIT_PREFERRED) return SDM_OK;
+    return sdm_fail(why, SDM_E_QUALITY, "the mirror image of the shape fits as well");
+}
+
+/* Fits one phantom. A fit that is not to be trusted is a result, not an error; *why then holds the
  * reason. */
 static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *source, bool polish,
                           const sdm_experiment *e, const cli_experiment_phantom *p,
                           cli_experiment_fit *out, sdm_error *why, sdm_error *err)
 {
-    const sdm_fit_target target = {.kind = SDM_FIT_IMAGE, .grid = p->grid, .values = p->values};
+    const sdm_experiment_method *method = e->rows[job->index].method;
+    const bool wrong = *method->shows || method->wrong;
+    const sdm_fit_target target = {.kind = method->labels ? SDM_FIT_LABEL : SDM_FIT_IMAGE,
+                                   .grid = p->grid,
+                                   .values = p->values};
     sdm_fit_opts opts = sdm_fit_defaults();
     sdm_fit_result r = {0};
+    double start[SDM_MAX_PARAMS];
+    for (size_t i = 0; i < job->maker.n_params; i++)
+        start[i] = 0.5 * (job->maker.min[i] + job->maker.max[i]);
     // fit
     opts.prior_sd = e->fit.prior_sd;
     opts.polish_eps = e->fit.eps;
-    opts.start_params = p->start;
+    opts.start_params = start;
+    if (!wrong) opts.appearance.inside[0].mean = opts.appearance.outside[0].mean + p->contrast;
     opts.start_pose = p->start_pose;
     opts.max_polish_iterations = polish ? opts.max_iterations : 0;
     opts.n_threads = 1; // the table has times of one core
     opts.cancelled = cli_interrupted;
     const double begin = cli_thread_clock();
     sdm_status s = sdm_fit(source, &target, &opts, &r, why);
+    if (!s) s = check_mirror(job, source, &target, &opts, &r, why);
+    if (s == SDM_E_ARG && wrong) s = SDM_E_QUALITY; // the start lies outside of the image
     out->seconds = cli_thread_clock() - begin;
     // store the estimate
     out->converged = !s;
+    if (s) snprintf(out->reason, sizeof out->reason, "%.199s", why->text);
     out->maps_network = r.n_network;
     out->maps_exact = r.n_exact;
     for (size_t i = 0; i < job->maker.n_params; i++) {
-        out->truth[i] = p->truth[i];
+        out->truth[i] = wrong ? NAN : p->truth[i];
         out->found[i] = s ? NAN : r.params[i];
         out->sd[i] = s ? NAN : r.sd[i];
         out->at_bound[i] = !s && r.at_bound[i];
@@ -122,9 +149,9 @@ static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *s
     // measure the overlap
     out->dice = NAN;
     const sdm_fit_source exact = {.shape = job->shape, .grid = job->maker.grid};
-    if (!s)
+    if (!s && !wrong)
         s = measure_dice(polish ? &exact : source, &r, p, &out->dice, err);
-    else if (s != SDM_E_QUALITY)
+    else if (s && s != SDM_E_QUALITY)
         s = sdm_fail(err, s, "%s", why->text);
     sdm_fit_dispose(&r);
     return s == SDM_E_QUALITY ? SDM_OK : s;
@@ -155,10 +182,11 @@ void cli_experiment_fits_free(cli_experiment_fits *f)
     sdm_free(f);
 }
 
-/* Fits all phantoms; *why holds the reason why the first of the failed fits did not converge. */
+/* Fits all phantoms, which show the shape of `shown`; *why holds the reason why the first of the
+ * failed fits did not converge. */
 static sdm_status fit_all(const cli_experiment_run *run, const cli_experiment_job *job,
-                          const sdm_fit_source *source, cli_experiment_result *out, sdm_error *why,
-                          sdm_error *err)
+                          const cli_experiment_job *shown, const sdm_fit_source *source,
+                          cli_experiment_result *out, sdm_error *why, sdm_error *err)
 {
     const bool polish = out->row->method->fit == SDM_EXPERIMENT_FIT_POLISH;
     sdm_status s = allocate_fits(run, job, &out->fits, err);
@@ -168,7 +196,7 @@ static sdm_status fit_all(const cli_experiment_run *run, const cli_experiment_jo
         cli_experiment_phantom phantom = {0};
         sdm_error doubt = {0};
         cli_progress_show(&bar, out->row->title, (double)i / (double)out->fits->n, NULL);
-        s = cli_experiment_phantom_make(run, job, i, &phantom, err);
+        s = cli_experiment_phantom_make(run, shown, out->row->method, i, &phantom, err);
         if (!s) s = fit_one(job, source, polish, run->e, &phantom, &out->fits->fit[i], &doubt, err);
         if (!s && !out->fits->fit[i].converged && !why->status) {
             *why = doubt;
@@ -185,7 +213,8 @@ static sdm_status fit_all(const cli_experiment_run *run, const cli_experiment_jo
 static void set_figures(cli_experiment_result *out)
 {
     const cli_experiment_fits *f = out->fits;
-    double fits = 0, seconds = 0, dice = 0, network = 0, exact = 0, within = 0, counted = 0;
+    double fits = 0, seconds = 0, dice = 0, network = 0, exact = 0, within = 0, two = 0,
+           counted = 0;
     for (size_t i = 0; i < f->n; i++) {
         const cli_experiment_fit *one = &f->fit[i];
         seconds += one->seconds / (double)f->n;
@@ -195,8 +224,9 @@ static void set_figures(cli_experiment_result *out)
         fits++;
         dice += one->dice;
         for (size_t k = 0; k < f->n_params; k++) {
-            counted += !one->at_bound[k];
+            counted += !one->at_bound[k] && !isnan(one->truth[k]);
             within += !one->at_bound[k] && fabs(one->found[k] - one->truth[k]) <= 3 * one->sd[k];
+            two += !one->at_bound[k] && fabs(one->found[k] - one->truth[k]) <= 2 * one->sd[k];
         }
     }
     out->figure[SDM_FIGURE_SHAPES] = (double)f->n;
@@ -204,8 +234,9 @@ static void set_figures(cli_experiment_result *out)
     out->figure[SDM_FIGURE_FIT] = seconds;
     out->figure[SDM_FIGURE_MAPS_NETWORK] = network;
     out->figure[SDM_FIGURE_MAPS_EXACT] = exact;
-    if (fits > 0) out->figure[SDM_FIGURE_DICE] = dice / fits;
+    if (fits > 0 && !isnan(dice)) out->figure[SDM_FIGURE_DICE] = dice / fits;
     if (counted > 0) out->figure[SDM_FIGURE_WITHIN] = within / counted;
+    if (counted > 0) out->figure[SDM_FIGURE_WITHIN_2] = two / counted;
 }
 
 /* ---- rows ---- */
@@ -237,11 +268,18 @@ sdm_status cli_experiment_fit_row(const cli_experiment_run *run, cli_experiment_
                               &out->figure[SDM_FIGURE_MS], &share, err);
     sdm_status s = by_network ? open_network(run, job, out, &model, err) : SDM_OK;
     const sdm_fit_source source = {.model = model, .shape = job->shape, .grid = job->maker.grid};
-    if (!s) s = fit_all(run, job, &source, out, &why, err);
+    cli_experiment_job other = {0};
+    const bool own = out->row->shown_row == job->index;
+    if (!s && !own) {
+        s = cli_experiment_job_open(run, out->row->shown_row, &other);
+        if (s && err) *err = other.open_error;
+    }
+    if (!s) s = fit_all(run, job, own ? job : &other, &source, out, &why, err);
+    cli_experiment_job_close(&other);
     if (!s) set_figures(out);
     if (!s) set_note(run, model, &why, out);
     if (!s)
-        cli_experiment_log(run, "%s: %.0f of %zu fits converged, %.3g s each", out->row->title,
+        cli_experiment_log(run, "%s: %.0f of %zu fits accepted, %.3g s each", out->row->title,
                            out->figure[SDM_FIGURE_FITS], out->fits->n, out->figure[SDM_FIGURE_FIT]);
     sdm_model_free(model);
     return s;

@@ -65,7 +65,7 @@ static const cli_experiment_fit *find_exact_fit(const cli_experiment_result *exa
     return other;
 }
 
-/* Errors of one parameter over the fits that converged; NaN: unknown. */
+/* Errors of one parameter over the fits that are to be trusted; NaN: unknown. */
 typedef struct fit_spread {
     double difference; /* mean abs(estimate - estimate of the exact fit) */
     double error;      /* mean abs(estimate - truth) */
@@ -105,11 +105,31 @@ static bool has_fits(const cli_experiment_result *r)
     return r->state == CLI_EXPERIMENT_DONE && r->fits;
 }
 
+/* Adds the number of right and of wrong fits, and how many of them were accepted, where the
+ * experiment has wrong ones. */
+static void add_verdicts(const cli_experiment_run *run, sdm_text *t)
+{
+    size_t n[2] = {0, 0}, accepted[2] = {0, 0};
+    for (size_t i = 0; i < run->e->n_rows; i++) {
+        const cli_experiment_result *r = &run->results[i];
+        if (!has_fits(r)) continue;
+        const bool wrong = *r->row->method->shows || r->row->method->wrong;
+        n[wrong] += r->fits->n;
+        for (size_t k = 0; k < r->fits->n; k++) accepted[wrong] += r->fits->fit[k].converged;
+    }
+    if (!n[1]) return;
+    sdm_text_add(t,
+                 "\n| cases | fits | accepted | refused |\n|---|---:|---:|---:|\n"
+                 "| right | %zu | %zu | %zu |\n| wrong | %zu | %zu | %zu |\n",
+                 n[0], accepted[0], n[0] - accepted[0], n[1], accepted[1], n[1] - accepted[1]);
+}
+
 void cli_experiment_fit_markdown(const cli_experiment_run *run, sdm_text *t)
 {
     bool any = false;
     for (size_t i = 0; i < run->e->n_rows; i++) any |= has_fits(&run->results[i]);
     if (!any) return;
+    add_verdicts(run, t);
     sdm_text_add(t,
                  "\n| method | parameter | unit | difference from the exact fit | difference (%s) "
                  "| error | standard deviation | within 3 sd |\n",
@@ -128,9 +148,9 @@ void cli_experiment_fit_markdown(const cli_experiment_run *run, sdm_text *t)
             sdm_text_add(t, "\n");
         }
     }
-    sdm_text_add(t,
-                 "\nMeans of absolute values over the fits that converged; the last column omits "
-                 "estimates at an end of their range.\n");
+    sdm_text_add(
+        t, "\nMeans of absolute values over the fits that are to be trusted; the last column omits "
+           "estimates at an end of their range.\n");
 }
 
 void cli_experiment_fit_json(const cli_experiment_run *run, const cli_experiment_result *r,
@@ -177,7 +197,7 @@ static void add_fits(const cli_experiment_fits *f, sdm_text *t)
     for (size_t k = 0; k < f->n_params; k++)
         sdm_text_add(t, ",%s_true,%s,%s_sd,%s_at_bound", f->name[k], f->name[k], f->name[k],
                      f->name[k]);
-    sdm_text_add(t, "\n");
+    sdm_text_add(t, ",reason\n");
     for (size_t i = 0; i < f->n; i++) {
         const cli_experiment_fit *one = &f->fit[i];
         sdm_text_add(t, "%zu,%s", i + 1, one->converged ? "true" : "false");
@@ -190,6 +210,8 @@ static void add_fits(const cli_experiment_fits *f, sdm_text *t)
             sdm_csv_real(t, one->sd[k]);
             sdm_text_add(t, ",%s", one->at_bound[k] ? "true" : "false");
         }
+        sdm_text_add(t, ",");
+        sdm_csv_text(t, one->reason);
         sdm_text_add(t, "\n");
     }
 }

@@ -22,6 +22,18 @@ static void describe_grid(const sdm_grid *g, char *buf, size_t size)
              h[1], h[2]);
 }
 
+/* The grid of the maps of a row. */
+static sdm_grid row_grid(const sdm_experiment_row *row, const sdm_grid *trained)
+{
+    const int64_t finer = row->variant ? row->variant->finer : 1;
+    sdm_grid g = *trained;
+    for (int a = 0; a < 3; a++) {
+        g.n[a] = (g.n[a] - 1) * finer + 1;
+        g.spacing[a] /= (double)finer;
+    }
+    return g;
+}
+
 /* Checks that the published differences name parameters of the shape. */
 static sdm_status check_reference(const cli_experiment_run *run, const cli_experiment_job *job,
                                   sdm_error *err)
@@ -42,13 +54,16 @@ static sdm_status job_open(const cli_experiment_run *run, size_t index, cli_expe
     sdm_status s = SDM_ALLOC(&job->config, 1, "configuration", err);
     if (!s) s = sdm_experiment_config(run->e, index, job->config, err);
     if (!s && run->args->threads > 0) job->config->threads = (int)run->args->threads;
-    if (!s) s = cli_experiment_path(run, index, "", job->config->output.folder, err);
+    const sdm_experiment_row *row = &run->e->rows[index];
+    if (!s)
+        s = cli_experiment_path(run, *row->method->engine ? index : row->network_row, "",
+                                job->config->output.folder, err);
     if (!s) s = cli_config_shape(job->config, run->registry, &job->shape, err);
     if (s) return s;
     cli_map_maker *m = &job->maker;
     const sdm_param *params = sdm_instance_params(job->shape, &m->n_params);
     m->shape = job->shape;
-    m->grid = job->config->grid;
+    m->grid = row_grid(row, &job->config->grid);
     describe_grid(&m->grid, run->results[index].grid, sizeof run->results[index].grid);
     s = sdm_train_ranges(job->config, job->shape, m->min, m->max, err);
     if (!s)
@@ -146,8 +161,10 @@ cli_experiment_stored cli_experiment_find_stored(const cli_experiment_run *run,
                                                  const cli_experiment_job *job)
 {
     char model[SDM_PATH_TEXT_MAX], checkpoint[SDM_PATH_TEXT_MAX];
-    if (run->args->force || cli_experiment_path(run, job->index, "model.sdm", model, NULL) ||
-        cli_experiment_path(run, job->index, "checkpoint.sdmc", checkpoint, NULL))
+    const size_t row = run->e->rows[job->index].network_row;
+    if ((run->args->force && row == job->index) ||
+        cli_experiment_path(run, row, "model.sdm", model, NULL) ||
+        cli_experiment_path(run, row, "checkpoint.sdmc", checkpoint, NULL))
         return CLI_STORED_NONE;
     if (is_same_model(job->config, model)) return CLI_STORED_MODEL;
     if (is_same_checkpoint(job->config, checkpoint)) return CLI_STORED_CHECKPOINT;

@@ -8,6 +8,7 @@
 #include "experiment_command.h"
 #include "report/terminal.h"
 #include "report/train_progress.h"
+#include "sdm/field.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
@@ -76,15 +77,16 @@ sdm_status cli_experiment_provide_model(const cli_experiment_run *run,
     return s;
 }
 
-/* *mb = growth of the resident memory while the model is opened and makes a map, MiB. */
-static sdm_status measure_memory(const char *path, const double *p, float *values, double *mb,
-                                 sdm_error *err)
+/* *mb = growth of the resident memory while the model is opened and makes a map on the grid, MiB.
+ */
+static sdm_status measure_memory(const char *path, const double *p, const sdm_grid *grid,
+                                 float *values, double *mb, sdm_error *err)
 {
     const sdm_generate_opts opts = {.policy = SDM_RANGE_CLAMP, .n_threads = 1};
     sdm_model *model = NULL;
     const long before = cli_bench_peak_start();
     sdm_status s = sdm_model_open(path, &model, err);
-    if (!s) s = sdm_generate(model, p, &opts, values, NULL, err);
+    if (!s) s = sdm_generate_grid(model, p, &opts, grid, values, NULL, NULL, err);
     *mb = cli_bench_peak_mb(before);
     sdm_model_free(model);
     return s;
@@ -102,13 +104,21 @@ static sdm_status measure_network(const cli_experiment_run *run, cli_experiment_
     // includes the memory of the map
     const long before = cli_bench_peak_start();
     double more = 0;
-    sdm_status s = SDM_ALLOC(&values, sdm_grid_count(&info->grid), "distance map", err);
-    if (!s) memset(values, 1, sdm_grid_count(&info->grid) * sizeof *values);
+    const cli_model_on_grid on = {model, job->maker.grid};
+    const size_t voxels = sdm_grid_count(&on.grid);
+    const bool own = voxels == sdm_grid_count(&info->grid);
+    sdm_status s = SDM_ALLOC(&values, voxels, "distance map", err);
+    if (!s) memset(values, 1, voxels * sizeof *values);
     const double map_mb = cli_bench_peak_mb(before);
-    if (!s) s = measure_memory(path, job->nominal, values, &more, err);
+    if (!s) s = measure_memory(path, job->nominal, &on.grid, values, &more, err);
     // times and errors
-    if (!s) s = cli_time_maps(model, NULL, seed, false, 0, &t, err);
-    job->maker = cli_maker_of_model(model, job->shape);
+    job->maker = own ? cli_maker_of_model(model, job->shape) : cli_maker_on_grid(&on, job->shape);
+    if (own) {
+        if (!s) s = cli_time_maps(model, NULL, seed, false, 0, &t, err);
+    } else {
+        t.ms_batch = NAN;
+        if (!s) s = cli_time_maker(&job->maker, seed, values, &t.ms_network, err);
+    }
     if (!s) s = cli_evaluate_maps(&job->maker, seed, (size_t)out->row->samples, true, &e, err);
     if (!s) {
         cli_experiment_set_errors(out, &e);
@@ -134,7 +144,8 @@ sdm_status cli_experiment_network(const cli_experiment_run *run, cli_experiment_
 {
     char path[SDM_PATH_TEXT_MAX];
     sdm_model *model = NULL;
-    sdm_status s = cli_experiment_path(run, job->index, "model.sdm", path, err);
+    sdm_status s =
+        cli_experiment_path(run, run->e->rows[job->index].network_row, "model.sdm", path, err);
     if (!s) s = cli_experiment_provide_model(run, job, out, err);
     if (!s) s = sdm_model_open(path, &model, err);
     if (!s) s = measure_network(run, job, path, model, out, err);

@@ -36,15 +36,15 @@ static void random_vector(uint64_t seed, uint64_t first, double length, double v
     for (int i = 0; i < 3; i++) v[i] *= length / sqrt(sum);
 }
 
-/* Returns the true pose, rotated by fit.off_deg about `middle` and translated by fit.off_mm, both
- * in random directions. */
-static sdm_pose perturb_pose(const sdm_experiment *e, uint64_t seed, const sdm_pose *truth,
-                             const double middle[3])
+/* Returns the true pose, rotated by fit.off_deg about `middle` and translated by off_mm, both in
+ * random directions. */
+static sdm_pose perturb_pose(const sdm_experiment *e, double off_mm, uint64_t seed,
+                             const sdm_pose *truth, const double middle[3])
 {
     sdm_pose off = {{0, 0, 0}, {0, 0, 0}};
     double shift[3], turned[3];
     random_vector(seed, 0, e->fit.off_deg * PI / 180, off.rotation);
-    random_vector(seed, 3, e->fit.off_mm, shift);
+    random_vector(seed, 3, off_mm, shift);
     sdm_pose_apply(&off, middle, turned);
     for (int i = 0; i < 3; i++) off.translation[i] = middle[i] - turned[i] + shift[i];
     return sdm_pose_compose(&off, truth);
@@ -68,10 +68,10 @@ static sdm_status find_box(const cli_experiment_job *job, const cli_experiment_p
 
 /* Makes a grid around the box. The grid contains all voxels that a fit uses, from its start pose to
  * its end. */
-static sdm_status make_grid(const sdm_experiment *e, const double min[3], const double max[3],
-                            sdm_grid *out, sdm_error *err)
+static sdm_status make_grid(const sdm_experiment *e, double off_mm, const double min[3],
+                            const double max[3], sdm_grid *out, sdm_error *err)
 {
-    const double pad = sdm_fit_defaults().margin + e->fit.off_mm;
+    const double pad = sdm_fit_defaults().margin + off_mm;
     double middle[3];
     int64_t n[3];
     for (int i = 0; i < 3; i++) {
@@ -88,33 +88,63 @@ static sdm_status make_grid(const sdm_experiment *e, const double min[3], const 
     return sdm_grid_check(out, err);
 }
 
+/* The scanner of a method. */
+static sdm_phantom_opts scanner(const cli_experiment_run *run, const sdm_experiment_method *m,
+                                uint64_t seed)
+{
+    sdm_phantom_opts o = sdm_phantom_defaults();
+    o.seed = seed;
+    o.n_threads = (int)run->args->threads;
+    o.cancelled = cli_interrupted;
+    o.noise *= m->noise;
+    o.inside.sd *= m->noise, o.outside.sd *= m->noise;
+    for (int a = 0; a < 3; a++) o.blur[a] *= m->blur;
+    o.inside.mean = o.outside.mean + m->contrast * (o.inside.mean - o.outside.mean);
+    if (m->wrong == SDM_EXPERIMENT_ABSENT) o.inside = o.outside;
+    return o;
+}
+
+/* Reverses every row of the image. */
+static void mirror_image(const sdm_grid *g, float *values)
+{
+    for (size_t row = 0; row < (size_t)(g->n[1] * g->n[2]); row++, values += g->n[0])
+        for (int64_t i = 0, k = g->n[0] - 1; i < k; i++, k--) {
+            const float x = values[i];
+            values[i] = values[k], values[k] = x;
+        }
+}
+
 sdm_status cli_experiment_phantom_make(const cli_experiment_run *run, const cli_experiment_job *job,
-                                       size_t index, cli_experiment_phantom *out, sdm_error *err)
+                                       const sdm_experiment_method *method, size_t index,
+                                       cli_experiment_phantom *out, sdm_error *err)
 {
     const sdm_experiment *e = run->e;
     const cli_map_maker *m = &job->maker;
     const uint64_t seed = phantom_seed(e->experiment.seed, index);
-    sdm_phantom_opts opts = sdm_phantom_defaults();
-    double min[3], max[3], middle[3];
-    opts.seed = seed;
-    opts.n_threads = (int)run->args->threads;
-    opts.cancelled = cli_interrupted;
+    const sdm_phantom_opts opts = scanner(run, method, seed);
+    double min[3], max[3], middle[3], off_mm = e->fit.off_mm;
     cli_maker_params(m, e->experiment.seed, index, out->truth);
     for (size_t i = 0; i < m->n_params; i++) {
         out->start[i] = 0.5 * (m->min[i] + m->max[i]);
         out->truth[i] = out->start[i] + e->fit.range * (out->truth[i] - out->start[i]);
     }
+    out->contrast = opts.inside.mean - opts.outside.mean;
     out->pose = sdm_phantom_random_pose(PI, TRANSLATION_MAX_MM, seed);
     sdm_status s = find_box(job, out, min, max, err);
     if (s) return s;
     for (int i = 0; i < 3; i++) middle[i] = 0.5 * (min[i] + max[i]);
-    out->start_pose = perturb_pose(e, seed, &out->pose, middle);
-    s = make_grid(e, min, max, &out->grid, err);
-    if (!s) s = SDM_ALLOC(&out->values, sdm_grid_count(&out->grid), "image", err);
-    if (!s) s = SDM_ALLOC(&out->label, sdm_grid_count(&out->grid), "labels", err);
+    if (method->wrong == SDM_EXPERIMENT_MOVED)
+        for (int i = 0; i < 3; i++) off_mm = fmax(off_mm, max[i] - min[i]);
+    out->start_pose = perturb_pose(e, off_mm, seed, &out->pose, middle);
+    s = make_grid(e, off_mm, min, max, &out->grid, err);
+    const size_t n = s ? 0 : sdm_grid_count(&out->grid);
+    if (!s) s = SDM_ALLOC(&out->values, n, "image", err);
+    if (!s) s = SDM_ALLOC(&out->label, n, "labels", err);
     if (!s)
         s = sdm_phantom_make(job->shape, out->truth, &out->pose, &opts, &out->grid, out->values,
                              out->label, err);
+    for (size_t i = 0; i < n && !s && method->labels; i++) out->values[i] = out->label[i];
+    if (!s && method->wrong == SDM_EXPERIMENT_MIRRORED) mirror_image(&out->grid, out->values);
     return s;
 }
 

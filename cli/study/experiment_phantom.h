@@ -10,12 +10,15 @@ typedef struct cli_experiment_phantom {
     double truth[SDM_MAX_PARAMS], start[SDM_MAX_PARAMS]; /* parameters */
     sdm_pose pose, start_pose;                           /* true pose, start pose */
     sdm_grid grid;
-    float *values;  /* [nz][ny][nx] HU */
-    uint8_t *label; /* [nz][ny][nx] 1 inside, 0 outside */
+    double contrast; /* inside mean less outside mean, HU */
+    float *values;   /* [nz][ny][nx] HU; labels: 1 inside, 0 outside */
+    uint8_t *label;  /* [nz][ny][nx] 1 inside, 0 outside */
 } cli_experiment_phantom;
 
-/* Makes phantom `index` of the experiment. It is the same for all methods whose shapes have the
- * same ranges. SDM_E_ARG: fit.voxel is too small. */
+/* Makes phantom `index` of the experiment for a method: the shape of `job` as the method shows it
+ * (its keys noise, blur, contrast, wrong, labels). It is the same for all methods whose shapes have
+ * the same ranges. SDM_E_ARG: fit.voxel is too small. */
 sdm_status cli_experiment_phantom_make(const cli_experiment_run *run, const cli_experiment_job *job,
-                                       size_t index, cli_experiment_phantom *out, sdm_error *err);
+                                       const sdm_experiment_method *method, size_t index,
+                                       cli_experiment_phantom *out, sdm_error *err);
 void cli_experiment_phantom_dispose(cli_experiment_phantom *p);

@@ -26,6 +26,10 @@ static plan plan_row(const cli_experiment_run *run, const cli_experiment_job *jo
         return p;
     }
     // rows with a network
+    if (run->e->rows[job->index].network_row != job->index) {
+        p.action = m->fit ? "load, fit" : "load, measure";
+        return p;
+    }
     switch (cli_experiment_find_stored(run, job)) {
     case CLI_STORED_MODEL:
         p.action = m->fit ? "load, fit" : "load, measure";

@@ -36,6 +36,19 @@ static void make_row(const sdm_experiment *e, const sdm_experiment_method *m,
     make_folder(row->title, row->folder);
 }
 
+/* The first variant with the same `set` as v. */
+static size_t first_alike(const sdm_experiment *e, size_t v)
+{
+    for (size_t u = 0; u < v; u++) {
+        const sdm_overrides *a = &e->variants[u].set, *b = &e->variants[v].set;
+        size_t i = 0;
+        if (a->n != b->n) continue;
+        while (i < a->n && !strcmp(a->items[i].text, b->items[i].text)) i++;
+        if (i == a->n) return u;
+    }
+    return v;
+}
+
 /* Sets network_row of every row. A method with fit: polish uses the network of the last method with
  * fit: network before it. `model`: position of the key fit.model. */
 static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mistakes)
@@ -54,14 +67,34 @@ static void find_networks(sdm_experiment *e, sdm_mark model, sdm_mistakes *mista
             else
                 strcpy(m->network, e->methods[from].network);
         }
-        for (size_t row = i; row < e->n_rows; row += e->n_methods)
-            e->rows[row].network_row = row - i + from;
+        for (size_t row = i, v = 0; row < e->n_rows; row += e->n_methods, v++)
+            e->rows[row].network_row = first_alike(e, v) * e->n_methods + from;
     }
     if (*e->fit.model && n_networks != 1)
         sdm_mistakes_add(
             mistakes, model,
             "fit.model: one model for %zu methods with fit: network, need one such method",
             n_networks);
+}
+
+/* Sets shown_row of every row from the key `shows` of its method. */
+static void find_shown(sdm_experiment *e, sdm_mistakes *mistakes)
+{
+    for (size_t i = 0; i < e->n_methods; i++) {
+        const sdm_experiment_method *m = &e->methods[i];
+        size_t from = i;
+        if (*m->shows)
+            for (from = 0; from < e->n_methods; from++)
+                if (e->methods[from].fit && !strcmp(e->methods[from].name, m->shows)) break;
+        if (from == e->n_methods) {
+            sdm_mistakes_add(mistakes, m->mark,
+                             "method '%s': shows: no method with fit is named '%s'", m->name,
+                             m->shows);
+            from = i;
+        }
+        for (size_t row = i; row < e->n_rows; row += e->n_methods)
+            e->rows[row].shown_row = row - i + from;
+    }
 }
 
 /* Records a mistake if two rows have the same folder. */
@@ -139,6 +172,7 @@ sdm_status sdm_experiment_finish(sdm_experiment *e, sdm_reader *r, sdm_error *er
             make_row(e, &e->methods[i], e->n_variants ? &e->variants[v] : NULL,
                      &e->rows[e->n_rows++]);
     find_networks(e, sdm_fields_given(r, "fit", "model")->mark, r->mistakes);
+    find_shown(e, r->mistakes);
     check_folders(e, r->mistakes);
     attach_references(e, r->mistakes);
     if (*e->experiment.baseline)

@@ -53,8 +53,8 @@ static const sdm_figure_info FIGURES[SDM_N_FIGURES] = {
                          "peak resident memory for one map, including the map"},
     [SDM_FIGURE_SHAPES] = {"shapes", "shapes", "",
                            "number of shapes on which the errors are measured"},
-    [SDM_FIGURE_FITS] = {"fits", "fits converged", "",
-                         "number of fits that converged, out of `shapes`"},
+    [SDM_FIGURE_FITS] = {"fits", "fits accepted", "",
+                         "number of fits that are to be trusted, out of `shapes`"},
     [SDM_FIGURE_FIT] = {"fit_s", "one fit", "s", "mean time of a fit on one core"},
     [SDM_FIGURE_MAPS_NETWORK] = {"maps_network", "network maps", "",
                                  "maps with derivatives by the network, mean per fit"},
@@ -63,6 +63,8 @@ static const sdm_figure_info FIGURES[SDM_N_FIGURES] = {
     [SDM_FIGURE_WITHIN] = {"within_3sd", "within 3 sd", "",
                            "fraction of the estimates, over all parameters, within three standard "
                            "deviations of the truth"},
+    [SDM_FIGURE_WITHIN_2] = {"within_2sd", "within 2 sd", "",
+                             "the same for two standard deviations"},
 };
 
 const sdm_figure_info *sdm_figure_get_info(sdm_figure f)
@@ -170,6 +172,29 @@ static const sdm_field METHOD[] = {
      .help = "fit shapes to images. network: with maps of the network of this method; polish: the "
              "same with the last such network above, then with exact maps; exact: with exact maps; "
              "naive: not run, the cost of exact if the naive method made the maps"},
+    TEXT(M, "shows", shows, SDM_NAME_MAX, "none",
+         "fits: name of the method whose shape the test images show; the fits are then wrong and "
+         "must be refused; none: its own"),
+    {.key = "wrong",
+     .type = SDM_FIELD_CHOICE,
+     .offset = offsetof(M, wrong),
+     .choices = "none|mirrored|moved|absent",
+     .def = "none",
+     .unit = "",
+     .help = "fits: what else is wrong, so that they must be refused. mirrored: the images are "
+             "mirror images; moved: the start lies beside the shape; absent: no shape is there"},
+    {.key = "labels",
+     .type = SDM_FIELD_CHOICE,
+     .offset = offsetof(M, labels),
+     .choices = "no|yes",
+     .def = "no",
+     .unit = "",
+     .help = "fits: to labels in place of images"},
+    ROW(M, "noise", SDM_FIELD_REAL, noise, 0, 100, "1", "",
+        "fits: factor on noise and texture of the images"),
+    ROW(M, "blur", SDM_FIELD_REAL, blur, 0, 100, "1", "", "fits: factor on the blur of the images"),
+    ROW(M, "contrast", SDM_FIELD_REAL, contrast, 0.01, 100, "1", "",
+        "fits: factor on the contrast of the images"),
     ROW(M, "samples", SDM_FIELD_INT64, samples, 0, 1e6, "0", "shapes",
         "shapes on which its errors are measured; 0: as given in experiment"),
     SPECIAL("set", read_set, "mapping", "keys of a training", "none",
@@ -179,6 +204,10 @@ static const sdm_field METHOD[] = {
 #define V sdm_experiment_variant
 static const sdm_field VARIANT[] = {
     TEXT(V, "name", name, SDM_NAME_MAX, "required", "appended to the name of the method"),
+    ROW(V, "finer", SDM_FIELD_INT64, finer, 1, 64, "1", "",
+        "maps are made and measured with the spacing of the configuration divided by this number; "
+        "networks are trained on the grid of the configuration, once for all variants that differ "
+        "in this key alone"),
     SPECIAL("set", read_set, "mapping", "keys of a training", "none",
             "keys of the training configuration in this variant, e.g. {grid.spacing: 0.1}"),
 };
@@ -212,6 +241,7 @@ static const sdm_field REFERENCE[] = {
     FIGURE("maps_network", SDM_FIGURE_MAPS_NETWORK, "maps per fit"),
     FIGURE("maps_exact", SDM_FIGURE_MAPS_EXACT, "maps per fit"),
     FIGURE("within_3sd", SDM_FIGURE_WITHIN, "0 .. 1"),
+    FIGURE("within_2sd", SDM_FIGURE_WITHIN_2, "0 .. 1"),
     SPECIAL("difference", read_differences, "mapping", "names of parameters", "none",
             "mean absolute difference of each parameter from the exact fit, e.g. {a: 2e-8}"),
 };

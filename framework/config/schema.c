@@ -128,13 +128,13 @@ static const sdm_field GRID[] = {
 };
 
 static const sdm_field NETWORK[] = {
-    CHOICE(
-        "kind", network.kind, SDM_KIND_CHOICES, "auto",
-        "auto: pod or template, whichever has the smaller error in a short trial; template: exact "
-        "maps of the shape's parts, carried along with the parts, and a correction by pod; pod: "
-        "basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
-        "3-D convolutional encoder-decoder; deepsdf, imnet: one distance per point, evaluated "
-        "at every voxel"),
+    CHOICE("kind", network.kind, SDM_KIND_CHOICES, "auto",
+           "auto: pod or template, or one after the other, and the better one is kept; template: "
+           "exact "
+           "maps of the shape's parts, carried along with the parts, and a correction by pod; pod: "
+           "basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
+           "3-D convolutional encoder-decoder; deepsdf, imnet: one distance per point, evaluated "
+           "at every voxel"),
     BY_KIND(
         INT, "depth", network.depth, 0, 16, "layers", DEPTH,
         "number of hidden layers (pod: of the MLP, 0: polynomials only); sdmnn: number of levels"),
@@ -160,6 +160,9 @@ static const sdm_field NETWORK[] = {
             "total degree of the polynomial part"),
     OF_KIND(BASES, INT, "input_degree", network.input_degree, 1, 8, "4", "",
             "total degree of the products of parameters that are inputs of the MLP"),
+    OF_KIND(BASES, INT, "fine", network.fine, 0, 256, "0", "",
+            "units of a hidden layer of the fine level, which corrects creases between the voxels "
+            "(docs/grids.md); rounded up to a multiple of 4; 0: no fine level"),
     OF_KIND(SDMNN, INT, "channels", network.channels, 1, 512, "16", "",
             "channels of the first level, doubled in each further level"),
     OF_KIND(SDMNN, REAL, "dropout", network.dropout, 0, 0.9, "0.1", "",

@@ -140,8 +140,10 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", path, strerror(code));
     }
-    // a file that is replaced keeps its permissions; the owner of a new one may always write it
-    if (replaces && fchmod(f->fd, (st.st_mode & 0777) | S_IWUSR)) {
+    // a file that is replaced hands its permissions on, and its owner may write it; some file
+    // systems have no permissions
+    if (replaces && fchmod(f->fd, (st.st_mode & 0777) | S_IWUSR) && errno != EPERM &&
+        errno != ENOSYS && errno != ENOTSUP) {
         const int code = errno;
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_IO, "%s: cannot set its permissions: %s", path, strerror(code));

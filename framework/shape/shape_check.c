@@ -129,6 +129,20 @@ static sdm_status callbacks_check(const char *who, const sdm_shape *t, sdm_error
     return SDM_OK;
 }
 
+// the option that mirrors the shape has two choices
+static sdm_status mirror_check(const char *who, const sdm_shape *shape, sdm_error *err)
+{
+    if (!shape->mirror) return SDM_OK;
+    for (uint32_t i = 0; i < shape->n_options; i++) {
+        const sdm_option *o = &shape->options[i];
+        if (strcmp(o->name, shape->mirror) != 0 || o->type != SDM_OPTION_CHOICE) continue;
+        const char *bar = strchr(o->choices, '|');
+        if (bar && !strchr(bar + 1, '|')) return SDM_OK;
+    }
+    return sdm_fail(err, SDM_E_PLUGIN, "%s: mirror '%s': need an option of two choices", who,
+                    shape->mirror);
+}
+
 sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sdm_shape *out,
                                   sdm_error *err)
 {
@@ -164,5 +178,5 @@ sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sd
     if (!s && !out->n_params && !out->describe)
         s = sdm_fail(err, SDM_E_PLUGIN, "%s: no parameters", who);
     if (!s) s = options_check(who, out->options, out->n_options, err);
-    return s;
+    return s ? s : mirror_check(who, out, err);
 }

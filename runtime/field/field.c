@@ -7,6 +7,7 @@
 #include "field_parts.h"
 #include "maps/check_results.h"
 #include "maps/generate_parts.h"
+#include "sdm/internal/fine.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
 
@@ -42,10 +43,11 @@ sdm_status sdm_field_create(const sdm_model *m, const sdm_generate_opts *opts, b
     f->opts = o;
     f->n_threads = sdm_threads(o.n_threads);
     f->derivatives = derivatives;
-    f->shape = sdm_spline_shape(f->info->grid.n);
-    f->frame = sdm_spline_frame(&f->info->grid);
+    f->grid = sdm_model_fine(m) ? sdm_fine_grid(&f->info->grid) : f->info->grid;
+    f->shape = sdm_spline_shape(f->grid.n);
+    f->frame = sdm_spline_frame(&f->grid);
     f->kernels = sdm_spline_kernels();
-    f->voxels = sdm_grid_count(&f->info->grid);
+    f->voxels = sdm_grid_count(&f->grid);
     s = allocate(f, err);
     if (s) {
         sdm_field_free(f);
@@ -82,15 +84,39 @@ static sdm_status open_exact(sdm_field *f, sdm_error *err)
     return s ? s : sdm_exact_create(&f->mesh, &exact, &f->engine, err);
 }
 
-/* The maps and splines by the network. */
-static sdm_status fill_maps(sdm_field *f, sdm_error *err)
+/* maps[1 + n_params or 1][voxels of the model's grid] = the map by the network, and its
+ * derivatives.
+ */
+static sdm_status network_maps(const sdm_field *f, float *maps, sdm_error *err)
 {
     const sdm_generate_opts plain = {.n_threads = f->opts.n_threads};
+    return f->derivatives ? sdm_generate_jacobian(f->model, f->used, &plain, maps,
+                                                  maps + sdm_grid_count(&f->info->grid), NULL, err)
+                          : sdm_generate(f->model, f->used, &plain, maps, NULL, err);
+}
+
+/* The same on the grid of the fine level. */
+static sdm_status fine_maps(const sdm_field *f, float *maps, sdm_error *err)
+{
+    const size_t n_tangents = f->derivatives ? f->info->n_params : 0;
+    float *coarse = NULL;
+    sdm_status s =
+        sdm_alloc_unset((void **)&coarse, (1 + n_tangents) * sdm_grid_count(&f->info->grid),
+                        sizeof *coarse, "maps of a field", err);
+    if (!s) s = network_maps(f, coarse, err);
+    if (!s)
+        s = sdm_fine_map(sdm_model_fine(f->model), &f->info->grid, n_tangents, coarse, f->n_threads,
+                         maps, err);
+    sdm_free(coarse);
+    return s;
+}
+
+/* The maps and splines. */
+static sdm_status fill_maps(sdm_field *f, sdm_error *err)
+{
     const size_t n_maps = f->derivatives ? f->info->n_params + 1 : 1;
-    const sdm_status s = f->derivatives
-                             ? sdm_generate_jacobian(f->model, f->used, &plain, f->maps,
-                                                     f->maps + f->voxels, NULL, err)
-                             : sdm_generate(f->model, f->used, &plain, f->maps, NULL, err);
+    const sdm_status s =
+        sdm_model_fine(f->model) ? fine_maps(f, f->maps, err) : network_maps(f, f->maps, err);
     for (size_t i = 0; i < n_maps && !s; i++)
         sdm_spline_fit(&f->shape, f->maps + i * f->voxels, f->n_threads, f->factor,
                        f->splines + i * f->shape.count);

@@ -10,6 +10,7 @@
 struct sdm_field {
     const sdm_model *model;
     const sdm_model_info *info;
+    sdm_grid grid; /* of the map in use: the model's, or that of its fine level */
     sdm_generate_opts opts;
     int n_threads;
     bool derivatives;
@@ -88,7 +89,7 @@ static inline float field_value(const sdm_field *f, const field_place *p)
     return p->outside ? field_bound(d, field_square(p->beyond)) : d;
 }
 
-/* Whether the exact engine computes every value. */
+/* Does the exact engine compute all values of this field, and the network none? */
 static inline bool field_is_exact(const sdm_field *f)
 {
     return f->result.source == SDM_SOURCE_EXACT;

@@ -4,19 +4,23 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "fit/data/blur.h"
 #include "fit/data/cavity.h"
 #include "fit/data/soft_labels.h"
+#include "fit/judge/judgement.h"
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
+#include "fit/solver/open_motions.h"
 #include "fit/solver/prior.h"
 #include "fit/solver/tissue_field.h"
 #include "fit/solver/tissues.h"
 #include "fit/start/start_search.h"
 #include "fit/trust/evidence.h"
+#include "fit/trust/kept_pose.h"
 #include "fit/trust/posterior.h"
 #include "fit_check.h"
 #include "sdm/internal/clock.h"
@@ -37,15 +41,31 @@
 // the iterations
 #define WEIGHT_EPS 1e-3
 #define WEIGHT_ROUGH 0.05
+// plain steps up to this size are followed by steps with the averaged gradient, in units of
+// sdm_fit_opts.eps
+#define STEP_NEAR 1e-2
+// an unknown has converged when it moves by no more than this share of its sd
+#define UNREST_MAX 0.1
+// a kept pose is refused if a free one gains more than this (the true one exceeds it once in a
+// million times), and moves the surface by more than this part of a voxel of the map
+#define KEPT_POSE_GAIN 20.0
+#define KEPT_POSE_VOXELS 0.5
 // number of flat steps (of negligible predicted gain) in a row that ends the iterations with a
 // network's maps
 #define FLAT_MAX 6
+// share of outliers among points at the start
+#define OUTLIERS_FIRST 0.1
 // a parameter is determined by its prior alone if its sd exceeds this share of the prior's sd
 #define BY_PRIOR 0.9
 // Largest number of times that the priors are reweighted. Without a limit a prior that contradicts
 // the image could reinforce itself: a worse fit has more correlated residuals, which strengthen the
 // prior.
 #define WEIGHINGS_MAX 4
+
+static double longest_edge(const sdm_grid *g)
+{
+    return fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
+}
 
 sdm_fit_opts sdm_fit_defaults(void)
 {
@@ -65,6 +85,7 @@ sdm_fit_opts sdm_fit_defaults(void)
         .prior_sd = 1,
         .margin = 1.5,
         .least_inside = 0.5,
+        .beside = 0.3,
         .max_iterations = 60,
         .max_polish_iterations = 0,
         .eps = 1e-4,
@@ -176,6 +197,7 @@ static sdm_status problem_start(fit_problem *p, sdm_fit_result *out, sdm_error *
     p->state.blur = fmax(o->blur, p->maps.min_blur);
     p->state.l_ref = o->l_ref;
     p->state.point_sd = o->point_sd;
+    p->state.outliers = o->keep_appearance ? 0 : OUTLIERS_FIRST;
     p->prior = p->state;
     s = sdm_fit_blur_check(&p->maps.grid, share ? "blur" : "l_ref", share ? o->blur : o->l_ref,
                            sdm_fit_field_blur(p), err);
@@ -188,6 +210,13 @@ static sdm_status problem_start(fit_problem *p, sdm_fit_result *out, sdm_error *
     if (!s) s = sdm_fit_extent(&p->maps, &p->extent, err);
     memcpy(p->maps_params, p->state.params, sizeof p->maps_params);
     p->maps_blur = NAN;
+    const double voxel = longest_edge(&p->target->grid);
+    if (!s && p->target->kind != SDM_FIT_POINTS && voxel > p->extent.reach)
+        return sdm_fail(err, SDM_E_ARG,
+                        "voxels of %.4g mm are larger than the shape, which reaches %.3g mm from "
+                        "its middle: is the image in mm?",
+                        voxel, p->extent.reach);
+    p->state.outlier_density = 0.5 / fmax(p->extent.reach, o->point_sd);
     return s;
 }
 
@@ -249,6 +278,7 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
                             "the shape has left the image: no voxel near it is left");
         if (!s && changed) s = sdm_fit_evaluate(p, err); // evaluate the new samples
         if (!s && changed) s = sdm_fit_tissue_field_update(p, err);
+        if (!s) sdm_fit_open_motions_find(p);
         if (!s && round < weighings) s = priors_reweight(p, &change, err);
         // flat steps cannot resolve small changes of region and weights
         const bool last = end->flat ? change < WEIGHT_ROUGH : !changed && !(change > 0);
@@ -289,7 +319,9 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
     newton->eps = average ? o->eps : eps;
     newton->max_flat = !average ? 0 : exact ? 1 : FLAT_MAX;
     sdm_status s = maximise_settled(p, newton, end, err);
-    if (s || !end->converged || !average || !(exact || end->flat)) return s;
+    // where kinks keep plain steps from converging, averaged ones may
+    const bool near = end->converged || end->step <= STEP_NEAR;
+    if (s || !near || !average || !(exact || end->flat)) return s;
     // averaged gradient
     newton->averaged = true;
     newton->max_iterations = max_iterations;
@@ -298,10 +330,34 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
     return maximise_settled(p, newton, end, err);
 }
 
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Points, after the search: an sd that holds half of the points. It shrinks while the shape comes
+ * nearer; with a small sd from the beginning, all points of a shape that is a little off would pass
+ * for outliers. */
+static sdm_status points_start(fit_problem *p, sdm_error *err)
+{
+    if (p->target->kind != SDM_FIT_POINTS || p->opts->keep_appearance) return SDM_OK;
+    double *distance = NULL;
+    sdm_status s = sdm_fit_evaluate(p, err);
+    if (!s) s = SDM_ALLOC(&distance, p->samples.n, "points of the fit", err);
+    if (s) return s;
+    for (size_t i = 0; i < p->samples.n; i++) distance[i] = fabs(p->samples.field[i]);
+    qsort(distance, p->samples.n, sizeof *distance, ascending);
+    p->state.point_sd = fmax(p->state.point_sd, distance[p->samples.n / 2]);
+    sdm_free(distance);
+    return SDM_OK;
+}
+
 static sdm_status start_find(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const double from = sdm_clock();
-    const sdm_status s = sdm_fit_start_search(p, &out->turn, err);
+    sdm_status s = sdm_fit_start_search(p, &out->turn, err);
+    if (!s) s = points_start(p, err);
     out->seconds_search = sdm_clock() - from;
     return s;
 }
@@ -359,64 +415,92 @@ static void report(fit_problem *p, sdm_fit_result *out)
     out->blur = p->maps.share ? s->blur : 0;
     out->appearance = s->appearance;
     out->point_sd = p->target->kind == SDM_FIT_POINTS ? s->point_sd : 0;
+    out->outliers = p->target->kind == SDM_FIT_POINTS ? s->outliers : 0;
+    sdm_fit_open_motions_describe(p, out->open_motions, sizeof out->open_motions);
     out->n_network = p->maps.n_network;
     out->n_exact = p->maps.n_exact;
     out->seconds_network = p->maps.seconds_network;
     out->seconds_exact = p->maps.seconds_exact;
 }
 
-// mean of the tissue with the largest weight
-static double main_mean(const sdm_fit_law *law, size_t n)
+// the unknown that moves most in the last iterations, in its standard deviations (*most)
+static size_t most_restless(const fit_problem *p, const sdm_fit_result *r, double *most)
 {
-    size_t most = 0;
-    for (size_t i = 1; i < n; i++)
-        if (law[i].weight > law[most].weight) most = i;
-    return law[most].mean;
+    size_t worst = 0;
+    *most = 0;
+    for (size_t i = 0; i < p->n_params + 6; i++) {
+        const bool kept = i < p->n_params ? p->opts->keep_params : p->opts->keep_pose;
+        if (kept) continue;
+        const double unrest = sdm_fit_unrest(p, i) / r->sd[i];
+        if (!(unrest <= *most)) *most = unrest, worst = i;
+    }
+    return worst;
 }
 
-// returns SDM_E_QUALITY with the first reason to distrust the fit; the most basic reasons come
-// first
-static sdm_status judge(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
+/* A fit whose last steps are small beside the standard deviations counts as converged, though they
+ * are larger than eps: kinks of exact distances may keep them so. */
+static void accept_small_steps(const fit_problem *p, sdm_fit_result *out)
 {
-    const sdm_fit_opts *o = p->opts;
-    const sdm_fit_appearance *a = &r->appearance, *b = &o->appearance;
-    if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {
-        // images: evidence and contrast
-        const double in = main_mean(a->inside, a->n_inside),
-                     out = main_mean(a->outside, a->n_outside);
-        const bool darker = main_mean(b->inside, b->n_inside) < main_mean(b->outside, b->n_outside);
-        if (!(r->evidence > 0))
-            return sdm_fail(
-                err, SDM_E_QUALITY,
-                "the image shows no such shape near the start: explaining it without one is better "
-                "by %.3g (log-likelihood of independent voxels); check the start pose, and whether "
-                "the inside is %s than the outside in this image",
-                -r->evidence, darker ? "darker" : "brighter");
-        // the sign of the contrast must be that of the start
-        if ((in < out) != darker)
-            return sdm_fail(
-                err, SDM_E_QUALITY,
-                "the contrast is the opposite of the start's: inside %.4g, outside %.4g, but the "
-                "start says that the inside is %s; give tissue values of this kind of image",
-                in, out, darker ? "darker" : "brighter");
+    double most;
+    if (out->converged) return;
+    (void)most_restless(p, out, &most);
+    if (!(most <= UNREST_MAX)) return;
+    out->converged = true;
+    snprintf(out->reason, sizeof out->reason,
+             "the last steps move every unknown by at most %.2g of its standard deviation", most);
+}
+
+static sdm_status not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
+{
+    static const char *const pose[6] = {"rotation about x",    "rotation about y",
+                                        "rotation about z",    "translation along x",
+                                        "translation along y", "translation along z"};
+    double most, low, high;
+    const char *name;
+    const size_t worst = most_restless(p, r, &most);
+    if (worst < p->n_params)
+        sdm_fit_bounds(p->source, worst, &low, &high, &name);
+    else
+        name = pose[worst - p->n_params];
+    char moves[200] = "";
+    if (isfinite(most))
+        snprintf(moves, sizeof moves,
+                 "; %.100s still moves by %.2g of its standard deviation, need %.2g", name, most,
+                 UNREST_MAX);
+    return sdm_fail(err, SDM_E_QUALITY,
+                    "not converged after %zu iterations (%s%s): allow more iterations "
+                    "(max_iterations), give a nearer start, or a prior of what the data hardly "
+                    "determine",
+                    r->n_iterations, r->reason, moves);
+}
+
+// the verdict, with the unknown that keeps the fit from converging, and the pose that was kept
+static sdm_status judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err)
+{
+    sdm_error unrest = {0};
+    sdm_status s = sdm_fit_judge(p, r, err);
+    for (size_t i = 0; i < r->verdict.n_findings && !r->converged; i++) {
+        sdm_fit_finding *f = &r->verdict.findings[i];
+        if (f->kind != SDM_FIT_CHECK_CONVERGED) continue;
+        (void)not_converged(p, r, &unrest);
+        if (err && s == SDM_E_QUALITY && !strcmp(err->text, f->text)) *err = unrest;
+        snprintf(f->text, sizeof f->text, "%.239s", unrest.text);
     }
-    // the shape must not be a cavity itself, nor leave the image
-    const double widest = sdm_fit_inradius(&p->maps);
-    if (r->n_cavity && !(widest < o->cavity))
-        return sdm_fail(err, SDM_E_QUALITY,
-                        "the fitted shape holds a ball of %.3g mm, but spaces that hold one of "
-                        "%.3g mm were left out (cavity): give a radius above that of the shape",
-                        widest, o->cavity);
-    if (!(r->inside_share >= o->least_inside))
-        return sdm_fail(err, SDM_E_QUALITY,
-                        "only %.0f %% of the shape lies in the image, need %.0f %% (least_inside)",
-                        100 * r->inside_share, 100 * o->least_inside);
-    if (!r->converged)
-        return sdm_fail(
-            err, SDM_E_QUALITY,
-            "not converged after %zu iterations (%s); allow more of them, or give a nearer start",
-            r->n_iterations, r->reason);
-    return SDM_OK;
+    const double voxel = longest_edge(&p->maps.grid);
+    if (!(r->kept_pose_gain > KEPT_POSE_GAIN && r->kept_pose_motion > KEPT_POSE_VOXELS * voxel))
+        return s;
+    sdm_fit_finding f = {.kind = SDM_FIT_CHECK_KEPT_POSE,
+                         .grade = SDM_FIT_FAILED,
+                         .figure = r->kept_pose_gain,
+                         .limit = KEPT_POSE_GAIN};
+    snprintf(
+        f.text, sizeof f.text,
+        "the kept pose does not match the data: free, it moves the surface by %.2g mm and "
+        "explains the data better by %.3g (log-likelihood of independent samples); correct the "
+        "pose, or do not keep it",
+        r->kept_pose_motion, r->kept_pose_gain);
+    sdm_fit_verdict_add(&r->verdict, &f);
+    return s == SDM_OK || s == SDM_E_QUALITY ? sdm_fail(err, SDM_E_QUALITY, "%s", f.text) : s;
 }
 
 // computes the covariance, the share of the shape in the image, and the evidence
@@ -437,12 +521,9 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         out->evidence = (p->information.log_likelihood - out->log_likelihood_without) / factor -
                         0.5 * unknowns * log(n);
     }
+    if (!s && p->opts->keep_pose)
+        s = sdm_fit_kept_pose_test(p, &out->kept_pose_gain, &out->kept_pose_motion, err);
     return s;
-}
-
-static double longest_edge(const sdm_grid *g)
-{
-    return fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
 }
 
 /* Presents a label map as an image with the value 1 inside and 0 outside, with fixed tissues, seen
@@ -491,7 +572,7 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
         p.target = &as_image, p.opts = &with_labels, p.given_labels = true;
     }
     if (!s && target->kind == SDM_FIT_IMAGE && opts->cavity > 0) {
-        s = sdm_fit_mask_cavities(target, opts, &values, &out->n_cavity, err);
+        s = sdm_fit_mask_cavities(target, opts, &values, &out->n_cavity, &out->widest_space, err);
         as_image = *target, as_image.values = values;
         p.target = &as_image;
     }
@@ -505,8 +586,10 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     // 6. covariance and evidence; 7. report the result, also of a fit that failed with
     // SDM_E_QUALITY
     if (!s) s = assess(&p, out, err);
+    if (!s) accept_small_steps(&p, out);
     if (out->n_params && (!s || s == SDM_E_QUALITY)) report(&p, out);
     if (!s) s = judge(&p, out, err);
+    if (s) out->verdict.grade = SDM_FIT_FAILED;
     if (s && err && !*out->reason) snprintf(out->reason, sizeof out->reason, "%.255s", err->text);
     problem_dispose(&p);
     sdm_free(values);

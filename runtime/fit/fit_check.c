@@ -147,6 +147,8 @@ static sdm_status check_numbers(const sdm_fit_opts *o, sdm_error *err)
                         {"cavity", o->cavity, true},
                         {"tissue_mm", o->tissue_mm, true},
                         {"least_inside", o->least_inside, true},
+                        {"tolerance", o->tolerance, true},
+                        {"beside", o->beside, true},
                         {"eps", o->eps, false},
                         {"polish_eps", o->polish_eps, false}};
     for (size_t i = 0; i < sizeof n / sizeof *n; i++)
@@ -156,6 +158,8 @@ static sdm_status check_numbers(const sdm_fit_opts *o, sdm_error *err)
     if (o->least_inside > 1)
         return sdm_fail(err, SDM_E_ARG, "fit option least_inside is %g, need 0 to 1",
                         o->least_inside);
+    if (o->tolerance > 1)
+        return sdm_fail(err, SDM_E_ARG, "fit option tolerance is %g, need 0 to 1", o->tolerance);
     return SDM_OK;
 }
 

@@ -2,7 +2,9 @@
 #include <openvdb/io/File.h>
 #include <openvdb/tools/Diagnostics.h>
 
+#include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <vector>
 
 #include "sdm/internal/checksum.h"
@@ -71,6 +73,38 @@ void vdb_parts::check_level_set(const Grid &grid, const char *path, sdm_status s
                       path, said.c_str()));
 }
 
+namespace
+{
+
+// an archive that writes to any stream, in the format of openvdb::io::File, which drops the errors
+// of its own stream
+class archive : public openvdb::io::Archive
+{
+  public:
+    void write_to(std::ostream &to, const Grid::Ptr &grid) const
+    {
+        openvdb::io::Archive::write(to, openvdb::GridCPtrVec{grid}, true);
+    }
+};
+
+// writes the grid to `temp`; the message of an error names `path` and the reason of the system
+void write_archive(const char *path, const std::string &temp, const Grid::Ptr &grid, sdm_error *err)
+{
+    std::ofstream to;
+    errno = 0;
+    try {
+        to.exceptions(std::ios::badbit | std::ios::failbit);
+        to.open(temp, std::ios::binary | std::ios::trunc);
+        archive().write_to(to, grid);
+        to.close();
+    } catch (const std::ios_base::failure &) {
+        need(sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", path,
+                      errno ? std::strerror(errno) : "the disk reports no reason"));
+    }
+}
+
+} // namespace
+
 void vdb_parts::write_grid(const char *path, const Grid::Ptr &grid, sdm_error *err)
 {
     struct output {
@@ -79,10 +113,7 @@ void vdb_parts::write_grid(const char *path, const Grid::Ptr &grid, sdm_error *e
     } out;
     need(sdm_outfile_open(path, &out.file, err));
     const std::string temp = sdm_outfile_temp_path(out.file);
-    {
-        openvdb::io::File file(temp);
-        file.write(openvdb::GridCPtrVec{grid});
-    }
+    write_archive(path, temp, grid, err);
     need(sdm_seal_append(temp.c_str(), err));
     bool sealed = false;
     const Grid::Ptr back = read_grid(temp.c_str(), &sealed, err);

@@ -80,6 +80,7 @@ struct distribution_added {
 struct shape_added {
     struct shape_v1 v1;
     void (*distributions)(const void *, sdm_distribution *);
+    const char *mirror;
 };
 
 #define SAME_OFFSET(v1, now, field)                                                                \
@@ -132,6 +133,7 @@ SAME_OFFSET(shape_v1, sdm_shape, mesh);
 SAME_OFFSET(shape_v1, sdm_shape, velocity);
 SAME_OFFSET(shape_v1, sdm_shape, distance);
 SAME_OFFSET(shape_added, sdm_shape, distributions);
+SAME_OFFSET(shape_added, sdm_shape, mirror);
 SAME_OFFSET(distribution_added, sdm_distribution, mean);
 SAME_OFFSET(distribution_added, sdm_distribution, deviation);
 _Static_assert(sizeof(struct distribution_added) == sizeof(sdm_distribution),

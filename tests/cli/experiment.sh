@@ -133,6 +133,28 @@ grep -q '^| octree, coarse |' grids/table.md && grep -q '^| octree, fine |' grid
 grep -q '16 x 16 x 16 voxels of 1 mm' grids/table.csv || bad 'the grid of the variant is not used'
 absent grids/octree-coarse
 
+# Variants that differ in the grid of the maps alone use one network, at finer voxels with its fine level.
+cat >finer.yaml <<'END'
+shape: {name: ellipsoid, options: {edge: 1}}
+grid: {size: [12, 12, 12], spacing: 1.5}
+experiment: {samples: 1, engine_samples: 1}
+methods:
+  - {name: net, network: pod, set: {network: {depth: 0, rank: 4, modes: 8, degree: 2, fine: 4}, data: {static: 0, start: 40, online: 0, holdout: 4},
+     train: {steps: 20, batch: 16, refine: 0}}}
+  - {name: exact, engine: exact}
+variants: [{name: own}, {name: half, finer: 2}, {name: other, set: {seed: 7}}]
+END
+expect 0 - sdmgen experiment finer.yaml --out finer --dry-run
+has '^net, half .*23 x 23 x 23 voxels of 0.75 mm .*load, measure .*finer/net-own$'
+sdmgen experiment finer.yaml --out finer >out 2>err || bad "exit code $? of the experiment on finer grids"
+grep -q 'net, half: the model in finer/net-own is loaded' err || bad 'a variant on a finer grid does not use the model of the first one'
+[ "$(grep -c ': training,' err)" = 2 ] || bad "$(grep -c ': training,' err) trainings, need 2"
+grep -q '^| exact, half |' finer/table.md && grep -q '23 x 23 x 23 voxels of 0.75 mm' finer/table.csv || bad 'no maps on the finer grid'
+[ -f finer/net-half/slices.png ] && [ -f finer/exact-half/slices.png ] || bad 'no pictures of the finer grid'
+absent finer/net-half/model.sdm
+sed 's/finer: 2/finer: 0/' finer.yaml >finest.yaml
+expect 2 '^finest\.yaml:8:.*finer: 0 is out of range \(1 \.\. 64\)' sdmgen experiment finest.yaml
+
 # Mistakes in the configuration.
 printf 'shape: {name: ellipsoid}\ngrid: {size: [4, 4, 4], spacing: 1}\nmethods: [{name: A, engnie: exact}]\n' >bad.yaml
 expect 2 "^bad\.yaml:3:21: unknown key 'engnie'; did you mean 'engine'" sdmgen experiment bad.yaml
@@ -160,7 +182,8 @@ expect 2 'keys stands alone' sdmgen experiment tiny.yaml --keys
 # The shipped experiments are valid, and the documentation lists every key.
 for config in "$source_folder"/configs/*.yaml; do
     grep -q '^methods:' "$config" || continue
-    expect 0 - sdmgen experiment "$config" --dry-run
+    sdmgen experiment "$config" --dry-run >out 2>err || bad "$config: $(cat err)"
+    ! grep -v '^sdmgen: grid: size: ' err || bad "$config: the lines above" # grid: auto tells what it chose
     has '^trainings: [0-9]+ min'
 done
 expect 0 - sdmgen experiment --keys --markdown

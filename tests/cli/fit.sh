@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: a phantom is recovered, every kind of target and output, fits that must fail, mistakes.
-# Tests: cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_options.c fit_picture.c fit_report.c fit_result.c
+# Tests: cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_options.c fit_picture.c fit_repeat.c fit_report.c fit_result.c
 # fit_start.c fit_target.c progress_bar.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
@@ -42,6 +42,13 @@ is_json out
 is_json fit.json
 cmp -s out fit.json || bad 'stdout and -o fit.json must agree'
 [ "$(json trusted)" = true ] && [ "$(json converged)" = true ] || bad "not trusted: $(cat out)"
+# the command of the JSON repeats the fit; the checksum is that of the file
+mkdir again && (cd again && ln -s ../ct.nii.gz ../label.nrrd . && sed -n 's/.*"command": "sdmgen \([^"]*\)", "inputs".*/\1/p' ../out >command)
+expect 0 - eval "(cd again && \"$program\" $(cat again/command) >out 2>err)"
+[ "$(sed -n 's/.*\("parameters": {[^}]*}\).*/\1/p' again/out)" = "$(sed -n 's/.*\("parameters": {[^}]*}\).*/\1/p' first.json)" ] ||
+    bad "the command does not repeat the fit: $(cat again/command again/err)"
+cp first.json out
+has '"file": "ct.nii.gz", "crc64": "[0-9a-f]{16}"'
 within rx 3.5 4
 within ry 2.5 4
 within rz 2 4
@@ -74,9 +81,9 @@ fi
 inside=$(values fit.npy | awk '$1 < 0 { n++ } END { print n }')
 near "$inside" "$(sed -n 's/.*"inside_voxels": \([0-9]*\).*/\1/p' truth.json)" 40
 
-# Any number of threads gives the same output, except for times and the number of threads.
+# Any number of threads gives the same output, except for times, the number of threads and the command.
 expect 0 - sdmgen fit $fit --exact ct.nii.gz $near_truth --reference label.nrrd --json --threads 2
-strip() { sed -E 's/"(seconds[a-z_]*|threads)": [^,}]*//g' "$1"; }
+strip() { sed -E 's/"command": "[^"]*"//; s/"(seconds[a-z_]*|threads)": [^,}]*//g' "$1"; }
 [ "$(strip out)" = "$(strip first.json)" ] || bad 'two threads must give the same result'
 
 # The report as text.
@@ -141,7 +148,8 @@ middle=$((voxels / plane / 2))
     tail -c +$((353 + plane * (middle + 1))) label.nii
 } >walled.nii
 whole=$(json voxels_reference)
-expect 0 - sdmgen fit $fit walled.nii --label 1 --rotation 0,0,0 --spacing 0.5 --json
+expect 4 "walled.nii: 1. % of the volume of the shape is empty in the labels" sdmgen fit $fit walled.nii --label 1 --rotation 0,0,0 --spacing 0.5 --json
+expect 0 - sdmgen fit $fit walled.nii --label 1 --rotation 0,0,0 --spacing 0.5 --tolerance 0.2 --json
 awk -v n="$(json voxels_reference)" -v w="$whole" 'BEGIN { exit !(n < w - 100) }' || bad "wall of $(json voxels_reference) and $whole voxels"
 expect 0 - sdmgen fit $fit walled.nii --label 1 --label-close 0.4 --reference walled.nii --rotation 0,0,0 --spacing 0.5 --json
 near "$(json voxels_reference)" "$whole" 40
@@ -173,6 +181,10 @@ present label.png mesh.png mesh.off mesh.nrrd
 expect 0 - sdmgen fit $fit points.csv --rotation 0,0,0 -p rx=3.2 -p ry=3.2 --spacing 0.35 --json
 near "$(param rx)" 3 0.05
 near "$(param ry)" 3.5 0.05
+cp out xyz.json
+awk -F, '{ print $3 "," $1 "," $2 }' points.csv >zxy.csv # the header names the columns
+expect 0 - sdmgen fit $fit zxy.csv --rotation 0,0,0 -p rx=3.2 -p ry=3.2 --spacing 0.35 --json
+[ "$(param rx)" = "$(sed -n 's/.*"parameters": {[^}]*"rx": \([^,}]*\).*/\1/p' xyz.json)" ] || bad 'another order of the columns'
 
 # Fits that fail: exit code 4, one line on stderr, no files; the partial result is shown and marked as failed.
 calm='--inside 1300,225 --outside 1300,225'
@@ -230,11 +242,9 @@ expect 3 "label.nrrd: no voxel has the label '7'" sdmgen fit $fit label.nrrd --l
 printf 'x,y,z\n0,0,0\n1,0,0\n' >two.csv
 expect 3 'two.csv: 2 points, need 3' sdmgen fit $fit two.csv -o no.stl
 printf '' >nothing.csv
-expect 3 "nothing.csv: no header line: the first line must name the columns, such as 'x'" sdmgen fit $fit nothing.csv -o no.stl
-printf 'first,second\n0,0\n' >abc.csv
-expect 3 "abc.csv:1: unknown column 'first'; the first is 'x'" sdmgen fit $fit abc.csv -o no.stl
+expect 3 'nothing.csv: no points' sdmgen fit $fit nothing.csv -o no.stl
 printf 'x,y\n0,0\n1,0\n2,2\n' >flat.csv
-expect 3 'flat.csv: z of point 1 is missing' sdmgen fit $fit flat.csv -o no.stl
+expect 3 'flat.csv:2: 2 values, a line needs three: x,y,z' sdmgen fit $fit flat.csv -o no.stl
 printf 'shape_x,shape_y,shape_z,x,y,z\n0,0,0,1,1,1\n0,0,0,2,2,2\n' >same.csv
 expect 3 'same.csv: ' sdmgen fit $fit ct.nii.gz --start-points same.csv -o no.stl
 expect 1 'nowhere.nii' sdmgen fit $fit nowhere.nii -o no.stl
@@ -262,6 +272,9 @@ expect 2 'label applies to volumes' sdmgen fit $fit fit.stl --label 1
 expect 2 'no voxel of the image lies near the shape' sdmgen fit $fit ct.nii.gz --rotation 0,0,0 --start-centre 90,0,0 -o no.stl
 expect 2 'no voxel of the image lies near .*its middle at 90, ' sdmgen fit --shape cochlea ct.nii.gz --rotation 0,0,0 --start-centre 90,0,0 -o no.stl
 expect 2 'all [0-9]+ voxels of the image near the shape .*cavity' sdmgen fit $fit ct.nii.gz $near_truth --inside 600,2000 --outside 9000,10 --cavity 0.5 -o no.stl
+expect 0 '--cavity 4 left nothing out: the widest space like the inside holds a ball of [0-9.]+ mm$' sdmgen fit $fit ct.nii.gz $near_truth --cavity 4
+gzip -dc ct.nii.gz >moved.nii && printf '\0\0\240\101' | dd of=moved.nii bs=1 seek=268 conv=notrunc 2>err # x of qform: 20 mm
+expect 0 'moved.nii: sform and qform place voxels up to [0-9.]+ mm apart; sform is used$' sdmgen fit $fit moved.nii $near_truth
 expect 2 "did you mean 'rx'" sdmgen fit $fit ct.nii.gz -p rc=3
 expect 5 "parameter 'rx' = 9 mm, allowed [0-9.]+ \.\. [0-9.]+ mm\$" sdmgen fit $fit ct.nii.gz -p rx=9 -o no.stl
 expect 0 'start parameters were clamped to their range' sdmgen fit $fit ct.nii.gz $near_truth -p rx=9 --policy clamp --json

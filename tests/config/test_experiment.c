@@ -289,6 +289,20 @@ static void test_mistakes_of_the_experiment(void **state)
                    "dir/x.yaml:7:1: unknown key 'output'");
 }
 
+/* Variants with the same training share the network of the first of them. */
+static void test_networks_of_variants(void **state)
+{
+    (void)state;
+    expect_ok(SHAPE "methods: [{name: A, network: pod}, {name: B, engine: exact}]\n"
+                    "variants: [{name: a}, {name: b, finer: 3}, {name: c, set: {seed: 9}},\n"
+                    "  {name: d, finer: 2, set: {seed: 9}}, {name: e, finer: 3, set: {seed: 8}}]\n",
+              NULL);
+    static const size_t networks[] = {0, 1, 0, 1, 4, 5, 4, 5, 8, 9};
+    static const int64_t finer[] = {1, 3, 1, 2, 3};
+    for (size_t i = 0; i < 10; i++) assert_int_equal(e->rows[i].network_row, networks[i]);
+    for (size_t i = 0; i < 5; i++) assert_int_equal(e->variants[i].finer, finer[i]);
+}
+
 /* A mistake in a training key of a row is reported at the key, not at the start of the row. */
 static void test_mistakes_of_the_training(void **state)
 {
@@ -404,6 +418,7 @@ int main(void)
         cmocka_unit_test(test_mistakes_of_fits),
         cmocka_unit_test(test_figures_have_keys),
         cmocka_unit_test(test_mistakes_of_the_experiment),
+        cmocka_unit_test(test_networks_of_variants),
         cmocka_unit_test(test_mistakes_of_the_training),
         cmocka_unit_test(test_base_file_is_merged),
         cmocka_unit_test(test_shipped_files),

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -345,6 +346,19 @@ static void grids_convert_coordinates(void **state)
     assert_int_equal(sdm_grid_check(&bad, &e), SDM_E_ARG);
 }
 
+/* gcc's OpenMP waits for ever in a child of a process that has used threads. */
+static void a_child_has_one_thread(void **state)
+{
+    (void)state;
+    const int before = sdm_threads(3);
+    const pid_t child = fork();
+    if (!child) _exit(sdm_threads(3) == 1 && sdm_threads(0) == 1 ? 0 : 1);
+    int status = -1;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+    assert_int_equal(sdm_threads(3), before);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -358,6 +372,7 @@ int main(void)
         cmocka_unit_test(json_text_is_escaped),
         cmocka_unit_test(files_are_written_whole_or_not),
         cmocka_unit_test(thread_counts_are_limited),
+        cmocka_unit_test(a_child_has_one_thread),
         cmocka_unit_test(grids_convert_coordinates),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

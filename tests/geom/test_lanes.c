@@ -117,11 +117,30 @@ static void test_four_doubles(void **state)
     for (int j = 0; j < 4; j++) assert_true(out[0][j] == a[mask[j] < 0 ? 0 : 1][j]);
 }
 
+static void test_roots_and_equal_lanes(void **state)
+{
+    (void)state;
+    _Alignas(32) double x[4] = {2, 0.1, 0, 1e300}, root[4], size[4];
+    v4_store(root, v4_sqrt(v4_load(x)));
+    for (int i = 0; i < 4; i++) assert_true(root[i] == sqrt(x[i]));
+    for (int i = 0; i < 4; i += 2) x[i] = -x[i];
+    v4_store(size, v4_abs(v4_load(x)));
+    for (int i = 0; i < 4; i++) assert_true(size[i] == fabs(x[i]) && !signbit(size[i]));
+    uint32_t same[8];
+    for (int i = 0; i < 8; i++) same[i] = 4000000000u;
+    assert_true(v8_uniform(v8_load_i(same)));
+    for (int i = 0; i < 8; i++) {
+        same[i]++;
+        assert_false(v8_uniform(v8_load_i(same)));
+        same[i]--;
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_vectors_and_numbers_share_memory),
-                                       cmocka_unit_test(test_lane_operations),
-                                       cmocka_unit_test(test_permutation),
-                                       cmocka_unit_test(test_four_doubles)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_vectors_and_numbers_share_memory),
+        cmocka_unit_test(test_lane_operations), cmocka_unit_test(test_permutation),
+        cmocka_unit_test(test_four_doubles), cmocka_unit_test(test_roots_and_equal_lanes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -141,7 +141,8 @@ static void test_open_and_flat_parts(void **state)
     assert_true(isnan(a.union_volume));
     sdm_part_audit_dispose(&a);
     sdm_mesh_dispose(&m);
-    // two triangles back to back, and a triangle that repeats a vertex and has no part
+    // a box; two triangles with the same vertices in opposite order, which are a flat part; and a
+    // triangle with a vertex given twice, which belongs to no part
     add_box(&m, 0, 4, 2, false);
     const size_t v = m.n_vert, t = m.n_tri;
     mesh_make(&m, v + 3, t + 3);

@@ -51,6 +51,7 @@ static void test_nifti_frames(void **state)
             assert_at(&v, 1, 0, 0, -10, -22, 30, 1e-6);
             assert_at(&v, 0, 1, 0, -7, -20, 30, 1e-6);
             assert_at(&v, 0, 0, 1, -10, -20, 26, 1e-6);
+            assert_true(v.frames_differ_mm == 0 && !v.frames_mirrored);
 
             /* sform takes precedence over qform. i runs along +z (RAS), j along -x, k along +y;
              * the unit is micrometres. */
@@ -67,6 +68,25 @@ static void test_nifti_frames(void **state)
             assert_at(&v, 0, 1, 0, 2, -2, 3, 1e-6);
             assert_at(&v, 0, 0, 1, -1, -6, 3, 1e-6);
             assert_true(v.values[7] == -1507 && v.values[0] == -37);
+            /* the places above, those of qform now in micrometres */
+            double apart = 0;
+            for (int64_t c = 0; c < 8; c++) {
+                const double i = (double)(c & 1) * (double)(v.grid.n[0] - 1),
+                             j = (double)(c >> 1 & 1) * (double)(v.grid.n[1] - 1),
+                             k = (double)(c >> 2) * (double)(v.grid.n[2] - 1);
+                const double d[3] = {-1 + 3 * j - 1e-3 * (-10 + 3 * j),
+                                     -2 - 4 * k - 1e-3 * (-20 - 2 * i),
+                                     3 + 2 * i - 1e-3 * (30 - 4 * k)};
+                apart = fmax(apart, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
+            }
+            assert_true(fabs(v.frames_differ_mm - apart) < 1e-5 * apart);
+            /* rows of the axes: (0, -2, 0), (3, 0, 0), (0, 0, -4) and (0, 0, 2), (3, 0, 0), (0, -4,
+             * 0): determinants of the same sign, until qfac changes it */
+            assert_false(v.frames_mirrored);
+            store_real(pixdim, real, big, 1);
+            put_file("test_volume.nii", b.data, b.size);
+            assert_read("test_volume.nii", &v);
+            assert_true(v.frames_mirrored);
             sdm_volume_dispose(&v);
         }
 }

@@ -558,30 +558,49 @@ static void maps_with_derivatives_are_smooth(void **state)
     n_levels = 3;
 }
 
-// NaN and infinity must not turn into finite numbers.
+// A parameter that is NaN must not give a finite map.
 static void bytes_keep_what_is_not_finite(void **state)
 {
     (void)state;
-    for (int which = 0; which < 4; which++) {
-        toy t;
-        toy_make(&t, SDM_POD_I8, 0);
-        if (which < 3)
-            *(float *const[]){t.head, t.basis, t.layer[1]}[which] = which ? NAN : INFINITY;
-        sdm_model *m = toy_open(&t);
-        void *scratch;
-        float map[315];
-        double p[P];
-        int finite = 0;
-        random_params(0, p);
-        if (which == 3) p[1] = NAN;
-        assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "scratch", NULL), 0);
-        sdm_model_forward(m, p, 1, map, scratch);
-        for (int v = 0; v < 315; v++) finite += isfinite(map[v]) != 0;
-        assert_true(finite < 315);
-        sdm_free(scratch);
-        sdm_model_free(m);
-        sdm_free(t.memory);
-    }
+    toy t;
+    toy_make(&t, SDM_POD_I8, 0);
+    sdm_model *m = toy_open(&t);
+    void *scratch;
+    float map[315];
+    double p[P];
+    int finite = 0;
+    random_params(0, p);
+    p[1] = NAN;
+    assert_int_equal(sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "scratch", NULL), 0);
+    sdm_model_forward(m, p, 1, map, scratch);
+    for (int v = 0; v < 315; v++) finite += isfinite(map[v]) != 0;
+    assert_true(finite < 315);
+    sdm_free(scratch);
+    sdm_model_free(m);
+    sdm_free(t.memory);
+}
+
+// A file with a weight that is NaN or infinite is refused, though its checksums are right.
+static void weights_must_be_finite(void **state)
+{
+    (void)state;
+    for (int type = SDM_POD_F32; type <= SDM_POD_I8; type++)
+        for (int which = 0; which < 6; which++) {
+            toy t;
+            toy_make(&t, (sdm_pod_type)type, 0);
+            (*(float *const[]){t.head, t.basis, t.layer[1]}[which / 2]) =
+                which % 2 ? NAN : INFINITY;
+            uint8_t *bytes;
+            size_t size;
+            sdm_model *m;
+            sdm_error e = {0};
+            assert_int_equal(sdm_pod_build(&t.spec, &bytes, &size, NULL), SDM_OK);
+            assert_int_equal(sdm_model_open_memory("toy", bytes, size, &m, &e), SDM_E_FORMAT);
+            assert_non_null(strstr(e.text, "is not finite"));
+            assert_non_null(strstr(e.text, "of section 'pod."));
+            sdm_free(bytes);
+            sdm_free(t.memory);
+        }
 }
 
 static void file_keeps_everything(void **state)
@@ -837,6 +856,7 @@ int main(void)
         cmocka_unit_test(jacobian_of_bytes),
         cmocka_unit_test(jacobian_of_bytes_is_the_slope),
         cmocka_unit_test(bytes_keep_what_is_not_finite),
+        cmocka_unit_test(weights_must_be_finite),
         cmocka_unit_test(maps_with_derivatives_are_smooth),
         cmocka_unit_test(file_keeps_everything),
         cmocka_unit_test(distributions_are_kept),

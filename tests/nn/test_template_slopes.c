@@ -1,6 +1,6 @@
 /* Derivatives of the template network against central differences of its maps, and its correction
  * by a pod network.
- * Tests: template_slopes.c */
+ * Tests: template_corner_slopes.c template_point_slope.c template_slopes.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -25,13 +25,12 @@ static void set_numbers(toy *t, size_t first, size_t n, double scale)
    turns; 3: the same beside two planes, which it carries. Templates without an error of
    interpolation have derivatives without jumps. */
 enum { TOYS = 4 };
-// The inverse of a warp stops at about the square of a fiftieth of the spacing of its lattice.
-static const double TOLERANCE[TOYS] = {1e-3, 1e-3, 4e-3, 4e-3};
+// The metric of a warp belongs to a point up to a two-hundredth of the spacing of its lattice away.
+static const double TOLERANCE[TOYS] = {1e-3, 1e-3, 2e-3, 2e-3};
 
 static toy make(int which, const sdm_grid *grid)
 {
     toy t = toy_new(grid);
-    // wide enough that no block of a part with a warp is interpolated from its corners
     const sdm_lattice near = lattice(ORIGIN, which < 2 ? 4 : 16, 0.5), far = lattice(ORIGIN, 40, 2),
                       warp = lattice(ORIGIN, 40, 4);
     const body planes[3] = {{PLANE, {0, 0, 1}, {0, 0, 1}, 0},
@@ -233,7 +232,7 @@ static void correction_is_added(void **state)
 {
     (void)state;
     for (int which = 1; which <= 2; which++) {
-        const sdm_grid grid = toy_grid(1);
+        const sdm_grid grid = toy_grid(0);
         toy t = make(which, &grid);
         sdm_model *plain = toy_open(&t);
         size_t size;
@@ -252,7 +251,9 @@ static void correction_is_added(void **state)
             for (int a = 0; a < 3; a++) y[a] = fmin(fmax(y[a], -12), 12);
             const double scaled = 2 * (p[0] - t.params[0].min) / 3 - 1,
                          truth = dot3(LINEAR, y) * (1 + scaled);
-            if (!(fabs((double)(with[v] - without[v]) - truth) < 2e-3))
+            // three voxels away from the surface warps are interpolated, by the distance
+            const bool far = which == 2 && fmaxf(fabsf(with[v]), fabsf(without[v])) > 3 * 0.5f;
+            if (!(fabs((double)(with[v] - without[v]) - truth) < (far ? 5e-2 : 2e-3)))
                 fail_msg("voxel %zu: %g, not %g", v, (double)(with[v] - without[v]), truth);
         }
         check_slopes(&t, m, TOLERANCE[which]);

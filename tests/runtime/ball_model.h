@@ -72,8 +72,8 @@ static const sdm_shape ball_shape = {.abi = SDM_SHAPE_ABI,
 
 enum { BALL_VOXELS = 17 * 17 * 17 };
 
-static sdm_model *ball_model(const char *second_name, const sdm_grid *grid,
-                             double (*mode)(const double x[3]))
+static void ball_model_bytes(const char *second_name, const sdm_grid *grid,
+                             double (*mode)(const double x[3]), uint8_t **bytes, size_t *size)
 {
     sdm_model_param params[2] = {
         {.name = "radius", .unit = "mm", .min = 1.0, .max = 1.5, .def = 1.2},
@@ -133,11 +133,18 @@ static sdm_model *ball_model(const char *second_name, const sdm_grid *grid,
     sdm_pod_gather(&info.grid, blocks, n_blocks, basis_map, basis);
     spec.weights = (sdm_pod_weights){
         .layer = {zero}, .bias = {zero}, .head = head, .mean = mean, .basis = basis};
+    sdm_error err;
+    if (sdm_pod_build(&spec, bytes, size, &err)) fail_msg("%s", err.text);
+}
+
+static inline sdm_model *ball_model(const char *second_name, const sdm_grid *grid,
+                                    double (*mode)(const double x[3]))
+{
     uint8_t *bytes = NULL;
     size_t size;
     sdm_error err;
     sdm_model *m = NULL;
-    if (sdm_pod_build(&spec, &bytes, &size, &err)) fail_msg("%s", err.text);
+    ball_model_bytes(second_name, grid, mode, &bytes, &size);
     if (sdm_model_open_memory("ball", bytes, size, &m, &err)) fail_msg("%s", err.text);
     sdm_free(bytes);
     return m;

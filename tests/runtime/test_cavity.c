@@ -47,8 +47,16 @@ static void test_mask_matches_brute_force(void **state)
         }
         const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = image};
         size_t n, expected = 0, all = 0;
+        double widest, radius = 0; // the widest ball, up to the next wall
+        for (size_t i = 0; i < COUNT; i++) {
+            double next = INFINITY;
+            for (size_t k = 0; k < COUNT; k++)
+                if (wall[k]) next = fmin(next, voxel_distance(&g, i, k));
+            radius = fmax(radius, next);
+        }
         o.n_threads = 1 + (int)(seed % 3);
-        assert_int_equal(sdm_fit_mask_cavities(&t, &o, &found, &n, NULL), SDM_OK);
+        assert_int_equal(sdm_fit_mask_cavities(&t, &o, &found, &n, &widest, NULL), SDM_OK);
+        assert_true(fabs(widest - radius) < 1e-6);
         for (size_t i = 0; i < COUNT; i++) {
             bool out = false;
             for (size_t k = 0; k < COUNT; k++)

@@ -48,7 +48,7 @@ static void test_bound_outside(void **state)
             for (int p = 0; p < 2; p++)
                 assert_true(fabs((double)slopes[p] -
                                  d / bound * oracle_at(&s->slope[t][p], nearest, NULL)) < 2e-6);
-            // differences of the bound
+            // the gradient agrees with central differences of the bound
             for (int a = 0; a < 3; a++) {
                 const double h = 1e-3;
                 float ends[2];

@@ -85,9 +85,12 @@ static void test_scores_match_differences(void **state)
     }
     const fit_observation label = observation_of(SDM_FIT_LABEL, SDM_FIT_LABELS, 0),
                           points = observation_of(SDM_FIT_POINTS, SDM_FIT_LABELS, 0);
+    fit_observation outliers = points;
+    outliers.outliers = 0.3, outliers.outlier_density = 0.2;
     for (double d = -2; d < 2; d += 0.31) {
         for (double u = 0; u <= 1; u += 0.25) check_score(&label, u, d, 1e-5);
         check_score(&points, 0, d, 1e-5);
+        check_score(&outliers, 0, d, 1e-5);
     }
 }
 

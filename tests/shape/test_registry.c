@@ -258,6 +258,26 @@ static void test_callbacks_are_checked(void **state)
     registration_refused(&s, "no summary");
 }
 
+// The option that mirrors a shape exists and has two choices.
+static void test_mirror_is_checked(void **state)
+{
+    (void)state;
+    static const sdm_option SIDES[] = {
+        {"side", SDM_OPTION_CHOICE, "", 0, 0, 0, "left|right", ""},
+        {"three", SDM_OPTION_CHOICE, "", 0, 0, 0, "left|right|both", ""},
+        {"edge", SDM_OPTION_REAL, "mm", 0.1, 1, 0.5, NULL, ""}};
+    sdm_shape s = GOOD;
+    s.options = SIDES, s.n_options = 3;
+    s.mirror = "three";
+    registration_refused(&s, "mirror 'three': need an option of two choices");
+    s.mirror = "edge";
+    registration_refused(&s, "mirror 'edge'");
+    s.mirror = "none";
+    registration_refused(&s, "mirror 'none'");
+    s.mirror = "side";
+    assert_int_equal(sdm_registry_add(registry, &s, "x", &err), SDM_OK);
+}
+
 static void test_registry_refuses_wrong_arguments(void **state)
 {
     (void)state;
@@ -687,6 +707,7 @@ int main(void)
         WITH_REGISTRY(test_parameters_are_checked),
         WITH_REGISTRY(test_options_are_checked),
         WITH_REGISTRY(test_callbacks_are_checked),
+        WITH_REGISTRY(test_mirror_is_checked),
         WITH_REGISTRY(test_find_suggests_the_nearest_name),
         WITH_REGISTRY(test_registry_refuses_wrong_arguments),
         cmocka_unit_test(test_option_text_is_parsed),

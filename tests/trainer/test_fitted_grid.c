@@ -21,8 +21,8 @@ static void read_config(sdm_config *c, const char *grid)
     if (sdm_config_parse("test.yaml", text, strlen(text), NULL, 0, c, &e)) fail_msg("%s", e.text);
 }
 
-// The grid holds the box with the margin, its longest edge has no more voxels than asked for and
-// hardly fewer, and its spacing has two digits.
+// The grid contains the box and the margin. Its longest edge has at most the number of voxels asked
+// for, and only a few less. Its spacing is rounded to two significant digits.
 static void check_around(double size, double place, int voxels)
 {
     const double low[3] = {place, place - size, -0.3 * size},

@@ -52,7 +52,7 @@ static sdm_verdict figures(void)
 static sdm_verdict decide(const char *override, sdm_cause cause, double fall, double modes_mm2)
 {
     const sdm_config c = config_of(&override, override ? 1 : 0);
-    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500};
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .asked = true};
     sdm_verdict v = figures();
     v.part_mm2[SDM_CAUSE_BASES] = v.part_mm2[SDM_CAUSE_NETWORK] = v.part_mm2[SDM_CAUSE_MAPS] = 1e-5;
     v.part_mm2[cause] = 8e-5;
@@ -86,6 +86,7 @@ static void largest_part_limits(void **state)
         {"data.memory_gb=0.005", SDM_CAUSE_MAPS, 0, 0, "to 400 and data.memory_gb to 1;"},
         {NULL, SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f16"},
         {"network.weights=f16", SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f32"},
+        {NULL, SDM_CAUSE_OVERLAP, 0, 0, "set network.kind to auto, which trains pod, too"},
         {NULL, SDM_CAUSE_TEMPLATE, 0, 0,
          "lower grid.spacing from 0.8 to 0.4 (and double grid.size, if it is given)"},
     };
@@ -121,7 +122,22 @@ static void length_of_the_training(void **state)
     assert_string_equal(v.key, "train.steps");
 }
 
-// The grid limits if it errs more than the model and more than a twentieth of a voxel.
+// After `auto` there is no other kind to advise.
+static void overlap_without_a_remedy(void **state)
+{
+    (void)state;
+    const sdm_config c = config_of(NULL, 0);
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .asked = false};
+    sdm_verdict v = figures();
+    v.part_mm2[SDM_CAUSE_TEMPLATE] = 1e-5, v.part_mm2[SDM_CAUSE_OVERLAP] = 3e-5;
+    trainer_verdict_decide(&in, &v);
+    assert_int_equal(v.limit, SDM_CAUSE_OVERLAP);
+    assert_true(!v.key[0] && !strstr(v.sentence, "network.kind"));
+    assert_non_null(strstr(v.sentence, "75 %"));
+}
+
+// The grid limits if it errs twice as much as the model and more than a twentieth of a voxel: where
+// the network is the larger part of the error of the surface, a finer grid is no remedy.
 static void grid_limits(void **state)
 {
     (void)state;
@@ -131,7 +147,7 @@ static void grid_limits(void **state)
         double model_mm, grid_mm;
         bool limits;
     } cases[] = {
-        {0.01, 0.039, false}, {0.01, 0.041, true}, {0.05, 0.049, false}, {0.05, 0.06, true}};
+        {0.01, 0.039, false}, {0.01, 0.041, true}, {0.05, 0.09, false}, {0.05, 0.11, true}};
     for (size_t i = 0; i < 4; i++) {
         sdm_verdict v = figures();
         v.rmse_voxel_mm = cases[i].model_mm;
@@ -401,11 +417,17 @@ int main(int argc, char **argv)
     const struct CMUnitTest slow[] = {cmocka_unit_test(advice_helps)};
     if (argc > 1) return cmocka_run_group_tests(slow, set_up, tear_down);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(largest_part_limits), cmocka_unit_test(length_of_the_training),
-        cmocka_unit_test(grid_limits),         cmocka_unit_test(grades),
-        cmocka_unit_test(grid_cuts),           cmocka_unit_test(error_falls_in_the_last_third),
-        cmocka_unit_test(evaluations_are_due), cmocka_unit_test(surface_of_a_sphere),
-        cmocka_unit_test(parts_add_up),        cmocka_unit_test(progress_is_true),
+        cmocka_unit_test(largest_part_limits),
+        cmocka_unit_test(length_of_the_training),
+        cmocka_unit_test(overlap_without_a_remedy),
+        cmocka_unit_test(grid_limits),
+        cmocka_unit_test(grades),
+        cmocka_unit_test(grid_cuts),
+        cmocka_unit_test(error_falls_in_the_last_third),
+        cmocka_unit_test(evaluations_are_due),
+        cmocka_unit_test(surface_of_a_sphere),
+        cmocka_unit_test(parts_add_up),
+        cmocka_unit_test(progress_is_true),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -14,5 +14,6 @@ enum {
     STREAM_DROPOUT = 700,
     STREAM_SURFACE = 720, // points of a surface (surface_check.h)
     STREAM_PLAN = 750,    // rejection of Sobol' points (sample_plan.h)
+    STREAM_FINE = 800,    // samples of the fine level: shapes, cells; 802 weights, 803 batches
     STREAM_BASES = 1000   // start of subspace iterations: global modes; block b has 1001 + b
 };

@@ -9,6 +9,7 @@
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 #include "streams.h"
+#include "trilinear.h"
 
 enum { SHAPES = 4, POINTS = 500 };
 
@@ -64,28 +65,12 @@ static void draw_point(const surface_mesh *s, uint64_t seed, uint64_t index, dou
     }
 }
 
-/* *value = map[nz][ny][nx] at x by trilinear interpolation; false if x is outside of the grid. */
-static bool interpolate(const sdm_grid *g, const float *map, const double x[3], double *value)
+/* index[3] = the index coordinates of x; false if x is outside of the grid. */
+static bool index_of(const sdm_grid *g, const double x[3], double index[3])
 {
-    double index[3], share[3];
-    size_t at[3];
     sdm_grid_index(g, x, index);
-    for (int a = 0; a < 3; a++) {
+    for (int a = 0; a < 3; a++)
         if (!(index[a] >= 0 && index[a] < (double)g->n[a] - 1)) return false;
-        at[a] = (size_t)index[a];
-        share[a] = index[a] - (double)at[a];
-    }
-    *value = 0;
-    for (size_t k = 0; k < 8; k++) {
-        double weight = 1;
-        size_t v[3];
-        for (size_t a = 0; a < 3; a++) {
-            const size_t bit = k >> a & 1;
-            weight *= bit ? share[a] : 1 - share[a];
-            v[a] = at[a] + bit;
-        }
-        *value += weight * (double)map[(v[2] * (size_t)g->n[1] + v[1]) * (size_t)g->n[0] + v[0]];
-    }
     return true;
 }
 
@@ -105,9 +90,10 @@ static sdm_status check_surface(const dataset *d, const sdm_exact *e, size_t sha
         s.area[t] = (t ? s.area[t - 1] : 0) + v3_norm(normal) / 2;
     }
     for (size_t i = 0; i < POINTS && !status; i++) {
-        double x[3], normal[3], inside[3], value;
+        double x[3], normal[3], inside[3], index[3];
         draw_point(&s, d->seed, shape * POINTS + i, x, normal);
-        if (!interpolate(d->grid, map, x, &value)) continue;
+        if (!index_of(d->grid, x, index)) continue;
+        const double value = trainer_trilinear(d->grid, map, index);
         // one voxel below the surface a ball of this radius touches it at x alone, if it fits in
         v3_along(x, -voxel, normal, inside);
         sums->square += value * value;

@@ -127,7 +127,7 @@ static sdm_status pod_run(trainer *t, bool resumed, sdm_error *err)
     pod_state *pod = t->state;
     sdm_status s = SDM_OK;
     // the measurement of the model and of the parts of its error needs the rest of a time budget
-    const double total = t->config->train.minutes * 60;
+    const double total = trainer_budget_seconds(t);
     pod->refine_end = total - fmin(10, 0.03 * total) - fmin(1, 0.05 * total);
     pod->mode_fit_end =
         t->phase_started + (pod->refine_end - t->phase_started) * (1 - t->config->train.refine);

@@ -84,6 +84,7 @@ sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err)
         {"average", p->average, p->n * sizeof *p->average},
         {"best", p->best, p->n * sizeof *p->best},
         {"best.errors", best, sizeof best},
+        {"turns", t->turns, t->turns->n > 1 ? sizeof *t->turns : 0},
         {"points", t->data.plan.point, t->data.plan.n_planned * sizeof *t->data.plan.point},
         {"errors", t->data.plan.error, t->data.plan.n_planned * sizeof *t->data.plan.error}};
     uint8_t *bytes = NULL;
@@ -286,6 +287,44 @@ static sdm_status plan_read(const trainer *t, const checkpoint_file *o, sample_p
                         t->folder);
     p->n_planned = n;
     return SDM_OK;
+}
+
+/* Reads the turns of a run with two kinds. */
+static sdm_status turns_read(const trainer *t, const sdm_section *stored, training_turns *out,
+                             sdm_error *err)
+{
+    if (stored->size == sizeof *out) memcpy(out, stored->data, sizeof *out);
+    bool sound = stored->size == sizeof *out && out->n == 2 && (out->at == 0 || out->at == 1) &&
+                 out->share > 0 && out->share <= 1 &&
+                 memchr(out->first.model_path, '\0', sizeof out->first.model_path);
+    for (int i = 0; i < 2 && sound; i++)
+        sound = out->kind[i] == SDM_NETWORK_POD || out->kind[i] == SDM_NETWORK_TEMPLATE;
+    return sound ? SDM_OK
+                 : sdm_fail(err, SDM_E_FORMAT,
+                            "%s/checkpoint.sdmc: its list of kinds is damaged or of another "
+                            "version: start anew with --force",
+                            t->folder);
+}
+
+sdm_status trainer_checkpoint_turns(const trainer *t, training_turns *out, bool *found,
+                                    sdm_error *err)
+{
+    checkpoint_file o = {0};
+    sdm_config *config = NULL;
+    sdm_status s = checkpoint_open(t, &o, found, err);
+    if (s || !*found) return s;
+    const sdm_section *turns = section_find(&o, "turns"), *text = section_find(&o, "config");
+    if (turns && turns->size) {
+        s = turns_read(t, turns, out, err);
+    } else {
+        s = SDM_ALLOC(&config, 1, "configuration", err);
+        if (!s) s = sdm_config_parse("checkpoint", text->data, text->size, NULL, 0, config, err);
+        if (!s) *out = (training_turns){.n = 1, .kind = {config->network.kind}, .share = 1};
+        out->chosen = true;
+    }
+    sdm_free(config);
+    sdm_free(o.bytes);
+    return s;
 }
 
 sdm_status trainer_checkpoint_read(trainer *t, bool *found, sdm_error *err)

@@ -15,6 +15,11 @@ sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err);
 /* Writes a checkpoint if the last one is older than train.checkpoint_seconds at time `now`. */
 sdm_status trainer_checkpoint_if_due(trainer *t, double now, sdm_error *err);
 
+/* *out = the kinds that the run trains whose checkpoint is in the folder of t, and where it was.
+ *found: false if there is no checkpoint. SDM_E_FORMAT: it is damaged. */
+sdm_status trainer_checkpoint_turns(const trainer *t, training_turns *out, bool *found,
+                                    sdm_error *err);
+
 /* First half of reading, before the maps are made: checks the configuration, restores counters,
    times, sample plan and metrics. t->data.n_taken becomes the number of random samples that the
    caller has to make again. *found: false if there is no checkpoint. SDM_E_CONFIG: the

@@ -53,6 +53,7 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     const double voxel = trainer_dataset_voxel(d);
     const float near_mm = (float)sdm_grid_near(d->grid);
     double square = 0, absolute = 0, near = 0, largest = 0, at_surface = 0, dice = 0, dice_min = 1;
+    double shallow = 0, deep = 0;
     size_t n_near = 0, n_at_surface = 0;
     // sum the errors over maps and voxels
     for (size_t i = 0; i < n && !s; i++) {
@@ -72,6 +73,8 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
             const double e = (double)values[v] - truth[v];
             here += e * e;
             absolute += fabs(e);
+            if (truth[v] < 0 && e > 0) shallow += e * e;
+            if (truth[v] < 0 && e < 0) deep += e * e;
             if (fabs(e) > largest) largest = fabs(e);
             if (fabsf(truth[v]) <= near_mm) near += e * e, n_near++;
             if (fabs((double)truth[v]) <= voxel) at_surface += e * e, n_at_surface++;
@@ -101,7 +104,9 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
         *more = (model_errors){.rmse_voxel_mm =
                                    n_at_surface ? sqrt(at_surface / (double)n_at_surface) : 0,
                                .dice = dice / (double)n,
-                               .dice_min = dice_min};
+                               .dice_min = dice_min,
+                               .shallow_mm2 = shallow / voxels,
+                               .deep_mm2 = deep / voxels};
     }
     trainer_workbench_dispose(&w);
     sdm_free(each);
@@ -318,19 +323,20 @@ sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err)
     return s;
 }
 
-sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error *err)
+void trainer_export_path(const trainer *t, char path[SDM_PATH_TEXT_MAX])
+{
+    snprintf(path, SDM_PATH_TEXT_MAX, "%.*s/model.sdm", SDM_PATH_TEXT_MAX - 16, t->folder);
+}
+
+sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error *err)
 {
     description *d = NULL;
     sdm_model *model = NULL;
-    uint8_t *bytes = NULL;
-    size_t size = 0;
     model_errors more;
-    sdm_verdict verdict;
-    char path[SDM_PATH_TEXT_MAX + 32];
-    snprintf(path, sizeof path, "%s/model.sdm", t->folder);
-    // build a first model and measure it
+    *report = (sdm_train_report){0};
+    trainer_export_path(t, report->model_path);
     sdm_status s = description_create(t, &d, err);
-    if (!s) s = model_open(t, path, d, &model, err);
+    if (!s) s = model_open(t, report->model_path, d, &model, err);
     if (!s) s = measure_model(t, model, t->data.n_holdout, &t->accuracy, &more, err);
     sdm_model_free(model);
     if (!s && !isfinite(t->accuracy.mse_mm2))
@@ -338,30 +344,37 @@ sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error 
                      "the trained network gives numbers that are not finite: use "
                      "network.weights=f32 or lower the "
                      "learning rates");
-    // build the final model, which holds its measured accuracy
     if (!s) {
-        d->info.accuracy = t->accuracy;
         t->heldout_mse = t->accuracy.mse_mm2;
         s = trainer_metric(t, 0, err);
-        if (!s) s = trainer_verdict_make(t, &more, &verdict, err);
-        if (!s) s = trainer_metric_verdict(t, &verdict, err);
+        if (!s) s = trainer_verdict_make(t, &more, &report->verdict, err);
+        if (!s) s = trainer_metric_verdict(t, &report->verdict, err);
+        report->accuracy = t->accuracy;
+        report->steps = t->step;
+        report->samples = d->info.train_samples;
     }
-    if (!s) s = t->kind->build(t, &d->info, &bytes, &size, err);
+    description_free(d);
+    return s;
+}
+
+sdm_status trainer_export_model(const trainer *t, sdm_error *err)
+{
+    description *d = NULL;
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    char path[SDM_PATH_TEXT_MAX];
+    trainer_export_path(t, path);
+    sdm_status s = description_create(t, &d, err);
+    if (!s) {
+        d->info.accuracy = t->accuracy;
+        s = t->kind->build(t, &d->info, &bytes, &size, err);
+    }
     if (!s) s = sdm_container_write(path, bytes, size, err);
     sdm_free(bytes);
     sdm_error picture = {0};
     if (!s && curve_write(t, &picture))
         // a failed picture is no reason to lose the network: a notice only
         trainer_message(t, "%s", picture.text);
-    if (!s && report) {
-        *report = (sdm_train_report){.accuracy = t->accuracy,
-                                     .steps = t->step,
-                                     .samples = d->info.train_samples,
-                                     .seconds = trainer_seconds(t),
-                                     .verdict = verdict};
-        snprintf(report->model_path, sizeof report->model_path, "%.*s",
-                 (int)sizeof report->model_path - 1, path);
-    }
     description_free(d);
     return s;
 }

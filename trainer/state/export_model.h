@@ -16,10 +16,16 @@ sdm_status trainer_export_dump(const trainer *t, sdm_text *out, sdm_error *err);
  *out. The caller owns *out even after an error: sdm_outfile_discard(). */
 sdm_status trainer_export_config(const trainer *t, sdm_outfile **out, sdm_error *err);
 
+/* path = that of model.sdm in the folder of the run. */
+void trainer_export_path(const trainer *t, char path[SDM_PATH_TEXT_MAX]);
+
 /* Builds the model from the averaged weights, measures it on the held-out maps exactly as the
-   runtime will run it, writes model.sdm and loss.png and fills *report (may be NULL).
+   runtime will run it, adds its error and its verdict to the metrics and fills *report.
    SDM_E_QUALITY: the network gives numbers that are not finite. */
-sdm_status trainer_export_model(trainer *t, sdm_train_report *report, sdm_error *err);
+sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error *err);
+
+/* Writes model.sdm, with the accuracy that trainer_export_judge() has measured, and loss.png. */
+sdm_status trainer_export_model(const trainer *t, sdm_error *err);
 
 /* *out = errors of the model with the present averaged weights on all held-out shapes. Writes
    nothing. */

@@ -10,6 +10,9 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
+/* How a line about the choice of the kind begins. */
+static const char AUTO[] = "{\"phase\": \"auto\"";
+
 /* Number after `key` in one line; NaN if there is none, or null. */
 static double number_after(const char *line, size_t length, const char *key)
 {
@@ -46,6 +49,8 @@ sdm_status trainer_history_read(const trainer *t, history *out, sdm_error *err)
                                      .step = number_after(p, length, "\"step\": "),
                                      .loss = number_after(p, length, "\"loss_mm2\": "),
                                      .heldout = number_after(p, length, "\"heldout_mse_mm2\": ")};
+        // the training of another kind begins
+        if (!strncmp(p, AUTO, sizeof AUTO - 1)) out->n = 0;
         if (point.phase != SDM_PHASE_DATA && isfinite(point.step)) out->point[out->n++] = point;
     }
     return SDM_OK;

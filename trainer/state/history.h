@@ -14,7 +14,8 @@ typedef struct history {
     history_point *point; /* [n], in the order of time */
 } history;
 
-/* Reads all lines of t->metrics with a step. Call trainer_history_dispose() also after an error. */
+/* Reads the lines of t->metrics with a step, those of the kind trained last. Call
+ * trainer_history_dispose() also after an error. */
 sdm_status trainer_history_read(const trainer *t, history *out, sdm_error *err);
 void trainer_history_dispose(history *h);
 

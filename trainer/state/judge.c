@@ -16,9 +16,10 @@ static const double STILL_FALLING = 0.1;
 /* With fewer steps than this no network has converged, whether the error still falls or not. */
 static const double FEW_STEPS = 500;
 
-/* The grid limits the surface if interpolation between its voxels errs more than the model, and by
-   more than this fraction of a voxel. */
-static const double GRID_ERROR = 0.05;
+/* The grid limits the surface if interpolation between its voxels errs by this multiple of the
+   error of the model, and by more than this fraction of a voxel: only then does a finer grid, of
+   eight times as many voxels, take away most of the error of the surface. */
+static const double GRID_SHARE = 2, GRID_ERROR = 0.05;
 
 /* Sets the key to change and its values. */
 static void advise(sdm_verdict *v, const char *key, double from, double to)
@@ -110,6 +111,9 @@ static const char *advise_part(const verdict_input *in, sdm_verdict *v)
         return advise_maps(in, v);
     case SDM_CAUSE_ROUNDING:
         return "The rounding of the weights limits it";
+    case SDM_CAUSE_OVERLAP:
+        return "Inside overlaps of its parts the template gives bounds, not distances; this limits "
+               "it";
     case SDM_CAUSE_TEMPLATE:
         advise(v, "grid.spacing", v->voxel_mm, v->voxel_mm / 2);
         return "The lattices of the template limit it, which are as fine as the grid";
@@ -140,7 +144,8 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
         part[SDM_CAUSE_NETWORK] > 0.5 * part[SDM_CAUSE_MAPS])
         *limit = SDM_CAUSE_NETWORK;
     const double grid = sqrt(v->part_mm2[SDM_CAUSE_GRID]);
-    if (grid > fmax(v->rmse_voxel_mm, GRID_ERROR * v->voxel_mm)) *limit = SDM_CAUSE_GRID;
+    if (grid > fmax(GRID_SHARE * v->rmse_voxel_mm, GRID_ERROR * v->voxel_mm))
+        *limit = SDM_CAUSE_GRID;
     return largest > 0 || *limit == SDM_CAUSE_GRID;
 }
 
@@ -155,6 +160,10 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
     if (v->limit == SDM_CAUSE_ROUNDING)
         snprintf(change, sizeof change, ": set network.weights to %s",
                  c->network.weights == SDM_WEIGHT_I8 ? "f16" : "f32");
+    // a run of `auto` has compared the kinds, or found pod far worse
+    if (v->limit == SDM_CAUSE_OVERLAP && in->asked)
+        snprintf(change, sizeof change,
+                 ": set network.kind to auto, which trains pod, too, and keeps the better one");
     if (!strcmp(v->key, "grid.spacing"))
         snprintf(also, sizeof also, " (and double grid.size, if it is given)");
     // with `auto`, a value that is the default of `auto` would become that of the kind
@@ -214,10 +223,13 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
     if (v->cut > 0) tell_cut(v);
 }
 
-/* Distributes the error of the model over its causes. */
-static void set_parts(const error_measures *m, double mse, sdm_verdict *v)
+/* Distributes the error of the model over its causes. A bound errs towards the surface alone, all
+ * other errors about as much to either side. */
+static void set_parts(const error_measures *m, const model_errors *errors, double mse,
+                      sdm_verdict *v)
 {
     double *part = v->part_mm2;
+    const double shallow = errors->shallow_mm2, deep = errors->deep_mm2;
     error_pair network = m->network, bases = m->bases;
     if (m->other_voxels || (m->corrects && network.heldout > mse)) {
         // the ratios on other voxels: a sample, or a correction's grid, which reaches farther
@@ -232,8 +244,9 @@ static void set_parts(const error_measures *m, double mse, sdm_verdict *v)
         part[SDM_CAUSE_MAPS] = network.heldout - network.training;
     }
     const double rest = mse - (isfinite(network.heldout) ? network.heldout : 0);
+    if (m->overlaps) part[SDM_CAUSE_OVERLAP] = fmin(rest, fmax(0, shallow - deep));
     if (m->corrects)
-        part[SDM_CAUSE_TEMPLATE] = rest;
+        part[SDM_CAUSE_TEMPLATE] = rest - (m->overlaps ? part[SDM_CAUSE_OVERLAP] : 0);
     else if (!m->other_voxels)
         part[SDM_CAUSE_ROUNDING] = rest;
 }
@@ -266,13 +279,14 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                                       trainer_history_fall(&h, SDM_PHASE_REFINE, floor))};
     for (int i = 0; i < SDM_CAUSES; i++) out->part_mm2[i] = NAN;
     out->part_mm2[SDM_CAUSE_GRID] = surface.rms_mm * surface.rms_mm;
-    set_parts(&m, t->accuracy.mse_mm2, out);
+    set_parts(&m, errors, t->accuracy.mse_mm2, out);
     const verdict_input in = {
         .config = t->config,
         .maps = (double)(d->n_static + d->n_taken),
         .cut = trainer_by_time(t) && !d->only_holdout &&
                (int64_t)d->n_start<t->config->data.start, .ended_early = t->saved_seconds> 0,
-        .steps = (double)t->step};
+        .steps = (double)t->step,
+        .asked = !t->turns->chosen};
     trainer_verdict_decide(&in, out);
     trainer_history_dispose(&h);
     return SDM_OK;

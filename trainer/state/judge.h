@@ -9,6 +9,9 @@ typedef struct model_errors {
     double rmse_voxel_mm; /* root mean square error of the voxels within a voxel of the surface */
     double dice;          /* Dice coefficient: mean over the held-out shapes */
     double dice_min;      /* Dice coefficient: smallest of a held-out shape */
+    /* Mean square errors inside the shapes, as parts of that of all voxels, mm^2: where the map is
+       nearer to the surface than the truth, and where it is not. */
+    double shallow_mm2, deep_mm2;
 } model_errors;
 
 /* Measures the parts of the error and fills *out. t->accuracy must be set. */
@@ -22,6 +25,7 @@ typedef struct verdict_input {
     bool cut;         /* the time of the budget ended before all maps of data.start were made */
     bool ended_early; /* by train.patience */
     double steps;     /* of the optimiser */
+    bool asked;       /* the configuration gives the kind, `auto` has not chosen it */
 } verdict_input;
 
 /* Sets grade, limit, key, values and sentence from the figures in *v. */

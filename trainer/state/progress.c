@@ -11,6 +11,11 @@
 
 double trainer_seconds(const trainer *t) { return sdm_clock() - t->started; }
 
+double trainer_budget_seconds(const trainer *t)
+{
+    return (t->config->network.fine ? 0.9 : 1) * 60 * t->config->train.minutes;
+}
+
 bool trainer_by_time(const trainer *t) { return t->config->train.minutes > 0; }
 
 int64_t trainer_steps(const trainer *t)
@@ -106,7 +111,7 @@ void trainer_report(trainer *t, double fraction, bool now)
     t->hooks.progress(t->hooks.user, &p);
 }
 
-void trainer_message(trainer *t, const char *fmt, ...)
+void trainer_message(const trainer *t, const char *fmt, ...)
 {
     if (!t->hooks.message) return;
     char line[1024];
@@ -151,7 +156,7 @@ void trainer_evaluated(trainer *t, double mse, double began)
 
 /* Rewrites the whole file metrics.jsonl: so it is complete at any moment, and a resumed run does
  * not repeat lines. */
-static sdm_status metrics_write(const trainer *t, sdm_error *err)
+sdm_status trainer_metrics_write(const trainer *t, sdm_error *err)
 {
     if (!t->folder) return SDM_OK; // a trial
     char path[SDM_PATH_TEXT_MAX + 32];
@@ -172,7 +177,8 @@ static sdm_status metrics_add(trainer *t, sdm_json *j, sdm_error *err)
     if (!j->text.failed) sdm_text_add(t->metrics, "%s\n", j->text.data);
     const bool failed = j->text.failed || t->metrics->failed;
     sdm_json_dispose(j);
-    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : metrics_write(t, err);
+    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics")
+                  : trainer_metrics_write(t, err);
 }
 
 sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)

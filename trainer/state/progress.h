@@ -7,6 +7,10 @@
  * which the maps were computed again does not. */
 double trainer_seconds(const trainer *t);
 
+/* Seconds of train.minutes in which the network is trained and measured: all, or all but a tenth if
+   a fine level follows. */
+double trainer_budget_seconds(const trainer *t);
+
 /* true: the budget is a time (train.minutes). false: it is trainer_steps() optimiser steps. */
 bool trainer_by_time(const trainer *t);
 int64_t trainer_steps(const trainer *t);
@@ -35,7 +39,7 @@ void trainer_pace_start(trainer *t, double unit_maps);
 void trainer_report(trainer *t, double fraction, bool now);
 
 /* Sends a notice of one line to the message callback. */
-void trainer_message(trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
+void trainer_message(const trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
 
 /* true if the caller wants the run to stop. [any thread] */
 bool trainer_cancelled(const trainer *t);
@@ -58,6 +62,9 @@ sdm_status trainer_metric(trainer *t, double rate, sdm_error *err);
 
 /* Appends a line with the verdict, without times unless the budget is a time. */
 sdm_status trainer_metric_verdict(trainer *t, const sdm_verdict *v, sdm_error *err);
+
+/* Writes metrics.jsonl anew; a trial writes nothing. */
+sdm_status trainer_metrics_write(const trainer *t, sdm_error *err);
 
 /* For a training loop: counts a step and reports progress. */
 void trainer_step_done(trainer *t);

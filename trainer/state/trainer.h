@@ -7,6 +7,7 @@
 #include "numerics/optimiser.h"
 #include "sdm/internal/pod.h"
 #include "sdm/internal/train.h"
+#include "turns.h"
 
 typedef struct train_kind train_kind;
 
@@ -25,6 +26,7 @@ typedef struct trainer {
     const char *folder; /* NULL: a trial, which writes no files */
     sdm_train_hooks hooks;
     int n_threads;
+    const training_turns *turns; /* of the run; NULL: a trial */
     const train_kind *kind;
     void *design; /* data of the kind from before the maps; NULL before train_kind.prepare() */
     void *state;  /* data of the kind; NULL before train_kind.begin() */

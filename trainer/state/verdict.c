@@ -5,7 +5,8 @@
 
 const char *sdm_cause_name(sdm_cause cause)
 {
-    static const char *const names[] = {"bases", "network", "maps", "rounding", "template", "grid"};
+    static const char *const names[] = {"bases",    "network", "maps", "rounding",
+                                        "template", "overlap", "grid"};
     return (size_t)cause < SDM_CAUSES ? names[cause] : "unknown";
 }
 
@@ -17,6 +18,7 @@ const char *sdm_cause_text(sdm_cause cause)
         "what is larger on held-out maps than on training maps",
         "rounding of the weights in the model file",
         "what motion, warp and lattices of the template leave besides",
+        "inside overlaps of the parts, where their minimum is only a bound of the distance",
         "exact maps, interpolated between the voxels at the exact surface"};
     return (size_t)cause < SDM_CAUSES ? texts[cause] : "unknown";
 }

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "data/trilinear.h"
 #include "data/workbench.h"
 #include "design.h"
 #include "pod/pod_kind.h"
@@ -48,27 +49,11 @@ static sdm_status correction_of(const void *user, const double *p, const float *
         status = sdm_template_carry(m, p, s->nodes, s->n_voxels, x, err);
     }
     for (size_t i = 0; i < s->n_voxels && !status; i++) {
-        // trilinear; outside of the grid the nearest point of the grid
-        double index[3], t[3];
-        size_t at[3];
+        // outside of the grid the nearest point of the grid
+        double index[3];
         sdm_grid_index(g, x + 3 * i, index);
-        for (int a = 0; a < 3; a++) {
-            const double last = (double)g->n[a] - 1, u = fmin(fmax(index[a], 0), last);
-            at[a] = g->n[a] > 1 ? (size_t)fmin(u, last - 1) : 0;
-            t[a] = u - (double)at[a];
-        }
-        double sum = 0;
-        for (int k = 0; k < 8; k++) {
-            double w = 1;
-            size_t v[3];
-            for (int a = 0; a < 3; a++) {
-                const int bit = k >> a & 1;
-                w *= bit ? t[a] : 1 - t[a];
-                v[a] = at[a] + (size_t)(bit && g->n[a] > 1);
-            }
-            sum += w * (double)map[(v[2] * (size_t)g->n[1] + v[1]) * (size_t)g->n[0] + v[0]];
-        }
-        out[i] = (float)sum;
+        for (int a = 0; a < 3; a++) index[a] = fmin(fmax(index[a], 0), (double)g->n[a] - 1);
+        out[i] = (float)trainer_trilinear(g, map, index);
     }
     sdm_free(scratch);
     sdm_free(x);
@@ -299,6 +284,7 @@ static sdm_status template_parts(const trainer *t, error_measures *out, sdm_erro
     out->motion_mm = s->design.motion_error_mm;
     out->warp_mm = s->design.warp_error_mm;
     out->corrects = true;
+    out->overlaps = s->design.n_parts > 1;
     return s->corrected ? trainer_kind_pod.parts(t, out, err) : SDM_OK;
 }
 

@@ -12,8 +12,7 @@ static inline v4d dot4(v4d ax, v4d bx, v4d ay, v4d by, v4d az, v4d bz)
 
 /* Squared distances of four points, each from its own feature x[number[i]]. The operations and
    their order are those of sdm_feature_distance2(), hence the same bits. */
-static inline void distances4(const sdm_feature *x, const uint32_t number[4], v4d px, v4d py,
-                              v4d pz, double out[4])
+static inline v4d distances4(const sdm_feature *x, const uint32_t number[4], v4d px, v4d py, v4d pz)
 {
     v4d a[4], u[4];
     for (int i = 0; i < 4; i++) {
@@ -27,5 +26,19 @@ static inline void distances4(const sdm_feature *x, const uint32_t number[4], v4
     const v4d s = dot4(wx, a[3], wy, u[0], wz, u[1]);
     const v4d rx = v4_sub(wx, v4_mul(s, a[3])), ry = v4_sub(wy, v4_mul(s, u[0])),
               rz = v4_sub(wz, v4_mul(s, u[1]));
-    v4_store(out, v4_if_negative(u[3], v4_mul(s, s), dot4(rx, rx, ry, ry, rz, rz)));
+    return v4_if_negative(u[3], v4_mul(s, s), dot4(rx, rx, ry, ry, rz, rz));
+}
+
+/* Distances of four points from one feature, with the bits of the roots of distances4(): for a face
+   the root of s * s, rounded, is abs(s). */
+static inline v4d distances4_from(const sdm_feature *x, v4d px, v4d py, v4d pz)
+{
+    const v4d wx = v4_sub(px, v4_all(x->a[0])), wy = v4_sub(py, v4_all(x->a[1])),
+              wz = v4_sub(pz, v4_all(x->a[2]));
+    const v4d ux = v4_all(x->u[0]), uy = v4_all(x->u[1]), uz = v4_all(x->u[2]);
+    const v4d s = dot4(wx, ux, wy, uy, wz, uz);
+    if (x->face < 0) return v4_abs(s);
+    const v4d rx = v4_sub(wx, v4_mul(s, ux)), ry = v4_sub(wy, v4_mul(s, uy)),
+              rz = v4_sub(wz, v4_mul(s, uz));
+    return v4_sqrt(dot4(rx, rx, ry, ry, rz, rz));
 }

@@ -9,6 +9,8 @@
 /* Relative slack for grid axes that are orthonormal to 1e-6 only, and in voxels. */
 #define SLACK 1e-5
 #define SLACK_VOXELS 1e-3
+// Ranges of up to FEW tiles are tested tile by tile.
+#define FEW 64
 
 /* A range of tiles, lo ... hi - 1. */
 typedef struct range {
@@ -34,8 +36,10 @@ static range tiles_around(const sdm_blocks *b, const sdm_frame *f)
         for (int a = 0; a < 3; a++) {
             const double along = d[0] * g->dir[a] + d[1] * g->dir[3 + a] + d[2] * g->dir[6 + a];
             const double slack = SLACK * size + b->band_mm * (1 + SLACK);
-            lo[a] = fmin(lo[a], (along - slack) / g->spacing[a] - SLACK_VOXELS);
-            hi[a] = fmax(hi[a], (along + slack) / g->spacing[a] + SLACK_VOXELS);
+            const double low = (along - slack) / g->spacing[a] - SLACK_VOXELS,
+                         high = (along + slack) / g->spacing[a] + SLACK_VOXELS;
+            lo[a] = low < lo[a] ? low : lo[a];
+            hi[a] = high > hi[a] ? high : hi[a];
         }
     }
     for (int a = 0; a < 3; a++) {
@@ -46,17 +50,27 @@ static range tiles_around(const sdm_blocks *b, const sdm_frame *f)
     return r;
 }
 
-/* May a voxel of the range lie within the band around the triangle? Compares the distance of the
-   centre of the range with its radius. */
+/* May a voxel of the range lie within the band around the triangle? Compares the distances of the
+   centre of the range from the triangle's plane and from the triangle with its extents. */
 static bool range_is_near(const sdm_blocks *b, const range *r, const sdm_frame *f)
 {
-    double index[3], x[3], radius = 0;
+    const sdm_grid *g = &b->grid;
+    double index[3], x[3], along[3], radius = 0, extent = 0;
     for (int a = 0; a < 3; a++) {
         const double half = 0.5 * (double)(SDM_BLOCK_SIZE * (r->hi[a] - r->lo[a]) - 1);
         index[a] = (double)(SDM_BLOCK_SIZE * r->lo[a]) + half;
-        radius += half * half * b->grid.spacing[a] * b->grid.spacing[a];
+        along[a] = half * g->spacing[a];
+        radius += along[a] * along[a];
     }
-    sdm_grid_world(&b->grid, index, x);
+    sdm_grid_world(g, index, x);
+    double height = 0;
+    for (int a = 0; a < 3; a++) {
+        height += (x[a] - f->a[a]) * f->n[a];
+        extent += along[a] *
+                  fabs(f->n[0] * g->dir[a] + f->n[1] * g->dir[3 + a] + f->n[2] * g->dir[6 + a]);
+    }
+    if (f->flat == 0 && fabs(height) > (extent + b->band_mm) * (1 + SLACK) + SLACK * sqrt(radius))
+        return false;
     const double far = (sqrt(radius) + b->band_mm) * (1 + SLACK);
     return sdm_frame_distance2(f, x) <= far * far;
 }
@@ -65,24 +79,28 @@ static bool range_is_near(const sdm_blocks *b, const range *r, const sdm_frame *
 static void range_mark(sdm_blocks *b, range r, const sdm_frame *f)
 {
     int longest = 0;
+    int64_t count = 1;
     for (int a = 0; a < 3; a++) {
-        if (r.hi[a] <= r.lo[a]) return;
-        if (r.hi[a] - r.lo[a] > r.hi[longest] - r.lo[longest]) longest = a;
+        const int64_t length = r.hi[a] - r.lo[a];
+        if (length <= 0) return;
+        if (length > r.hi[longest] - r.lo[longest]) longest = a;
+        count *= length;
     }
-    const int64_t length = r.hi[longest] - r.lo[longest];
-    uint32_t *tile = &b->tile[(r.lo[2] * b->n[1] + r.lo[1]) * b->n[0] + r.lo[0]];
-    if (length == 1 && *tile == 0) return;
-    // the test is not worth while for a few tiles, whose halves are tested again
-    const int64_t count = (r.hi[0] - r.lo[0]) * (r.hi[1] - r.lo[1]) * (r.hi[2] - r.lo[2]);
-    if ((length == 1 || count > 8) && !range_is_near(b, &r, f)) return;
-    if (length == 1) {
-        *tile = 0;
+    if (count > FEW) {
+        if (!range_is_near(b, &r, f)) return;
+        range half = r;
+        half.hi[longest] = r.lo[longest] = (r.lo[longest] + r.hi[longest]) / 2;
+        range_mark(b, half, f);
+        range_mark(b, r, f);
         return;
     }
-    range half = r;
-    half.hi[longest] = r.lo[longest] = r.lo[longest] + length / 2;
-    range_mark(b, half, f);
-    range_mark(b, r, f);
+    for (int64_t k = r.lo[2]; k < r.hi[2]; k++)
+        for (int64_t j = r.lo[1]; j < r.hi[1]; j++)
+            for (int64_t i = r.lo[0]; i < r.hi[0]; i++) {
+                uint32_t *tile = &b->tile[(k * b->n[1] + j) * b->n[0] + i];
+                const range one = {{i, j, k}, {i + 1, j + 1, k + 1}};
+                if (*tile && range_is_near(b, &one, f)) *tile = 0;
+            }
 }
 
 /* Numbers the marked tiles and allocates their blocks. */
@@ -153,7 +171,7 @@ static bool is_needed(const sdm_blocks *b, size_t i)
         end[a] = b->grid.n[a] - b->first[i][a];
         if (end[a] > SDM_BLOCK_SIZE) end[a] = SDM_BLOCK_SIZE;
     }
-    for (int64_t z = 0; z < end[2]; z++)
+    for (int64_t z = 0; z < end[2] && !needed; z++)
         for (int64_t y = 0; y < end[1]; y++) {
             const float *row = &b->values[i][(z * SDM_BLOCK_SIZE + y) * SDM_BLOCK_SIZE];
             for (int64_t x = 0; x < end[0]; x++)

@@ -17,6 +17,9 @@
 // features apart.
 #define REACH_MAX 1e5
 
+// Bands below this multiple of the radius of a block do without reference points: measured.
+#define NARROW 1.5f
+
 static sdm_grid_kernel *kernel_choose(void)
 {
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -116,11 +119,14 @@ static int64_t voxel_index_in(const int64_t size[3], const int64_t at[3])
     return (at[2] * size[1] + at[1]) * size[0] + at[0];
 }
 
-/* Fills the tables vector, voxel, voxel_in_tile and tile_voxel of the job. in_vector: the eight
-   voxels of a vector. */
+/* Fills the tables vector, voxel, voxel_in_tile, voxel_mm and voxel_store of the job. in_vector:
+   the eight voxels of a vector. */
 static void voxel_tables_set(sdm_grid_job *job, const sdm_grid_parts *in_vector)
 {
     const sdm_grid_parts *tiles = &job->part[SDM_TILES], *vectors = &job->part[SDM_VECTORS];
+    const int64_t stored[2] = {job->blocks ? SDM_BLOCK_SIZE : job->n[0],
+                               job->blocks ? SDM_BLOCK_SIZE : job->n[1]};
+    job->paired = in_vector->first[1][0] == 1;
     for (int v = 0; v < 8; v++) {
         for (int i = 0; i < 8; i++) {
             int64_t in_tile[3];
@@ -133,7 +139,8 @@ static void voxel_tables_set(sdm_grid_job *job, const sdm_grid_parts *in_vector)
             const int64_t index = voxel_index_in(tiles->size, in_tile);
             voxel_offset(job, at, x);
             job->voxel_in_tile[v][i] = (uint8_t)index;
-            for (int c = 0; c < 3; c++) job->tile_voxel[c][index] = x[c];
+            for (int c = 0; c < 3; c++) job->voxel_mm[c][v][i] = x[c];
+            job->voxel_store[v][i] = (in_tile[2] * stored[1] + in_tile[1]) * stored[0] + in_tile[0];
             // within the block, scaled
             for (int t = 0; t < 8; t++) {
                 for (int c = 0; c < 3; c++) {
@@ -247,6 +254,7 @@ static sdm_status job_run(const sdm_grid_job *j, const sdm_grid *g, const sdm_ex
             job.step[a][c] = g->n[a] > 1 ? g->dir[3 * c + a] * g->spacing[a] : 0;
     }
     const double reach = job_set_tables(&job);
+    job.narrow = job.band < NARROW * job.part[SDM_BLOCKS].radius;
     const int n_threads = sdm_threads(opts->n_threads);
     if (!(reach < REACH_MAX)) return distance_by_points(&job, g, opts, n_threads, err);
     // each thread gets an equal share of the memory limit; 0 would mean no limit

@@ -63,6 +63,8 @@ typedef struct sdm_grid_job {
     float band;
     /* the same in mm */
     double band_mm;
+    /* the band is so narrow that it culls more than reference points (map.inc) would */
+    bool narrow;
     /* division of a box, a block and a tile, [level] */
     sdm_grid_parts part[SDM_PART_LEVELS];
     /* [tile]: centres of its eight vectors relative to the centre of the block, scaled */
@@ -71,8 +73,14 @@ typedef struct sdm_grid_job {
     sdm_points voxel[8][8];
     /* [vector][lane]: index of the voxel within its tile (0 to 63), x fastest */
     uint8_t voxel_in_tile[8][8];
-    /* [coordinate][index]: positions of the voxels of a tile relative to its first voxel, mm */
-    _Alignas(64) double tile_voxel[3][64];
+    /* [coordinate][vector][lane]: positions of the voxels of a tile relative to its first voxel,
+       mm */
+    _Alignas(64) double voxel_mm[3][8][8];
+    /* [vector][lane]: where the value of the voxel is stored relative to that of the first voxel
+       of the tile, if all of the tile is */
+    int64_t voxel_store[8][8];
+    /* whether the values of lanes 2 i and 2 i + 1 are stored side by side */
+    bool paired;
     /* positions of the eight voxels of a vector relative to its centre, scaled */
     sdm_points to_voxel;
     /* whether the offsets of vectors in a tile are exactly twice, and those of tiles in a block

@@ -106,7 +106,7 @@ typedef struct sdm_candidate {
 typedef struct sdm_candidates {
     /* squared distances of the nearest and second nearest candidate, [vector][voxel] */
     _Alignas(64) float first[64][8], second[64][8];
-    /* number of the nearest candidate, [vector][voxel] */
+    /* number of the nearest candidate, [vector][voxel]; any feature if there is none */
     uint32_t number[64][8];
     /* index of the vector's last candidate in list[]; SDM_NONE: the vector has no candidate */
     uint32_t last[64];

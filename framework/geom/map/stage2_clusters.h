@@ -6,9 +6,13 @@
 #include "stage1_bounds.h"
 
 /* Mask of the parts that contain a point whose nearest feature may lie below the node. */
-static inline int node_parts(const sdm_grid_parts *q, bool aligned, const cull8 *v,
+static inline int node_parts(const sdm_grid_parts *q, bool narrow, bool aligned, const cull8 *v,
                              const sdm_cluster_node *node)
 {
+    if (narrow) {
+        const point8 w = vector_from_box(node, v->centre);
+        return 0xff & ~v8_greater(p8_dot(w, w), v8_mul(v->band, v->band));
+    }
     point8 h;
     const v8f d = length8(vector_from_box(node, v->centre), &h);
     return 0xff & ~v8_greater(d, cull_limit(q, aligned, v, h));
@@ -27,7 +31,8 @@ static sdm_status clusters_of_blocks(const sdm_grid_job *job, const cull8 *v, in
     while (top) {
         const uint32_t i = stack[--top];
         const sdm_cluster_node *node = &f->node[i];
-        const int mask = blocks & node_parts(&job->part[SDM_BLOCKS], job->aligned, v, node);
+        const int mask =
+            blocks & node_parts(&job->part[SDM_BLOCKS], job->narrow, job->aligned, v, node);
         if (!mask) continue;
         if (!node->count) {
             stack[top++] = node->first + 1;
@@ -61,8 +66,8 @@ static float clusters_of_tiles(const sdm_grid_job *job, const sdm_cluster_list *
     for (int a = 0; a < 3; a++) centre[a] = (centre_mm[a] - f->centre[a]) * f->scale;
     // cull, without branches: the masks are unpredictable
     for (size_t i = 0; i < in->n; i++) {
-        const int mask =
-            tiles & node_parts(&job->part[SDM_TILES], job->aligned, v, &f->node[in->list[i]]);
+        const int mask = tiles & node_parts(&job->part[SDM_TILES], job->narrow, job->aligned, v,
+                                            &f->node[in->list[i]]);
         scratch->cluster[n] = (sdm_cluster_ref){.node = in->list[i], .tiles = (uint32_t)mask};
         n += mask != 0;
     }

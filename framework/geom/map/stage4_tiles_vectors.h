@@ -58,6 +58,8 @@ SDM_FOR_KIND void batch_test_tiles(block *b, int kind)
         const size_t lane = lane_of(p->feature[i]);
         const sdm_block_group *m = &p->group[lane_item(p->feature[i], n_group)];
         sdm_block_feature *x = &batch->feature[i];
+        // for stage 6
+        __builtin_prefetch(&job->features->exact[m->number + (uint32_t)lane]);
         const functions8 f = block_feature_start(job, kind, to_voxel, m, lane, x);
         v8f excess = region_excess(kind, &f, m->extent, lane, minus_half, x->most);
         if (kind != SDM_THIN_FACES && b->tile_far2 < INFINITY) {

@@ -12,10 +12,9 @@ static void candidates_clear(sdm_candidates *c)
     for (int v = 0; v < 64; v++) {
         v8_store(c->first[v], v8_all(INFINITY));
         v8_store(c->second[v], v8_all(INFINITY));
-        v8_store_i(c->number[v], v8_all_i(0));
-        c->last[v] = SDM_NONE;
-        c->open[v] = 0;
     }
+    memset(c->last, 0xff, sizeof c->last); // SDM_NONE
+    memset(c->open, 0, sizeof c->open);
 }
 
 /* Squared distances in float of the voxels of a vector of a tile to feature x; INFINITY for

@@ -21,29 +21,17 @@ typedef struct tile {
     float error;
 } tile;
 
-/* Results of the 64 voxels of a tile, indexed as by sdm_grid_job.voxel_in_tile. */
+/* Results of the 64 voxels of a tile, [vector][lane]. */
 typedef struct voxels {
-    // number of the nearest feature, SDM_NONE: none known
-    uint32_t number[64];
-    // squared distance, mm^2
-    _Alignas(32) double d2[64];
-    // voxels that tile_choose() has already settled: their indices and squared distances, mm^2
-    int n_settled;
-    uint8_t settled[64];
-    double settled_d2[64];
+    // number of the nearest feature, SDM_NONE: the voxel lies outside the band
+    uint32_t number[8][8];
+    // distance, mm
+    _Alignas(32) float distance[8][8];
 } voxels;
 
-/* Index within the tile of the voxel in a lane of a vector. */
-static inline unsigned voxel_index(const sdm_grid_job *job, int vector, int lane)
+static inline void voxel_position(const tile *t, int vector, int lane, double p[3])
 {
-    const unsigned i = job->voxel_in_tile[vector][lane];
-    assert(i < 64);
-    return i;
-}
-
-static inline void voxel_position(const tile *t, unsigned i, double p[3])
-{
-    for (int a = 0; a < 3; a++) p[a] = t->corner[a] + t->job->tile_voxel[a][i];
+    for (int a = 0; a < 3; a++) p[a] = t->corner[a] + t->job->voxel_mm[a][vector][lane];
 }
 
 /* Searches the tree for the nearest triangle of the whole surface, for voxels without a candidate.
@@ -83,72 +71,70 @@ static uint32_t voxel_settle(const tile *t, unsigned v, int lane, const double p
     return best;
 }
 
-/* Sets x->number of all voxels: the candidate that is clearly nearest in float, or else the one
-   that is nearest in double. */
-static void tile_choose(const tile *t, voxels *x)
+/* Distances of the eight voxels of a vector, each from its own feature. */
+static inline void vector_distances(const tile *t, int v, const uint32_t number[8], float out[8])
+{
+    const sdm_feature *exact = t->job->features->exact;
+    const double(*at)[8][8] = t->job->voxel_mm;
+    const bool one = v8_uniform(v8_load_i(number));
+    _Alignas(32) double d[8];
+    for (int i = 0; i < 8; i += 4) {
+        const v4d x = v4_add(v4_all(t->corner[0]), v4_load(&at[0][v][i])),
+                  y = v4_add(v4_all(t->corner[1]), v4_load(&at[1][v][i])),
+                  z = v4_add(v4_all(t->corner[2]), v4_load(&at[2][v][i]));
+        if (one)
+            v4_store(&d[i], distances4_from(&exact[number[0]], x, y, z));
+        else
+            v4_store(&d[i], v4_sqrt(distances4(exact, &number[i], x, y, z)));
+    }
+    for (int i = 0; i < 8; i++) out[i] = (float)d[i];
+}
+
+/* Finds the nearest features of the voxels of a vector, and their distances: the candidate that is
+   clearly nearest in float, or else the one that is nearest in double. */
+static void vector_fill(const tile *t, int v, voxels *x)
 {
     const sdm_grid_job *job = t->job;
     const sdm_candidates *c = t->candidates;
-    const v8f k = v8_all(ambiguity(t->error));
-    const bool banded = job->band_mm < INFINITY;
-    for (int v = 0; v < 8; v++) {
-        if (!(t->vectors >> v & 1)) {
-            for (int i = 0; i < 8; i++) x->number[voxel_index(job, v, i)] = 0;
-            continue;
-        }
-        // clear: the second nearest is farther than the first by more than the errors of both;
-        // false for NaN (INFINITY - INFINITY)
-        const unsigned at = 8 * t->number + (unsigned)v;
-        if (banded && c->last[at] == SDM_NONE) { // all voxels are outside the band
-            for (int i = 0; i < 8; i++) {
-                x->settled[x->n_settled] = (uint8_t)voxel_index(job, v, i);
-                x->number[x->settled[x->n_settled]] = SDM_NONE;
-                x->settled_d2[x->n_settled++] = INFINITY;
-            }
-            continue;
-        }
-        const v8f first = v8_load(c->first[at]);
-        const v8f limit = v8_fma(v8_add(v8_sqrt(first), v8_all(1)), k, first);
-        const int clear = v8_greater(v8_load(c->second[at]), limit) & (int)~c->open[at];
-        for (int i = 0; i < 8; i++) {
-            const uint32_t number = x->number[voxel_index(job, v, i)] = c->number[at][i];
-            __builtin_prefetch(&job->features->exact[number]); // for tile_measure()
-        }
-        // the other voxels: compare all of their candidates in double
-        for (int open = 0xff & ~clear; open; open &= open - 1) {
-            const int lane = __builtin_ctz((unsigned)open);
-            const unsigned i = voxel_index(job, v, lane);
-            double p[3];
-            voxel_position(t, i, p);
-            x->settled[x->n_settled] = (uint8_t)i;
-            x->number[i] = voxel_settle(t, at, lane, p, &x->settled_d2[x->n_settled]);
-            x->n_settled++;
-        }
+    const unsigned at = 8 * t->number + (unsigned)v;
+    // clear: the second nearest is farther than the first by more than the errors of both; false
+    // for NaN (INFINITY - INFINITY)
+    const v8f first = v8_load(c->first[at]), k = v8_all(ambiguity(t->error));
+    const v8f limit = v8_fma(v8_add(v8_sqrt(first), v8_all(1)), k, first);
+    const int clear = v8_greater(v8_load(c->second[at]), limit) & (int)~c->open[at];
+    memcpy(x->number[v], c->number[at], sizeof x->number[v]);
+    vector_distances(t, v, c->number[at], x->distance[v]);
+    // the other voxels: compare all of their candidates in double
+    for (int open = 0xff & ~clear; open; open &= open - 1) {
+        const int lane = __builtin_ctz((unsigned)open);
+        double p[3], d2;
+        voxel_position(t, v, lane, p);
+        x->number[v][lane] = voxel_settle(t, at, lane, p, &d2);
+        x->distance[v][lane] = (float)sqrt(d2);
+    }
+    if (job->band_mm < INFINITY)
+        v8_store(x->distance[v], v8_min(v8_load(x->distance[v]), v8_all((float)job->band_mm)));
+}
+
+/* Sets the voxels of a vector outside the band. */
+static void vector_fill_far(const sdm_grid_job *job, int v, voxels *x)
+{
+    for (int i = 0; i < 8; i++) {
+        x->distance[v][i] = (float)job->band_mm;
+        x->number[v][i] = SDM_NONE;
     }
 }
 
-/* Computes x->d2 of all voxels, the squared distances to the features x->number. */
-static void tile_measure(const tile *t, voxels *x)
-{
-    const double(*at)[64] = t->job->tile_voxel;
-    const double *c = t->corner;
-    uint32_t number[64];
-    for (int i = 0; i < 64; i++) number[i] = x->number[i] == SDM_NONE ? 0 : x->number[i];
-    for (int i = 0; i < 64; i += 4)
-        distances4(t->job->features->exact, &number[i], v4_add(v4_all(c[0]), v4_load(&at[0][i])),
-                   v4_add(v4_all(c[1]), v4_load(&at[1][i])),
-                   v4_add(v4_all(c[2]), v4_load(&at[2][i])), &x->d2[i]);
-    for (int i = 0; i < x->n_settled; i++) x->d2[x->settled[i]] = x->settled_d2[i];
-}
-
-/* Sets x->number and x->d2 of a tile that has no candidates, by searches of the tree. */
+/* Sets the voxels of a tile without candidates: by searches of the tree. */
 static void tile_search(const tile *t, voxels *x)
 {
-    for (unsigned i = 0; i < 64; i++) {
-        double p[3];
-        voxel_position(t, i, p);
-        x->number[i] = nearest_in_tree(t, p, &x->d2[i]);
-    }
+    for (int v = 0; v < 8; v++)
+        for (int i = 0; i < 8; i++) {
+            double p[3], d2;
+            voxel_position(t, v, i, p);
+            x->number[v][i] = nearest_in_tree(t, p, &d2);
+            x->distance[v][i] = (float)sqrt(d2);
+        }
 }
 
 /* Writes n values of a row of voxels that begins at `at` to the blocks that contain them. */
@@ -167,42 +153,10 @@ static void row_write_blocks(const sdm_blocks *b, const int64_t at[3], int64_t n
     }
 }
 
-/* Writes the first size[3] voxels of a tile if all of them are in one block; false if not. */
-static bool tile_store_block(const tile *t, const int64_t size[3], const float d[64])
-{
-    const sdm_blocks *b = t->job->blocks;
-    const int64_t *whole = t->job->part[SDM_TILES].size;
-    int64_t at[3];
-    for (int a = 0; a < 3; a++) {
-        at[a] = t->first[a] % SDM_BLOCK_SIZE;
-        if (at[a] + size[a] > SDM_BLOCK_SIZE) return false;
-    }
-    const uint32_t number =
-        b->tile[(t->first[2] / SDM_BLOCK_SIZE * b->n[1] + t->first[1] / SDM_BLOCK_SIZE) * b->n[0] +
-                t->first[0] / SDM_BLOCK_SIZE];
-    if (number >= SDM_TILE_INSIDE) return true;
-    for (int64_t z = 0; z < size[2]; z++) {
-        for (int64_t y = 0; y < size[1]; y++) {
-            float *to =
-                &b->values[number]
-                          [((at[2] + z) * SDM_BLOCK_SIZE + at[1] + y) * SDM_BLOCK_SIZE + at[0]];
-            const float *from = &d[(z * whole[1] + y) * whole[0]];
-            if (size[0] == 4) // the usual size: a constant lets the compiler inline memcpy
-                memcpy(to, from, 4 * sizeof *d);
-            else
-                memcpy(to, from, (size_t)size[0] * sizeof *d);
-        }
-    }
-    return true;
-}
-
-/* Writes the first size[3] voxels of a tile to the blocks that contain them. A function of its own:
-   inlined, it would slow whole maps down. */
-static __attribute__((noinline)) void tile_store_blocks(const tile *t, const int64_t size[3],
-                                                        const float d[64])
+/* Writes the first size[3] voxels of a tile to the blocks that contain them. */
+static void tile_store_blocks(const tile *t, const int64_t size[3], const float d[64])
 {
     const int64_t *whole = t->job->part[SDM_TILES].size;
-    if (tile_store_block(t, size, d)) return;
     for (int64_t z = 0; z < size[2]; z++)
         for (int64_t y = 0; y < size[1]; y++) {
             const int64_t at[3] = {t->first[0], t->first[1] + y, t->first[2] + z};
@@ -210,13 +164,25 @@ static __attribute__((noinline)) void tile_store_blocks(const tile *t, const int
         }
 }
 
-/* Writes distances (mm) and, if wanted, slots of the voxels of a tile that are inside the grid. */
-static inline void tile_store(const tile *t, const float d[64], const uint32_t slot[64])
+/* Writes the voxels of a tile that are inside the grid row by row, and their slots if wanted. */
+static __attribute__((noinline)) void tile_store_rows(const tile *t, const voxels *x)
 {
     const sdm_grid_job *job = t->job;
     const int64_t *whole = job->part[SDM_TILES].size;
-    // row by row, cut off at the end of the grid
+    float d[64];
+    uint32_t slot[64];
     int64_t size[3];
+    const bool banded = job->band_mm < INFINITY;
+    for (int v = 0; v < 8; v++) {
+        if (!(t->vectors >> v & 1)) continue;
+        for (int i = 0; i < 8; i++) {
+            const unsigned at = job->voxel_in_tile[v][i];
+            d[at] = x->distance[v][i];
+            if (!job->slot) continue;
+            const bool far = banded && !(d[at] < (float)job->band_mm);
+            slot[at] = far ? SDM_NONE : job->features->owner[x->number[v][i]];
+        }
+    }
     for (int a = 0; a < 3; a++)
         size[a] = job->n[a] - t->first[a] < whole[a] ? job->n[a] - t->first[a] : whole[a];
     if (job->blocks) {
@@ -228,40 +194,41 @@ static inline void tile_store(const tile *t, const float d[64], const uint32_t s
             const int64_t to =
                 ((t->first[2] + z) * job->n[1] + t->first[1] + y) * job->n[0] + t->first[0];
             const int64_t from = (z * whole[1] + y) * whole[0];
-            if (size[0] == 4) // the usual size: a constant lets the compiler inline memcpy
-                memcpy(&job->values[to], &d[from], 4 * sizeof *d);
-            else
-                memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);
+            memcpy(&job->values[to], &d[from], (size_t)size[0] * sizeof *d);
             if (job->slot) memcpy(&job->slot[to], &slot[from], (size_t)size[0] * sizeof *slot);
         }
 }
 
-/* Writes a tile whose voxels all lie outside the band. */
-static __attribute__((noinline)) void tile_write_far(const tile *t)
-{
-    float d[64];
-    uint32_t slot[64];
-    for (int i = 0; i < 64; i++) {
-        d[i] = (float)t->job->band_mm;
-        slot[i] = SDM_NONE;
-    }
-    tile_store(t, d, slot);
-}
-
-/* Writes the distances and the slots of a tile. */
-static void tile_write(const tile *t, voxels *x)
+/* Where tile_store() may write the value of the first voxel of a tile, and those of the others by
+   sdm_grid_job.voxel_store; NULL: the tile is cut off by the end of the grid or of a block, its
+   block is not wanted, slots are wanted, or its values do not lie in pairs. */
+static inline float *tile_target(const tile *t)
 {
     const sdm_grid_job *job = t->job;
-    float d[64];
-    for (int i = 0; i < 64; i++) d[i] = (float)sqrt(x->d2[i]);
-    // from features to triangles
-    for (int i = 0; i < 64 && job->slot; i++)
-        x->number[i] = x->number[i] == SDM_NONE ? SDM_NONE : job->features->owner[x->number[i]];
-    if (job->band_mm < INFINITY)
-        for (int i = 0; i < 64; i++) {
-            if (d[i] < (float)job->band_mm) continue;
-            d[i] = (float)job->band_mm;
-            x->number[i] = SDM_NONE;
-        }
-    tile_store(t, d, x->number);
+    const sdm_blocks *b = job->blocks;
+    const int64_t *first = t->first, s = SDM_BLOCK_SIZE;
+    if (!job->paired || job->slot) return NULL;
+    for (int a = 0; a < 3; a++) {
+        const int64_t end = first[a] + job->part[SDM_TILES].size[a];
+        if (end > job->n[a]) return NULL;
+        if (b && first[a] % s > s - job->part[SDM_TILES].size[a]) return NULL;
+    }
+    if (!b) return &job->values[(first[2] * job->n[1] + first[1]) * job->n[0] + first[0]];
+    const uint32_t number =
+        b->tile[(first[2] / s * b->n[1] + first[1] / s) * b->n[0] + first[0] / s];
+    if (number >= SDM_TILE_INSIDE) return NULL;
+    return &b->values[number][(first[2] % s * s + first[1] % s) * s + first[0] % s];
+}
+
+/* Writes the voxels of a tile that are inside the grid. */
+static inline void tile_store(const tile *t, const voxels *x)
+{
+    float *to = tile_target(t);
+    if (!to) {
+        tile_store_rows(t, x);
+        return;
+    }
+    for (int v = 0; v < 8; v++)
+        for (int i = 0; i < 8; i += 2)
+            memcpy(&to[t->job->voxel_store[v][i]], &x->distance[v][i], 2 * sizeof(float));
 }

@@ -105,13 +105,15 @@ double sdm_frame_distance2(const sdm_frame *f, const double p[3])
     const position s = locate(f, p);
     double d[3], beyond[3];
     for (int k = 0; k < 3; k++) {
-        beyond[k] = fmax(fabs(s.t[k]) - f->half[k], 0);
+        const double t = fabs(s.t[k]) - f->half[k];
+        beyond[k] = t > 0 ? t : 0;
         d[k] = beyond[k] * beyond[k] + s.h[k] * s.h[k];
     }
     // p projects into the face when it lies inside all three edge lines. beyond[0] is then 0,
     // except for needles, whose edge lines nearly coincide far beyond the ends of the longest edge.
     if (s.h[0] < 0 && s.h[1] < 0 && s.h[2] < 0) return beyond[0] * beyond[0] + s.z * s.z;
-    return fmin(fmin(d[0], d[1]), d[2]) + s.z * s.z;
+    const double least = d[0] < d[1] ? d[0] : d[1];
+    return (least < d[2] ? least : d[2]) + s.z * s.z;
 }
 
 double sdm_frame_closest(const sdm_frame *f, const double p[3], double q[3], int *feature)

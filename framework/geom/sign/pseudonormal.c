@@ -11,11 +11,9 @@ static void pseudonormals_add(const sdm_mesh *m, const sdm_topology *topo, sdm_p
                               size_t t)
 {
     const double *v[3];
-    double ab[3], ac[3], n[3];
+    double n[3];
     for (size_t k = 0; k < 3; k++) v[k] = &m->vert[3 * (size_t)m->tri[3 * t + k]];
-    v3_sub(v[1], v[0], ab);
-    v3_sub(v[2], v[0], ac);
-    v3_cross(ab, ac, n);
+    v3_triangle_normal(v[0], v[1], v[2], n);
     const double len = v3_norm(n);
     if (!(len > 0)) return; // a triangle without area has no normal and adds nothing
     for (int i = 0; i < 3; i++) p->face[t][i] = n[i] / len;

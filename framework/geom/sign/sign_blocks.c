@@ -1,4 +1,6 @@
 /* Signs of a narrow-band map in blocks, from the crossings of rows of voxels. */
+#include <string.h>
+
 #include "sign_rows.h"
 
 #include "sign.h"
@@ -7,6 +9,18 @@ typedef struct blocks_job {
     const sdm_rows *rows;
     sdm_blocks *blocks;
 } blocks_job;
+
+/* Negates the elements begin ... end - 1 of a row of a block, which may lie outside of it. Without
+   branches, because the lengths are unpredictable. */
+static void values_flip(float row[SDM_BLOCK_SIZE], int64_t begin, int64_t end)
+{
+    uint32_t bits[SDM_BLOCK_SIZE];
+    const int32_t from = begin > 0 ? (int32_t)begin : 0,
+                  to = end < SDM_BLOCK_SIZE ? (int32_t)end : SDM_BLOCK_SIZE;
+    memcpy(bits, row, sizeof bits);
+    for (int32_t i = 0; i < SDM_BLOCK_SIZE; i++) bits[i] ^= i >= from && i < to ? 0x80000000u : 0;
+    memcpy(row, bits, sizeof bits);
+}
 
 /* Signs of the voxels of one row, of the tiles from tile[0] on: negates values of blocks; where
    `corner` is set, the row is the first one of its tiles and sets the signs of those without
@@ -19,14 +33,11 @@ static void row_flip(const blocks_job *job, size_t row, uint32_t *tile, int64_t 
         if (u.winding < 1) continue;
         for (int64_t i = u.begin / SDM_BLOCK_SIZE; i * SDM_BLOCK_SIZE < u.end; i++) {
             const int64_t first = i * SDM_BLOCK_SIZE;
-            int64_t begin, end;
             if (tile[i] >= SDM_TILE_INSIDE) {
                 if (corner && first >= u.begin) tile[i] = SDM_TILE_INSIDE;
                 continue;
             }
-            sdm_row_span_clip(&u, first, first + SDM_BLOCK_SIZE, &begin, &end);
-            float *values = &b->values[tile[i]][in_block];
-            for (int64_t at = begin - first; at < end - first; at++) values[at] = -values[at];
+            values_flip(&b->values[tile[i]][in_block], u.begin - first, u.end - first);
         }
     }
 }

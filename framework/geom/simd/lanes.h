@@ -5,6 +5,7 @@
 #pragma once
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
 #if defined(__AVX2__) && defined(__FMA__)
@@ -75,6 +76,12 @@ static inline v8i v8_if_less(v8f a, v8f b, v8i x, v8i y)
         (__m256i)y, (__m256i)x,
         _mm256_castps_si256(_mm256_cmp_ps((__m256)a, (__m256)b, _CMP_LT_OQ)));
 }
+/* Are all lanes equal? */
+static inline bool v8_uniform(v8i a)
+{
+    const __m256i first = _mm256_broadcastd_epi32(_mm256_castsi256_si128((__m256i)a));
+    return _mm256_movemask_epi8(_mm256_cmpeq_epi32((__m256i)a, first)) == -1;
+}
 /* out[i] = a[order[i]] for i = 0 to 7; order[] must be aligned to 16 bytes. */
 static inline void v8_permute(uint32_t *out, v8i a, const uint16_t *order)
 {
@@ -89,6 +96,8 @@ static inline void v4_store(double *p, v4d x) { *(v4d *)(void *)p = x; }
 static inline v4d v4_add(v4d a, v4d b) { return a + b; }
 static inline v4d v4_sub(v4d a, v4d b) { return a - b; }
 static inline v4d v4_mul(v4d a, v4d b) { return a * b; }
+static inline v4d v4_sqrt(v4d a) { return (v4d)_mm256_sqrt_pd((__m256d)a); }
+static inline v4d v4_abs(v4d a) { return (v4d)_mm256_andnot_pd(_mm256_set1_pd(-0.0), (__m256d)a); }
 /* x where m < 0, else y; m must not be -0 or NaN */
 static inline v4d v4_if_negative(v4d m, v4d x, v4d y)
 {

@@ -130,6 +130,12 @@ static inline v8i v8_if_less(v8f a, v8f b, v8i x, v8i y)
     return (v8i){(v4i)v4f_select(a.low < b.low, (v4f)x.low, (v4f)y.low),
                  (v4i)v4f_select(a.high < b.high, (v4f)x.high, (v4f)y.high)};
 }
+static inline bool v8_uniform(v8i a)
+{
+    const int32_t x = a.low[0];
+    const v4i first = {x, x, x, x};
+    return v4i_bits((v4i)(a.low == first) & (v4i)(a.high == first)) == 0xf;
+}
 static inline void v8_permute(uint32_t *out, v8i a, const uint16_t *order)
 {
     uint32_t from[8];
@@ -151,6 +157,12 @@ static inline void v4_store(double *p, v4d x)
 static inline v4d v4_add(v4d a, v4d b) { return (v4d){a.low + b.low, a.high + b.high}; }
 static inline v4d v4_sub(v4d a, v4d b) { return (v4d){a.low - b.low, a.high - b.high}; }
 static inline v4d v4_mul(v4d a, v4d b) { return (v4d){a.low * b.low, a.high * b.high}; }
+static inline v2d v2d_sqrt(v2d a) { return (v2d){sqrt(a[0]), sqrt(a[1])}; }
+static inline v4d v4_sqrt(v4d a) { return (v4d){v2d_sqrt(a.low), v2d_sqrt(a.high)}; }
+static inline v4d v4_abs(v4d a)
+{
+    return (v4d){(v2d)((v2l)a.low & INT64_MAX), (v2d)((v2l)a.high & INT64_MAX)};
+}
 static inline v2d v2d_if_negative(v2d m, v2d x, v2d y)
 {
     const v2l set = m < 0; // m is never -0 or NaN, see v4_if_negative()

@@ -66,11 +66,9 @@ static void add_triangle(const sdm_mesh *m, size_t t, const double apex[3], doub
     const double *a = m->vert + 3 * (size_t)m->tri[3 * t],
                  *b = m->vert + 3 * (size_t)m->tri[3 * t + 1],
                  *c = m->vert + 3 * (size_t)m->tri[3 * t + 2];
-    double u[3], v[3], w[3], n[3];
-    v3_sub(b, a, u);
-    v3_sub(c, a, v);
+    double w[3], n[3];
     v3_sub(a, apex, w);
-    v3_cross(u, v, n);
+    v3_triangle_normal(a, b, c, n);
     *area += 0.5 * v3_norm(n);
     *volume += v3_dot(w, n) / 6;
 }

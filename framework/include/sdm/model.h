@@ -54,6 +54,7 @@ typedef struct sdm_model_info {
     double macs;        /* number of multiply-adds for one map */
     const char *config; /* configuration of the training with all defaults filled in, YAML */
     const char *folder; /* folder of the file with a final '/'; NULL: opened from memory */
+    size_t fine_width;  /* units of a layer of the fine level (sdm/field.h); 0: none */
 } sdm_model_info;
 
 /* Immutable after opening: any number of threads may use one model at the same time. */

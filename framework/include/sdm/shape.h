@@ -137,6 +137,11 @@ typedef struct sdm_shape {
      * finite mean and a deviation above 0 with a probability of at least 1e-9 of lying in the range
      * of the parameter. */
     void (*distributions)(const void *self, sdm_distribution *out);
+
+    /* Optional: the name of an option of the type CHOICE with two choices, each of which gives the
+     * mirror image of the other at the same parameters ("ear" of "left|right"). A fit tries both.
+     * NULL: the shape states none. */
+    const char *mirror;
 } sdm_shape;
 
 /* The only symbol that the shared object of a plug-in exports: returns shape `index`, NULL beyond

@@ -68,6 +68,11 @@ typedef struct sdm_volume {
     size_t n_segments;
     /* the one-line description in the file, "" when it has none */
     char text[256];
+    /* NIfTI files with two frames, sform and qform: largest distance (mm) between the two places of
+     * a voxel; 0: they agree to rounding, or there is one. sform is in use */
+    double frames_differ_mm;
+    /* true: one of the two frames is a mirror image of the other */
+    bool frames_mirrored;
 } sdm_volume;
 
 /* Reads one three-dimensional image of one channel, in either byte order. The ending of `path`

@@ -163,9 +163,40 @@ static sdm_status use_qform(const nifti *f, sdm_image_header *h, sdm_error *err)
     return SDM_OK;
 }
 
+static double determinant(const double s[9])
+{
+    return s[0] * (s[4] * s[8] - s[5] * s[7]) - s[1] * (s[3] * s[8] - s[5] * s[6]) +
+           s[2] * (s[3] * s[7] - s[4] * s[6]);
+}
+
+/* Compares sform with qform at the corners of the image. Differences of a hundredth of a voxel are
+ * rounding: both are single precision. A damaged qform, which is not in use, is ignored. */
+static void compare_frames(const nifti *f, const sdm_image_header *h, double mm, sdm_volume *v)
+{
+    sdm_image_header s = *h, q = *h;
+    double most = 0, voxel = 0;
+    use_sform(f, &s);
+    if (use_qform(f, &q, NULL)) return;
+    for (int corner = 0; corner < 8; corner++) {
+        double square = 0;
+        for (size_t row = 0; row < 3; row++) {
+            double d = s.origin[row] - q.origin[row];
+            for (size_t a = 0; a < 3; a++)
+                d += (corner >> a & 1) * (double)(h->n[a] - 1) *
+                     (s.step[3 * row + a] - q.step[3 * row + a]);
+            square += d * d;
+        }
+        most = fmax(most, sqrt(square));
+    }
+    for (size_t i = 0; i < 9; i++) voxel = fmax(voxel, fabs(s.step[i]));
+    if (most > 0.01 * voxel) v->frames_differ_mm = most * mm;
+    v->frames_mirrored = determinant(s.step) * determinant(q.step) < 0;
+}
+
 /* Reads the frame from sform, else qform, else the voxel sizes alone (methods 3, 2 and 1 of
- * nifti1.h), and converts it from RAS to LPS and to mm. *placed: the file has sform or qform. */
-static sdm_status read_frame(const nifti *f, sdm_image_header *h, bool *placed, sdm_error *err)
+ * nifti1.h), and converts it from RAS to LPS and to mm. Sets v->placed and what v holds about two
+ * frames. */
+static sdm_status read_frame(const nifti *f, sdm_image_header *h, sdm_volume *v, sdm_error *err)
 {
     const bool sform = code_at(f, 254, 348) > 0, qform = code_at(f, 252, 344) > 0;
     for (size_t a = 0; a < 3 && !sform; a++) {
@@ -183,12 +214,13 @@ static sdm_status read_frame(const nifti *f, sdm_image_header *h, bool *placed, 
         s = use_qform(f, h, err);
     const int unit = (f->two ? (int)sdm_get_uint(f->bytes + 500, 4, f->big) : f->bytes[123]) & 7;
     const double mm = unit == UNIT_M ? 1000 : unit == UNIT_UM ? 1e-3 : 1;
+    if (sform && qform) compare_frames(f, h, mm, v);
     for (int row = 0; row < 3; row++) {
         const double sign = row < 2 ? -mm : mm;
         for (int a = 0; a < 3; a++) h->step[3 * row + a] *= sign;
         h->origin[row] *= sign;
     }
-    *placed = sform || qform;
+    v->placed = sform || qform;
     return s;
 }
 
@@ -200,7 +232,7 @@ sdm_status sdm_nifti_read(sdm_stream *in, sdm_image_header *h, sdm_volume *v, sd
     if (!s) s = read_sizes(&f, h->n, err);
     if (!s) s = read_type(&f, h, err);
     if (!s) s = read_scale(&f, h, err);
-    if (!s) s = read_frame(&f, h, &v->placed, err);
+    if (!s) s = read_frame(&f, h, v, err);
     if (s) return s;
     char text[81] = {0};
     memcpy(text, f.bytes + (f.two ? 240 : 148), 80);

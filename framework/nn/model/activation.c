@@ -48,6 +48,15 @@ static void leaky_relu(size_t n, const float *x, float *y, float *dy)
     }
 }
 
+static void algebraic(size_t n, const float *x, float *y, float *dy)
+{
+    for (size_t i = 0; i < n; i++) {
+        const float v = x[i], r = 1 / sqrtf(1 + v * v), s = v * r;
+        y[i] = 0.5f * (v + v * s);
+        if (dy) dy[i] = 0.5f * ((1 + s) + s * (r * r));
+    }
+}
+
 void sdm_activate(int kind, size_t n, const float *x, float *y, float *dy)
 {
     if (kind == 0)
@@ -56,6 +65,8 @@ void sdm_activate(int kind, size_t n, const float *x, float *y, float *dy)
         hyperbolic_tangent(n, x, y, dy);
     else if (kind == 2)
         relu(n, x, y, dy);
-    else
+    else if (kind == 3)
         leaky_relu(n, x, y, dy);
+    else
+        algebraic(n, x, y, dy);
 }

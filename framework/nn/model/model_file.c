@@ -74,16 +74,62 @@ const sdm_section *sdm_section_find(const sdm_section *sections, size_t n, const
     return NULL;
 }
 
-const void *sdm_model_weights(sdm_model *m, const sdm_section *sections, size_t n, const char *name,
-                              size_t size, sdm_error *err)
+/* Index of the first number that is NaN or infinite: the bits of its exponent are all set. `count`:
+ * none is. */
+#define FIRST_NOT_FINITE(NAME, TYPE, EXPONENT)                                                     \
+    static size_t NAME(const TYPE *bits, size_t count)                                             \
+    {                                                                                              \
+        for (size_t at = 0; at < count;) {                                                         \
+            const size_t end = count - at > 1024 ? at + 1024 : count;                              \
+            size_t found = 0;                                                                      \
+            for (size_t i = at; i < end; i++) found += (bits[i] & (EXPONENT)) == (EXPONENT);       \
+            while (found && (bits[at] & (EXPONENT)) != (EXPONENT)) at++;                           \
+            if (found) return at;                                                                  \
+            at = end;                                                                              \
+        }                                                                                          \
+        return count;                                                                              \
+    }
+FIRST_NOT_FINITE(first_not_finite_16, uint16_t, UINT16_C(0x7c00))
+FIRST_NOT_FINITE(first_not_finite_32, uint32_t, UINT32_C(0x7f800000))
+FIRST_NOT_FINITE(first_not_finite_64, uint64_t, UINT64_C(0x7ff0000000000000))
+
+static size_t first_not_finite(const void *data, sdm_number type, size_t count)
 {
+    switch (type) {
+    case SDM_NUMBER_FLOAT16:
+        return first_not_finite_16(data, count);
+    case SDM_NUMBER_FLOAT32:
+        return first_not_finite_32(data, count);
+    case SDM_NUMBER_FLOAT64:
+        return first_not_finite_64(data, count);
+    default:
+        return count;
+    }
+}
+
+const void *sdm_model_weights(sdm_model *m, const sdm_section *sections, size_t n, const char *name,
+                              sdm_number type, uint64_t count, sdm_error *err)
+{
+    static const size_t bytes[] = {[SDM_NUMBER_BYTE] = 1,
+                                   [SDM_NUMBER_INT32] = 4,
+                                   [SDM_NUMBER_FLOAT16] = 2,
+                                   [SDM_NUMBER_FLOAT32] = 4,
+                                   [SDM_NUMBER_FLOAT64] = 8};
     const sdm_section *s = sdm_section_find(sections, n, name);
-    if (!s)
+    if (!s) {
         sdm_fail(err, SDM_E_FORMAT, "damaged: it has no section '%s'", name);
-    else if (s->size != size)
-        sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' has %zu bytes, need %zu", name, s->size,
-                 size);
-    if (!s || s->size != size) return NULL;
-    m->info.weight_bytes += size;
+        return NULL;
+    }
+    if (s->size % bytes[type] || s->size / bytes[type] != count) {
+        sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' has %zu bytes, need %llu numbers of %zu",
+                 name, s->size, (unsigned long long)count, bytes[type]);
+        return NULL;
+    }
+    const size_t bad = first_not_finite(s->data, type, (size_t)count);
+    if (bad < count) {
+        sdm_fail(err, SDM_E_FORMAT, "damaged: number %zu of section '%s' is not finite", bad, name);
+        return NULL;
+    }
+    m->info.weight_bytes += s->size;
     return s->data;
 }

@@ -6,6 +6,7 @@
 #include "model_text.h"
 #include "onnx/onnx.h"
 #include "sdm/internal/container.h"
+#include "sdm/internal/fine.h"
 #include "sdm/model.h"
 
 typedef struct sdm_model_kind {
@@ -52,13 +53,27 @@ struct sdm_model {
     uint8_t *file; /* the whole file; weights point into it */
     const sdm_model_kind *kind;
     void *network; /* a struct whose type depends on the kind */
+    sdm_fine fine; /* width 0: none */
 };
 
-/* Returns the data (64-byte aligned) of the section `name` and adds `size` to
-   m->info.weight_bytes. NULL, with SDM_E_FORMAT in *err, if the section is missing or does not have
-   `size` bytes. */
+/* Type of the numbers in a section of weights. */
+typedef enum sdm_number {
+    SDM_NUMBER_BYTE,
+    SDM_NUMBER_INT32, /* signed or unsigned */
+    SDM_NUMBER_FLOAT16,
+    SDM_NUMBER_FLOAT32,
+    SDM_NUMBER_FLOAT64
+} sdm_number;
+
+/* Returns the data (64-byte aligned) of the section `name`, `count` numbers of this type, and adds
+   their bytes to m->info.weight_bytes. NULL, with SDM_E_FORMAT in *err, if the section is missing,
+   has another size, or holds a floating-point number that is not finite. */
 const void *sdm_model_weights(sdm_model *m, const sdm_section *sections, size_t n, const char *name,
-                              size_t size, sdm_error *err);
+                              sdm_number type, uint64_t count, sdm_error *err);
+
+/* Reads the section of the fine level, if there is one, into m->fine; its weights point into the
+   file. SDM_E_FORMAT. */
+sdm_status sdm_fine_open(sdm_model *m, const sdm_section *sections, size_t n, sdm_error *err);
 
 /* The section `name` among sections[n], or NULL. */
 const sdm_section *sdm_section_find(const sdm_section *sections, size_t n, const char *name);

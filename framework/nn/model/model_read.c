@@ -165,6 +165,7 @@ sdm_status sdm_model_read(uint8_t *bytes, size_t size, const sdm_model_kind *con
     if (!s) m->config = copy_text(config->data, config->size, err, &s);
     m->info.config = m->config;
     if (!s) s = m->kind->open(m, &lines, sections, n, err);
+    if (!s) s = sdm_fine_open(m, sections, n, err);
     if (s)
         sdm_model_free(m);
     else

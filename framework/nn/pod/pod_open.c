@@ -123,17 +123,16 @@ static sdm_status read_integer_tables(const sdm_section *sections, size_t n, sdm
     const sdm_pod_arch *a = &m->arch;
     const size_t n_blocks = a->levels.first[a->levels.n];
     const uint8_t *wide =
-        sdm_model_weights(model, sections, n, "pod.wide", (n_blocks + 1) * 4, err);
+        sdm_model_weights(model, sections, n, "pod.wide", SDM_NUMBER_INT32, n_blocks + 1, err);
     if (!wide) return SDM_E_FORMAT;
     m->order =
-        sdm_model_weights(model, sections, n, "pod.order", a->n_latent * sizeof *m->order, err);
+        sdm_model_weights(model, sections, n, "pod.order", SDM_NUMBER_INT32, a->n_latent, err);
     if (!m->order) return SDM_E_FORMAT;
-    m->factor =
-        sdm_model_weights(model, sections, n, "pod.factor",
-                          (m->coefficients_at[a->levels.n] + a->n_latent) * sizeof *m->factor, err);
+    m->factor = sdm_model_weights(model, sections, n, "pod.factor", SDM_NUMBER_FLOAT32,
+                                  m->coefficients_at[a->levels.n] + a->n_latent, err);
     if (!m->factor) return SDM_E_FORMAT;
     m->quantum =
-        sdm_model_weights(model, sections, n, "pod.quantum", n_blocks * sizeof *m->quantum, err);
+        sdm_model_weights(model, sections, n, "pod.quantum", SDM_NUMBER_FLOAT32, n_blocks, err);
     if (!m->quantum) return SDM_E_FORMAT;
 
     // memory
@@ -151,7 +150,8 @@ static sdm_status read_integer_tables(const sdm_section *sections, size_t n, sdm
 
     // limits, scales of the MLP
     const size_t n_limits = a->levels.n + 1 + a->depth;
-    const uint8_t *limits = sdm_model_weights(model, sections, n, "pod.limit", n_limits * 4, err);
+    const uint8_t *limits =
+        sdm_model_weights(model, sections, n, "pod.limit", SDM_NUMBER_INT32, n_limits, err);
     if (!limits) return SDM_E_FORMAT;
     for (size_t i = 0; i < n_limits; i++) {
         const uint32_t limit = read_u32(limits + 4 * i);
@@ -160,7 +160,7 @@ static sdm_status read_integer_tables(const sdm_section *sections, size_t n, sdm
         *(i <= a->levels.n ? &m->limit[i] : &m->layer_limit[i - a->levels.n - 1]) = (int)limit;
     }
     const float *scale = sdm_model_weights(model, sections, n, "pod.layer_scale",
-                                           a->depth * a->width * sizeof *scale, err);
+                                           SDM_NUMBER_FLOAT32, a->depth * a->width, err);
     if (!scale) return SDM_E_FORMAT;
     for (size_t l = 0; l < a->depth; l++) m->layer_scale[l] = scale + l * a->width;
 
@@ -194,24 +194,29 @@ static sdm_status bind_weights(const sdm_section *sections, size_t n, sdm_model 
         if (s) return s;
     }
 
-    // sections and their sizes
+    // sections, types and counts
+    static const sdm_number number_of[] = {[SDM_POD_F32] = SDM_NUMBER_FLOAT32,
+                                           [SDM_POD_F16] = SDM_NUMBER_FLOAT16,
+                                           [SDM_POD_I8] = SDM_NUMBER_BYTE};
+    const sdm_number type = number_of[m->type];
     const struct {
         const char *name;
-        size_t size;
+        sdm_number type;
+        size_t count;
     } need[] = {
-        {"pod.mlp", sdm_pod_count_mlp(m->type, a) * weight},
-        {"pod.head",
-         sdm_pod_count_weights(m->type, a->n_coefficients, sdm_pod_head_wide(m), a->n_latent) *
-             weight},
-        {"pod.basis", sdm_pod_place_weights(m->type, &a->levels, m->blocks, m->slabs, m->n_slabs,
-                                            m->leaves, m->wide, m->weights_at) *
-                          weight},
-        {"pod.mean", sdm_pod_mean_count(&a->levels, m->blocks) * sizeof(float)},
-        {"pod.bias", a->depth * a->width * sizeof(float)},
+        {"pod.mlp", type, sdm_pod_count_mlp(m->type, a)},
+        {"pod.head", type,
+         sdm_pod_count_weights(m->type, a->n_coefficients, sdm_pod_head_wide(m), a->n_latent)},
+        {"pod.basis", type,
+         sdm_pod_place_weights(m->type, &a->levels, m->blocks, m->slabs, m->n_slabs, m->leaves,
+                               m->wide, m->weights_at)},
+        {"pod.mean", SDM_NUMBER_FLOAT32, sdm_pod_mean_count(&a->levels, m->blocks)},
+        {"pod.bias", SDM_NUMBER_FLOAT32, a->depth * a->width},
     };
     const void *data[5];
     for (int i = 0; i < 5; i++) {
-        data[i] = sdm_model_weights(model, sections, n, need[i].name, need[i].size, err);
+        data[i] =
+            sdm_model_weights(model, sections, n, need[i].name, need[i].type, need[i].count, err);
         if (!data[i]) return SDM_E_FORMAT;
     }
 

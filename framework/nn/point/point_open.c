@@ -47,10 +47,10 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
     const size_t hidden = sdm_point_hidden_count(a, k->hidden_at),
                  inputs = sdm_point_input_count(a, input_at);
     k->hidden = sdm_model_weights(m, sections, n, "point.hidden",
-                                  hidden * (k->half ? sizeof(uint16_t) : sizeof(float)), err);
+                                  k->half ? SDM_NUMBER_FLOAT16 : SDM_NUMBER_FLOAT32, hidden, err);
     if (!k->hidden) return SDM_E_FORMAT;
     const float *input =
-        sdm_model_weights(m, sections, n, "point.input", inputs * sizeof *input, err);
+        sdm_model_weights(m, sections, n, "point.input", SDM_NUMBER_FLOAT32, inputs, err);
     if (!input) return SDM_E_FORMAT;
     for (size_t l = 0; l < a->depth; l++) {
         k->bias[l] = input + input_at[l];

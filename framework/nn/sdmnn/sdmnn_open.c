@@ -36,15 +36,14 @@ static sdm_status open_network(sdm_model *m, sdm_lines *lines, const sdm_section
 
     // sections
     const sdmnn_plan *p = &k->plan;
-    const size_t weight = half ? sizeof(uint16_t) : sizeof(float);
-    const float *dense = sdm_model_weights(m, sections, n, "sdmnn.dense",
-                                           sdm_sdmnn_dense_floats(p) * sizeof(float), err);
+    const sdm_number weight = half ? SDM_NUMBER_FLOAT16 : SDM_NUMBER_FLOAT32;
+    const float *dense = sdm_model_weights(m, sections, n, "sdmnn.dense", SDM_NUMBER_FLOAT32,
+                                           sdm_sdmnn_dense_floats(p), err);
     if (!dense) return SDM_E_FORMAT;
-    k->volume = sdm_model_weights(m, sections, n, "sdmnn.volume",
-                                  sdm_panel_count(p->cells, arch.width) * weight, err);
+    k->volume = sdm_model_weights(m, sections, n, "sdmnn.volume", weight,
+                                  sdm_panel_count(p->cells, arch.width), err);
     if (!k->volume) return SDM_E_FORMAT;
-    k->conv =
-        sdm_model_weights(m, sections, n, "sdmnn.conv", sdm_sdmnn_conv_count(p) * weight, err);
+    k->conv = sdm_model_weights(m, sections, n, "sdmnn.conv", weight, sdm_sdmnn_conv_count(p), err);
     if (!k->conv) return SDM_E_FORMAT;
 
     // parts of the section sdmnn.dense

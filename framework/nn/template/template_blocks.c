@@ -21,46 +21,22 @@ static double block_radius(const sdm_grid *grid)
 // The interpolation may change a distance by this much, mm.
 static double cull_slack(const template_work *w) { return 0.1 * w->grid->spacing[0]; }
 
-/* Corners. */
-
-static size_t corner_at(const template_work *w, size_t c, const template_block *b)
-{
-    const size_t *n = w->blocks;
-    return ((c * (n[2] + 1) + b->at[2]) * (n[1] + 1) + b->at[1]) * (n[0] + 1) + b->at[0];
-}
-
-// Corner i of a block, i = 0 .. 7, relative to the first one.
-static size_t corner_step(const template_work *w, size_t i)
-{
-    const size_t line = w->blocks[0] + 1;
-    return (i & 1) + (i >> 1 & 1) * line + (i >> 2) * line * (w->blocks[1] + 1);
-}
-
-// True if part c is to be interpolated in a block: rigid parts unless the block lies within the
-// lattice `near`, parts with a warp if all corners lie beyond one of its sides.
-static bool is_far(const template_work *w, size_t c, const template_block *b)
-{
-    if (w->part[c].rigid) return sdm_template_place(w, c, b) != TEMPLATE_WITHIN;
-    if (!w->part[c].warped) return false;
-    unsigned side = UINT8_MAX;
-    for (size_t i = 0; i < 8; i++) side &= w->side[corner_at(w, c, b) + corner_step(w, i)];
-    return side != 0;
-}
-
-// value[64] = the distance to part c in a block, from the corners. false: one of them is not known.
-static bool interpolate(const template_work *w, size_t c, const template_block *b, float *value)
-{
-    const size_t line = 4 * (w->blocks[0] + 1), plane = line * (w->blocks[1] + 1);
-    sdm_template_kernels()->block(w->corner + 4 * corner_at(w, c, b), line, plane, value);
-    return !isnan(value[0]); // every value is a sum with terms of all corners
-}
-
 // value[64] = the distance to part c in a block; value may be row.value.
 static void part_values(template_work *w, size_t c, const template_block *b, float *value)
 {
-    if (is_far(w, c, b) && interpolate(w, c, b, value)) return;
+    float far[VOXELS];
+    const float share = sdm_template_far(w, c, b, far);
+    if (share == 1) {
+        memcpy(value, far, sizeof far);
+        return;
+    }
     sdm_template_run(w, c, b);
-    if (value != w->row.value) memcpy(value, w->row.value, VOXELS * sizeof *value);
+    if (share > 0) {
+        sdm_template_blend(share, far, w->row.value, value);
+        if (value == w->row.value) w->loaded = SIZE_MAX;
+    } else if (value != w->row.value) {
+        memcpy(value, w->row.value, sizeof far);
+    }
 }
 
 /* Centres. */
@@ -84,18 +60,11 @@ static void affine_centres(template_work *w, size_t c, size_t y, size_t z)
     const part_state *part = &w->part[c];
     const template_row *r = &w->row;
     const size_t n_parts = w->k->n_parts, n = w->blocks[0];
-    const double half = 0.5 * (BLOCK - 1),
-                 first[3] = {half, half + (double)(BLOCK * y), half + (double)(BLOCK * z)};
-    float by[3][3]; // change of the point (mm) by a voxel along each axis
-    for (int i = 0; i < 3; i++) {
-        double u = part->from[i];
-        for (int a = 0; a < 3; a++) {
-            u += part->by[a][i] * first[a];
-            by[a][i] = (float)(w->k->parts[c].near.spacing * part->by[a][i]);
-        }
-        for (size_t x = 0; x < n; x++)
-            r->u[i][x] = (float)(u + part->by[0][i] * (double)(BLOCK * x));
-    }
+    const double half = 0.5 * (BLOCK - 1);
+    float by[3][3];
+    sdm_template_row_points(
+        w, c, (const double[]){half, half + (double)(BLOCK * y), half + (double)(BLOCK * z)}, n,
+        by);
     sdm_template_lookup(w, c, n);
     if (!part->rigid) {
         float metric[6];
@@ -116,13 +85,13 @@ static void affine_centres(template_work *w, size_t c, size_t y, size_t z)
 // The same for a part with a warp: the mean of the corners.
 static void warped_centres(template_work *w, size_t c)
 {
-    for (size_t i = 0; i < w->n_blocks; i++) {
-        const template_block b = sdm_template_block(w, i);
-        const float *corner = w->corner + 4 * corner_at(w, c, &b);
+    template_block b = sdm_template_first_block(w);
+    do {
+        const float *corner = w->corner + 4 * sdm_template_corner_at(w, c, &b);
         float sum = 0;
-        for (size_t k = 0; k < 8; k++) sum += corner[4 * corner_step(w, k)];
-        w->centre[4 * (i * w->k->n_parts + c)] = sum / 8;
-    }
+        for (size_t k = 0; k < 8; k++) sum += corner[4 * sdm_template_corner_step(w, k)];
+        w->centre[4 * (b.number * w->k->n_parts + c)] = sum / 8;
+    } while (sdm_template_next_block(w, &b));
 }
 
 void sdm_template_centres(template_work *w)

@@ -26,10 +26,10 @@ void sdm_template_forward(const sdm_model *m, const double *params, size_t n, fl
             k->correction->kind->forward(k->correction, p, 1, w.correction, w.correction_scratch,
                                          1);
         sdm_template_begin(&w, p, false);
-        for (size_t j = 0; j < w.n_blocks; j++) {
-            const template_block b = sdm_template_block(&w, j);
+        template_block b = sdm_template_first_block(&w);
+        do {
             sdm_template_values(&w, &b, w.value, NULL);
             sdm_template_store(&w, &b, w.value, values);
-        }
+        } while (sdm_template_next_block(&w, &b));
     }
 }

@@ -87,6 +87,7 @@ typedef struct warp_scratch {
        B-splines through them */
     float *points;
     float *metric;    /* [stations][8] */
+    float *sample;    /* [stations][8] samples, see template_work.h */
     station *station; /* [stations]; NULL unless derivatives are wanted */
 } warp_scratch;
 
@@ -97,9 +98,9 @@ void sdm_template_invert(const template_network *k, const sdm_template_part *par
 /* Turns points[stations][4] into the coefficients of the cubic B-splines that interpolate them. */
 void sdm_template_prefilter(const template_network *k, float *points);
 
-/* points[stations][4] (coefficients), metric[stations][8] = the derivatives of those of `w` in a
-   direction in
-   which the frame has the derivative dm[9], db[3] and the warp the derivative `control`. */
+/* points[stations][4] (not yet coefficients), metric[stations][8] = the derivatives of those of `w`
+   in a direction in which the frame has the derivative dm[9], db[3] and the warp the derivative
+   `control`. */
 void sdm_template_invert_slope(const template_network *k, const sdm_template_part *part,
                                const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,
                                const float *control, const double dm[9], const double db[3],

@@ -52,6 +52,12 @@ typedef struct template_table {
        from its value and slopes by blocks at the eight corners, the voxels (0, 0, 0) .. (4, 4, 4):
        corner[x][4], and the same `line` floats further along y and `plane` floats along z. */
     void (*block)(const float *corner, size_t line, size_t plane, float *value);
+    /* sum[4][4] = the sums over 4 x 4 x 4 control points of their values (four floats) times
+       weights: products of weights[a][0] along the axes, and with weights[a][1] in place of
+       weights[a][0] for one axis a = 0, 1, 2. control: the first of them; the same `line` floats
+       further along y and `plane` floats along z. */
+    void (*displace)(const float *control, size_t line, size_t plane, const float (*weights)[2][4],
+                     float (*sum)[4]);
 } template_table;
 
 extern const template_table sdm_template_generic;

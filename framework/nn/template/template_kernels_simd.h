@@ -77,7 +77,14 @@ static inline void store_planes(float *p, vec v)
     memcpy(p, &v, 16);
     memcpy(p + 16, (const char *)&v + 16, 16);
 }
+// p[0] and p[1], four times each.
+static inline vec repeat_each(const float *p)
+{
+    const vec v = repeat_two(p);
+    return __builtin_shufflevector(v, v, 0, 0, 0, 0, 5, 5, 5, 5);
+}
 #else
+static inline vec repeat_each(const float *p) { return splat(*p); }
 static inline vec load_lines(const float *p, size_t stride)
 {
     (void)stride;
@@ -383,5 +390,61 @@ static void block(const float *corner, size_t line, size_t plane, float *value)
     }
 }
 
-const template_table TABLE = {
-    .expand = expand, .lookup = lookup, .normalise = normalise, .correct = correct, .block = block};
+/* Control points of a line are PARTS vectors. Along x the first and third, the second and fourth
+   control point are summed first: with VW = 8 these are the halves of vectors. */
+#define PARTS (16 / VW)
+
+// to[4] = the sum along x with the weights w.
+static inline void sum_line(const vec line[PARTS], const vec w[PARTS], float *to)
+{
+#if VW == 8
+    vec two[2];
+    const vec sum = line[0] * w[0] + line[1] * w[1];
+    halves(sum, sum, two);
+    const vec all = two[0] + two[1];
+#else
+    const vec all = (line[0] * w[0] + line[2] * w[2]) + (line[1] * w[1] + line[3] * w[3]);
+#endif
+    memcpy(to, &all, 16);
+}
+
+static void displace(const float *control, size_t line, size_t plane, const float (*weights)[2][4],
+                     float (*sum)[4])
+{
+    vec f[PARTS], y[PARTS], z[PARTS]; // sums along y and z: no derivative, by y, by z
+    EACH(h, PARTS) f[h] = y[h] = z[h] = splat(0);
+    EACH(k, 4)
+    {
+        vec plain[PARTS], by_y[PARTS];
+        EACH(h, PARTS) plain[h] = by_y[h] = splat(0);
+        EACH(j, 4)
+        {
+            const float *from = control + (size_t)k * plane + (size_t)j * line;
+            EACH(h, PARTS)
+            {
+                const vec v = load(from + VW * h);
+                plain[h] += splat(weights[1][0][j]) * v;
+                by_y[h] += splat(weights[1][1][j]) * v;
+            }
+        }
+        EACH(h, PARTS)
+        {
+            f[h] += splat(weights[2][0][k]) * plain[h];
+            y[h] += splat(weights[2][0][k]) * by_y[h];
+            z[h] += splat(weights[2][1][k]) * plain[h];
+        }
+    }
+    vec x[2][PARTS];
+    EACH(d, 2) EACH(h, PARTS) x[d][h] = repeat_each(weights[0][d] + h * VW / 4);
+    sum_line(f, x[0], sum[0]);
+    sum_line(f, x[1], sum[1]);
+    sum_line(y, x[0], sum[2]);
+    sum_line(z, x[0], sum[3]);
+}
+
+const template_table TABLE = {.expand = expand,
+                              .lookup = lookup,
+                              .normalise = normalise,
+                              .correct = correct,
+                              .block = block,
+                              .displace = displace};

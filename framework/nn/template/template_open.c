@@ -55,16 +55,6 @@ static template_level level_of(const sdm_lattice *l, const sdm_lattice *near, co
     return out;
 }
 
-// The section `name`, with `count` elements of `size` bytes; NULL: see sdm_model_weights().
-static const void *read_array(sdm_model *m, const sdm_section *sections, size_t n, const char *name,
-                              uint64_t count, size_t size, sdm_error *err)
-{
-    if (count <= SIZE_MAX / size)
-        return sdm_model_weights(m, sections, n, name, (size_t)count * size, err);
-    sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' is too large", name);
-    return NULL;
-}
-
 // Points the parts to their arrays in the file.
 static sdm_status bind_arrays(sdm_model *m, const sdm_section *sections, size_t n, sdm_error *err)
 {
@@ -75,12 +65,14 @@ static sdm_status bind_arrays(sdm_model *m, const sdm_section *sections, size_t 
         if (p->n_modes) modes += (uint64_t)3 * p->n_modes * sdm_lattice_count(&p->warp);
         nodes += UINT64_C(4) * (sdm_lattice_count(&p->near) + sdm_lattice_count(&p->far));
     }
-    k->functions = read_array(m, sections, n, "template.functions",
-                              (uint64_t)k->n_numbers * k->n_terms, sizeof(double), err);
+    k->functions = sdm_model_weights(m, sections, n, "template.functions", SDM_NUMBER_FLOAT64,
+                                     (uint64_t)k->n_numbers * k->n_terms, err);
     if (!k->functions) return SDM_E_FORMAT;
-    const float *mode = read_array(m, sections, n, "template.modes", modes, sizeof(float), err);
+    const float *mode =
+        sdm_model_weights(m, sections, n, "template.modes", SDM_NUMBER_FLOAT32, modes, err);
     if (!mode) return SDM_E_FORMAT;
-    const float *node = read_array(m, sections, n, "template.nodes", nodes, sizeof(float), err);
+    const float *node =
+        sdm_model_weights(m, sections, n, "template.nodes", SDM_NUMBER_FLOAT32, nodes, err);
     if (!node) return SDM_E_FORMAT;
     for (size_t c = 0; c < k->n_parts; c++) {
         sdm_template_part *p = &k->parts[c];

@@ -8,31 +8,14 @@ enum { BLOCK = SDM_TEMPLATE_STEP, VOXELS = SDM_TEMPLATE_BLOCK_VOXELS };
 
 /* Stations. */
 
-// plane[stations in a plane][12] = the stations combined for plane z of a layer of blocks.
-static void combine_planes(const template_network *k, const warp_lines *l, size_t layer, size_t z,
-                           float *plane)
+// out[n][4] and then out[n][8] = the points[4][n][4] and the metric[2][n][8] of neighbouring layers
+// of n stations, combined for voxel `phase` between them.
+static void combine(const template_expansion *e, const float *points, const float *metric, size_t n,
+                    size_t phase, float *out)
 {
-    const size_t n = k->stations[0] * k->stations[1];
-    const float *p = l->points + 4 * n * layer, *g = l->metric + 8 * n * (layer + 1);
-    float w[4];
-    for (int a = 0; a < 4; a++) w[a] = k->expansion.cubic[a][z];
-    const float t = k->expansion.linear[z];
-    float *out = plane, *out_metric = plane + 4 * n;
-    for (size_t i = 0; i < 4 * n; i++)
-        out[i] = w[0] * p[i] + w[1] * p[4 * n + i] + w[2] * p[8 * n + i] + w[3] * p[12 * n + i];
-    for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
-}
-
-// line[stations in a line][12] = those of a plane combined for line y of a row of blocks.
-static void combine_lines(const template_network *k, const float *plane, size_t row, size_t y,
-                          float *line)
-{
-    const size_t n = k->stations[0];
-    const float *p = plane + 4 * n * row, *g = plane + 4 * n * k->stations[1] + 8 * n * (row + 1);
-    float w[4];
-    for (int a = 0; a < 4; a++) w[a] = k->expansion.cubic[a][y];
-    const float t = k->expansion.linear[y];
-    float *out = line, *out_metric = line + 4 * n;
+    float w[4], *out_metric = out + 4 * n;
+    for (int a = 0; a < 4; a++) w[a] = e->cubic[a][phase];
+    const float t = e->linear[phase], *p = points, *g = metric;
     for (size_t i = 0; i < 4 * n; i++)
         out[i] = w[0] * p[i] + w[1] * p[4 * n + i] + w[2] * p[8 * n + i] + w[3] * p[12 * n + i];
     for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
@@ -41,17 +24,22 @@ static void combine_lines(const template_network *k, const float *plane, size_t 
 void sdm_template_expand(const template_network *k, const template_block *b, warp_lines *l,
                          size_t n_c, float *const *c)
 {
-    const size_t nx = k->stations[0], ny = k->stations[1], plane = 12 * nx * ny, line = 12 * nx;
+    const size_t nx = k->stations[0], n = nx * k->stations[1], plane = 12 * n, line = 12 * nx;
     if (l->plane_of != b->at[2]) {
-        for (size_t z = 0; z < BLOCK; z++) combine_planes(k, l, b->at[2], z, l->plane + z * plane);
+        for (size_t z = 0; z < BLOCK; z++)
+            combine(&k->expansion, l->points + 4 * n * b->at[2], l->metric + 8 * n * (b->at[2] + 1),
+                    n, z, l->plane + z * plane);
         l->plane_of = b->at[2];
         l->line_of = SIZE_MAX;
     }
     if (l->line_of != b->at[1]) {
-        for (size_t z = 0; z < BLOCK; z++)
+        for (size_t z = 0; z < BLOCK; z++) {
+            const float *from = l->plane + z * plane;
             for (size_t y = 0; y < BLOCK; y++)
-                combine_lines(k, l->plane + z * plane, b->at[1], y,
-                              l->line + (BLOCK * z + y) * line);
+                combine(&k->expansion, from + 4 * nx * b->at[1],
+                        from + 4 * n + 8 * nx * (b->at[1] + 1), nx, y,
+                        l->line + (BLOCK * z + y) * line);
+        }
         l->line_of = b->at[1];
     }
     sdm_template_kernels()->expand(&k->expansion, l->line + 4 * b->at[0],
@@ -126,6 +114,21 @@ template_place sdm_template_place(const template_work *w, size_t c, const templa
 }
 
 /* Parts. */
+
+void sdm_template_row_points(const template_work *w, size_t c, const double first[3], size_t n,
+                             float by[3][3])
+{
+    const part_state *part = &w->part[c];
+    for (int i = 0; i < 3; i++) {
+        double u = part->from[i];
+        for (int a = 0; a < 3; a++) {
+            u += part->by[a][i] * first[a];
+            by[a][i] = (float)(w->k->parts[c].near.spacing * part->by[a][i]);
+        }
+        for (size_t x = 0; x < n; x++)
+            w->row.u[i][x] = (float)(u + part->by[0][i] * (double)(BLOCK * x));
+    }
+}
 
 static void affine_points(const template_work *w, size_t c, const template_block *b)
 {

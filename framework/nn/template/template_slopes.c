@@ -3,144 +3,27 @@
 #include <math.h>
 #include <string.h>
 
-#include "template_work.h"
-
-typedef float quad __attribute__((vector_size(16)));
-
-static quad quad_at(const float *p)
-{
-    quad q;
-    memcpy(&q, p, sizeof q);
-    return q;
-}
+#include "template_derivative.h"
 
 enum { BLOCK = SDM_TEMPLATE_STEP, VOXELS = SDM_TEMPLATE_BLOCK_VOXELS };
 
-/* Derivatives of the value of a voxel: by its index u[3], and by the metric xx, yy, zz, yz, xz,
-   xy. */
+/* Derivatives of the value of a voxel: by its index u[3], and by the metric. */
 typedef struct value_slope {
     float u[3], metric[6];
 } value_slope;
 
-/* A trilinear cell: the lower node along each axis, the fraction of the way to the next one, and
-   how fast the fraction changes with the index in `near` (0 where the index is clamped). */
-typedef struct cell {
-    ptrdiff_t node[3];
-    float t[3], rate;
-    bool moves[3];
-} cell;
-
-static cell cell_of(const float u[3], float scale, const float offset[3], const int32_t n[3])
-{
-    cell c = {.rate = scale};
-    for (int a = 0; a < 3; a++) {
-        const float x = u[a] * scale + offset[a], last = (float)(n[a] - 1);
-        const float y = x > 0 ? x < last ? x : last : 0;
-        ptrdiff_t i = (ptrdiff_t)y;
-        if (i > n[a] - 2) i = n[a] - 2;
-        c.node[a] = i;
-        c.t[a] = y - (float)i;
-        c.moves[a] = x > 0 && x < last;
-    }
-    return c;
-}
-
-/* The template at a point: distance f, gradient g, and their derivatives by the index u. */
-typedef struct template_slope {
-    float f, g[3], df[3], dg[3][3]; /* dg[a]: derivative of g by u[a] */
-} template_slope;
-
-static template_slope template_at(const template_level *l, const float u[3])
-{
-    const cell c = cell_of(u, l->scale, l->offset, l->n);
-    const ptrdiff_t line = 4 * (ptrdiff_t)l->n[0], plane = line * l->n[1];
-    const float *at = l->nodes + 4 * c.node[0] + line * c.node[1] + plane * c.node[2];
-    // sums over the corners: no derivative, by x, y, z, and the mixed ones yz, xz, xy
-    quad column[4], column_z[4];
-    for (int i = 0; i < 4; i++) {
-        const float *p = at + (i & 1 ? 4 : 0) + (i & 2 ? line : 0);
-        column_z[i] = quad_at(p + plane) - quad_at(p);
-        column[i] = quad_at(p) + c.t[2] * column_z[i];
-    }
-    const quad y0 = column[2] - column[0], y1 = column[3] - column[1];
-    const quad yz0 = column_z[2] - column_z[0], yz1 = column_z[3] - column_z[1];
-    const quad r0 = column[0] + c.t[1] * y0, r1 = column[1] + c.t[1] * y1;
-    const quad z0 = column_z[0] + c.t[1] * yz0, z1 = column_z[1] + c.t[1] * yz1;
-    const quad qx = r1 - r0, qxy = y1 - y0, qxz = z1 - z0;
-    const quad q = r0 + c.t[0] * qx, qy = y0 + c.t[0] * qxy, qz = z0 + c.t[0] * qxz,
-               qyz = yz0 + c.t[0] * (yz1 - yz0);
-    float bend[3], slope[3];
-    for (int a = 0; a < 3; a++) bend[a] = c.t[a] * (1 - c.t[a]), slope[a] = 1 - 2 * c.t[a];
-    template_slope s = {.f = q[0] - l->half * (bend[0] * qx[1] + bend[1] * qy[2] + bend[2] * qz[3]),
-                        .g = {q[1], q[2], q[3]}};
-    const float df[3] = {qx[0] - l->half * (slope[0] * qx[1] + bend[1] * qxy[2] + bend[2] * qxz[3]),
-                         qy[0] - l->half * (bend[0] * qxy[1] + slope[1] * qy[2] + bend[2] * qyz[3]),
-                         qz[0] -
-                             l->half * (bend[0] * qxz[1] + bend[1] * qyz[2] + slope[2] * qz[3])};
-    const quad by[3] = {qx, qy, qz};
-    for (int a = 0; a < 3; a++) {
-        const float rate = c.moves[a] ? c.rate : 0;
-        s.df[a] = rate * df[a];
-        for (int b = 0; b < 3; b++) s.dg[a][b] = rate * by[a][b + 1];
-    }
-    return s;
-}
-
-// du[3] = derivative of the correction by the index u
-static void correction_slope(const template_correction *k, const float u[3], float du[3])
-{
-    const cell c = cell_of(u, k->scale, k->offset, k->n);
-    const ptrdiff_t line = k->n[0], plane = line * k->n[1];
-    const float *at = k->map + c.node[0] + line * c.node[1] + plane * c.node[2];
-    float low[3] = {0};
-    for (int i = 0; i < 8; i++) {
-        const int bit[3] = {i & 1, i >> 1 & 1, i >> 2};
-        const float v = at[bit[0] + (bit[1] ? line : 0) + (bit[2] ? plane : 0)];
-        float w[3];
-        for (int a = 0; a < 3; a++) w[a] = bit[a] ? c.t[a] : 1 - c.t[a];
-        low[0] += (bit[0] ? v : -v) * w[1] * w[2];
-        low[1] += (bit[1] ? v : -v) * w[0] * w[2];
-        low[2] += (bit[2] ? v : -v) * w[0] * w[1];
-    }
-    for (int a = 0; a < 3; a++) du[a] = c.moves[a] ? c.rate * low[a] : 0;
-}
-
 // Derivatives of the value of part c in voxel i of w->row, after sdm_template_run().
 static value_slope slope_of_value(const template_work *w, size_t c, size_t i)
 {
-    const template_network *k = w->k;
     const template_row *r = &w->row;
-    const float u[3] = {r->u[0][i], r->u[1][i], r->u[2][i]};
-    bool in = true;
-    for (int a = 0; a < 3; a++) in &= u[a] >= 0 && u[a] <= (float)(k->near[c].n[a] - 1);
-    const template_slope s = template_at(in ? &k->near[c] : &k->far[c], u);
-    const float m[6] = {r->metric[0][i], r->metric[1][i], r->metric[2][i],
-                        r->metric[3][i], r->metric[4][i], r->metric[5][i]};
-    const float e = 1e-3f, *g = s.g;
-    // value = f sqrt(d / n), d = g^T g + e, n = g^T G g + e t
-    const float gg[3] = {m[0] * g[0] + m[5] * g[1] + m[4] * g[2],
-                         m[5] * g[0] + m[1] * g[1] + m[3] * g[2],
-                         m[4] * g[0] + m[3] * g[1] + m[2] * g[2]};
-    const float d = g[0] * g[0] + g[1] * g[1] + g[2] * g[2] + e,
-                n = g[0] * gg[0] + g[1] * gg[1] + g[2] * gg[2] + e * (m[0] + m[1] + m[2]) / 3;
-    const float root = sqrtf(d / n), f = s.f * root;
+    float u[3], metric[6];
+    for (int a = 0; a < 3; a++) u[a] = r->u[a][i];
+    for (int a = 0; a < 6; a++) metric[a] = r->metric[a][i];
+    point_slope p;
+    sdm_template_point_slope(w, c, u, metric, &p);
     value_slope out;
-    for (int a = 0; a < 3; a++) {
-        const float *dg = s.dg[a];
-        const float by_d = g[0] * dg[0] + g[1] * dg[1] + g[2] * dg[2],
-                    by_n = gg[0] * dg[0] + gg[1] * dg[1] + gg[2] * dg[2];
-        out.u[a] = root * s.df[a] + f * (by_d / d - by_n / n);
-    }
-    const float h = -0.5f * f / n;
-    for (int a = 0; a < 3; a++) out.metric[a] = h * (g[a] * g[a] + e / 3);
-    out.metric[3] = 2 * h * g[1] * g[2];
-    out.metric[4] = 2 * h * g[0] * g[2];
-    out.metric[5] = 2 * h * g[0] * g[1];
-    if (w->correction && c == 0) {
-        float du[3];
-        correction_slope(&w->correction_at, u, du);
-        for (int a = 0; a < 3; a++) out.u[a] += du[a];
-    }
+    for (int a = 0; a < 3; a++) out.u[a] = p.factor * p.df[a] + p.f * p.by_u[a] + p.dr[a];
+    for (int a = 0; a < 6; a++) out.metric[a] = p.f * p.by_metric[a];
     return out;
 }
 
@@ -154,11 +37,20 @@ typedef struct slopes_work {
     float *control;         /* control displacements of the warp of the first part */
     float *points, *metric; /* [D][stations][4], [D][stations][8] */
     warp_lines *lines;      /* [warps][D] */
+    point_slope *station;   /* [stations] of one part */
+    float *sample;          /* [stations][8] derivatives of its samples */
+    float *corner;          /* [warps][D][corners][4] */
     float *row[9];          /* [64] du, d metric */
     value_slope *slope;     /* [64] */
     float *value;           /* [64] the map, or a derivative */
     uint8_t *nearest;       /* [64] part with the smallest value */
 } slopes_work;
+
+// Number of corners of blocks.
+static size_t count_corners(const template_work *w)
+{
+    return (w->blocks[0] + 1) * (w->blocks[1] + 1) * (w->blocks[2] + 1);
+}
 
 static size_t slopes_carve(const sdm_model *m, size_t n, size_t correction_scratch, void *memory,
                            slopes_work *s)
@@ -185,6 +77,11 @@ static size_t slopes_carve(const sdm_model *m, size_t n, size_t correction_scrat
         sdm_template_take_lines(k, memory, &at, &l);
         if (memory) s->lines[i] = l;
     }
+    const size_t each = warps ? stations : 0;
+    s->station = sdm_template_take(memory, &at, each * sizeof *s->station);
+    s->sample = sdm_template_take(memory, &at, SAMPLE_SIZE * each * sizeof *s->sample);
+    s->corner =
+        sdm_template_take(memory, &at, warps * n * 4 * count_corners(&s->w) * sizeof *s->corner);
     for (int i = 0; i < 9; i++)
         s->row[i] = sdm_template_take(memory, &at, VOXELS * sizeof *s->row[i]);
     s->slope = sdm_template_take(memory, &at, VOXELS * sizeof *s->slope);
@@ -201,12 +98,40 @@ static size_t warp_number(const template_network *k, size_t c)
     return n;
 }
 
+// The correction's derivative along direction d.
+static template_correction change_of_correction(const slopes_work *s, size_t d)
+{
+    const template_network *k = s->w.k;
+    template_correction change = k->correction_lattice;
+    change.map = s->w.correction + (1 + d) * sdm_grid_count(&k->correction->info.grid);
+    return change;
+}
+
+// Derivatives of the stations and corners of part c, which has a warp, along direction d.
+static void warp_slopes(slopes_work *s, size_t c, size_t d)
+{
+    const template_work *w = &s->w;
+    const template_network *k = w->k;
+    const sdm_template_part *part = &k->parts[c];
+    const size_t stations = k->stations[0] * k->stations[1] * k->stations[2],
+                 at = warp_number(k, c) * s->n + d, pose = d * k->n_parts + c;
+    float *points = s->points + 4 * at * stations, *metric = s->metric + 8 * at * stations;
+    sdm_template_control(part, s->dg + d * k->n_numbers + part->amplitudes, s->control);
+    sdm_template_invert_slope(k, part, &w->pose[c], w->grid, &w->warp[c], s->control, s->dm[pose],
+                              s->db[pose], points, metric);
+    station_motion motion = {.points = points, .metric = metric};
+    if (w->correction && c == 0) motion.change = change_of_correction(s, d);
+    sdm_template_corner_slopes(w, c, s->station, &motion, s->sample,
+                               s->corner + 4 * at * count_corners(w));
+    sdm_template_prefilter(k, points);
+    s->lines[at].plane_of = s->lines[at].line_of = SIZE_MAX;
+}
+
 // Derivatives of frames and warps along direction[D][P], after sdm_template_begin().
 static void slopes_begin(slopes_work *s, const double *direction)
 {
     const template_network *k = s->w.k;
-    const size_t n_params = s->w.model->info.n_params, N = k->n_numbers,
-                 stations = k->stations[0] * k->stations[1] * k->stations[2];
+    const size_t n_params = s->w.model->info.n_params, N = k->n_numbers;
     for (size_t d = 0; d < s->n; d++) {
         double *dg = s->dg + d * N;
         for (size_t i = 0; i < N; i++) {
@@ -216,16 +141,11 @@ static void slopes_begin(slopes_work *s, const double *direction)
         }
         sdm_template_frames_slope(k, s->w.g, dg, s->w.pose, s->dm + d * k->n_parts,
                                   s->db + d * k->n_parts);
-        for (size_t c = 0; c < k->n_parts; c++) {
-            if (k->parts[c].n_modes == 0) continue;
-            const size_t at = (warp_number(k, c) * s->n + d) * stations;
-            sdm_template_control(&k->parts[c], dg + k->parts[c].amplitudes, s->control);
-            sdm_template_invert_slope(k, &k->parts[c], &s->w.pose[c], s->w.grid, &s->w.warp[c],
-                                      s->control, s->dm[d * k->n_parts + c],
-                                      s->db[d * k->n_parts + c], s->points + 4 * at,
-                                      s->metric + 8 * at);
-            s->lines[at / stations].plane_of = s->lines[at / stations].line_of = SIZE_MAX;
-        }
+    }
+    for (size_t c = 0; c < k->n_parts; c++) {
+        if (k->parts[c].n_modes == 0) continue;
+        sdm_template_station_slopes(&s->w, c, s->station);
+        for (size_t d = 0; d < s->n; d++) warp_slopes(s, c, d);
     }
 }
 
@@ -265,8 +185,8 @@ static void affine_slope(const slopes_work *s, size_t c, size_t d, const templat
 }
 
 // s->value = the derivative along direction d in the voxels of a block in which part c is the
-// nearest, after sdm_template_run().
-static void block_slope(slopes_work *s, size_t c, size_t d, const template_block *b)
+// nearest, as far as it is computed exactly, after sdm_template_run().
+static void exact_slope(slopes_work *s, size_t c, size_t d, const template_block *b)
 {
     template_work *w = &s->w;
     const template_network *k = w->k;
@@ -282,14 +202,23 @@ static void block_slope(slopes_work *s, size_t c, size_t d, const template_block
         s->value[v] = sum;
     }
     if (w->correction && c == 0) {
-        template_correction change = k->correction_lattice;
-        change.map = w->correction + (1 + d) * sdm_grid_count(&k->correction->info.grid);
+        const template_correction change = change_of_correction(s, d);
         sdm_template_kernels()->correct(&change, VOXELS, (const float *const *)w->row.u, s->value);
     }
 }
 
-// out[D] = the derivatives in the voxels of a block in which part c is the nearest.
-static void block_slopes(slopes_work *s, size_t c, const template_block *b, float *const *out)
+// slope[64] = the derivative along direction d of the interpolated distances to part c in a block.
+static void far_slope(const slopes_work *s, size_t c, size_t d, const template_block *b,
+                      float *slope)
+{
+    const template_work *w = &s->w;
+    const size_t at = warp_number(w->k, c) * s->n + d;
+    const float *corner = s->corner + 4 * at * count_corners(w);
+    sdm_template_interpolate(w, corner + 4 * sdm_template_corner_at(w, 0, b), slope);
+}
+
+// Evaluates the slopes of part c in the voxels of a block in which it is the nearest.
+static void prepare_slopes(slopes_work *s, size_t c, const template_block *b)
 {
     template_work *w = &s->w;
     if (w->loaded != c) sdm_template_run(w, c, b);
@@ -298,10 +227,26 @@ static void block_slopes(slopes_work *s, size_t c, const template_block *b, floa
             for (size_t v = 0; v < VOXELS; v++) w->row.metric[a][v] = a < 3;
     for (size_t v = 0; v < VOXELS; v++)
         if (s->nearest[v] == c) s->slope[v] = slope_of_value(w, c, v);
+}
+
+// out[D] = the derivatives in the voxels of a block in which part c is the nearest.
+static void block_slopes(slopes_work *s, size_t c, const template_block *b, float *const *out)
+{
+    template_work *w = &s->w;
+    float far[VOXELS], change[VOXELS];
+    const float share = w->part[c].warped ? sdm_template_far(w, c, b, far) : 0;
+    if (share < 1) prepare_slopes(s, c, b);
     const size_t nx = (size_t)w->grid->n[0], ny = (size_t)w->grid->n[1],
                  first = BLOCK * ((b->at[2] * ny + b->at[1]) * nx + b->at[0]);
     for (size_t d = 0; d < s->n; d++) {
-        block_slope(s, c, d, b);
+        if (share == 1)
+            far_slope(s, c, d, b, s->value);
+        else
+            exact_slope(s, c, d, b);
+        if (share > 0 && share < 1) {
+            far_slope(s, c, d, b, change);
+            sdm_template_blend_slope(w, share, far, w->row.value, change, s->value);
+        }
         for (size_t z = 0; z < b->n[2]; z++)
             for (size_t y = 0; y < b->n[1]; y++)
                 for (size_t x = 0, v = BLOCK * (BLOCK * z + y); x < b->n[0]; x++, v++)
@@ -313,13 +258,13 @@ static void block_slopes(slopes_work *s, size_t c, const template_block *b, floa
 static void fill_slopes(slopes_work *s, float *values, float *const *out)
 {
     template_work *w = &s->w;
-    for (size_t i = 0; i < w->n_blocks; i++) {
-        const template_block b = sdm_template_block(w, i);
+    template_block b = sdm_template_first_block(w);
+    do {
         sdm_template_values(w, &b, s->value, s->nearest);
         sdm_template_store(w, &b, s->value, values);
         for (size_t c = 0; c < w->k->n_parts; c++)
             if (memchr(s->nearest, (int)c, VOXELS)) block_slopes(s, c, &b, out);
-    }
+    } while (sdm_template_next_block(w, &b));
 }
 
 // Bytes of scratch memory of the correction's Jacobian, or of its product with one direction.

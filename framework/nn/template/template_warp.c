@@ -17,13 +17,17 @@ static quad quad_at(const float *p)
 
 void sdm_template_control(const sdm_template_part *part, const double *a, float *control)
 {
+    // first the three elements of all nodes one after the other, as in the modes
     const size_t n = sdm_lattice_count(&part->warp);
     memset(control, 0, 4 * n * sizeof *control);
     for (size_t m = 0; m < part->n_modes; m++) {
         const float f = (float)a[m], *mode = part->modes + 3 * n * m;
         if (f == 0) continue;
-        for (size_t i = 0; i < n; i++)
-            for (int c = 0; c < 3; c++) control[4 * i + (size_t)c] += f * mode[3 * i + (size_t)c];
+        for (size_t i = 0; i < 3 * n; i++) control[i] += f * mode[i];
+    }
+    for (size_t i = n; i-- > 0;) {
+        const float *from = control + 3 * i, node[4] = {from[0], from[1], from[2], 0};
+        memcpy(control + 4 * i, node, sizeof node);
     }
 }
 
@@ -91,13 +95,53 @@ void sdm_template_displacement(const sdm_lattice *l, const float *control, const
     }
 }
 
+// weights[2][4] = those of the four control points around a coordinate and their derivatives.
+// Returns the index of the first control point.
+static size_t first_weights(double u, uint32_t n, float per_mm, float (*weights)[4])
+{
+    const bool inside = u >= 1 && u <= (double)n - 2;
+    u = u > 1 ? u : 1;
+    u = u < (double)n - 2 ? u : (double)n - 2;
+    size_t i = (size_t)u;
+    if (i > n - 3u) i = n - 3u;
+    const float t = (float)(u - (double)i), f = inside ? per_mm : 0;
+    const float a = 1.0f / 6, b = 2.0f / 3;
+    const quad w = (quad){a, b, a, 0} +
+                   t * ((quad){-0.5f, 0, 0.5f, 0} +
+                        t * ((quad){0.5f, -1, 0.5f, 0} + t * (quad){-a, 0.5f, -0.5f, a})),
+               d = (quad){-0.5f, 0, 0.5f, 0} +
+                   t * ((quad){1, -2, 1, 0} + t * (quad){-0.5f, 1.5f, -1.5f, 0.5f});
+    const quad slope = f * d;
+    memcpy(weights[0], &w, sizeof w);
+    memcpy(weights[1], &slope, sizeof slope);
+    return i - 1;
+}
+
+// The same as sdm_template_displacement() without second derivatives, faster.
+static void displacement(const sdm_lattice *l, const float *control, const double y[3], double u[3],
+                         double du[9])
+{
+    const double per_mm = 1 / l->spacing;
+    const size_t line = 4 * (size_t)l->n[0], plane = line * l->n[1];
+    float weights[3][2][4], sum[4][4];
+    size_t at[3];
+    for (int a = 0; a < 3; a++)
+        at[a] = first_weights((y[a] - l->origin[a]) * per_mm, l->n[a], (float)per_mm, weights[a]);
+    sdm_template_kernels()->displace(control + 4 * at[0] + line * at[1] + plane * at[2], line,
+                                     plane, (const float(*)[2][4])weights, sum);
+    for (int i = 0; i < 3; i++) {
+        u[i] = (double)sum[0][i];
+        for (int a = 0; a < 3; a++) du[3 * i + a] = (double)sum[1 + a][i];
+    }
+}
+
 // out[9] = (I + du)^-1. A warp that folds (determinant near 0) is treated as the identity.
 static void inverse_of_warp(const double du[9], double out[9])
 {
     double a[9];
     for (int i = 0; i < 9; i++) a[i] = du[i] + (i % 4 == 0);
-    const double det = m3_adjugate(a, out);
-    for (int i = 0; i < 9; i++) out[i] = det > 1e-2 ? out[i] / det : (double)(i % 4 == 0);
+    const double det = m3_adjugate(a, out), factor = 1 / det;
+    for (int i = 0; i < 9; i++) out[i] = det > 1e-2 ? out[i] * factor : (double)(i % 4 == 0);
 }
 
 // Solves y + U(y) = q by Newton's method from y. Stops when the next step would change y by about
@@ -106,10 +150,10 @@ static void newton(const sdm_lattice *l, const float *control, const double q[3]
                    double inverse[9])
 {
     enum { ITERATIONS = 12 };
-    const double stop = 0.02 * l->spacing, longest = 0.5 * l->spacing;
+    const double stop = 0.005 * l->spacing, longest = 0.5 * l->spacing;
     for (int n = 0; n < ITERATIONS; n++) {
         double u[3], du[9], f[3], d[3];
-        sdm_template_displacement(l, control, y, u, du, NULL);
+        displacement(l, control, y, u, du);
         inverse_of_warp(du, inverse);
         for (int i = 0; i < 3; i++) f[i] = q[i] - y[i] - u[i];
         m3_apply(inverse, f, d);
@@ -158,9 +202,10 @@ void sdm_template_inverse_slope(const part_pose *pose, const double dm[9], doubl
     for (int i = 0; i < 9; i++) out[i] = -out[i];
 }
 
-// Turns samples v[n] (quads, `stride` floats apart) into coefficients of the cubic B-spline that
-// interpolates them, n >= 3. At both ends the second derivative is zero.
-static void spline_prefilter(float *v, size_t n, size_t stride)
+// Turns n samples of `width` functions into coefficients of the cubic B-splines that interpolate
+// them, n >= 3; stride: floats from one sample to the next. At both ends the second derivative is
+// zero.
+static void spline_prefilter(float *v, size_t n, size_t stride, size_t width)
 {
     // (c[i-1] + 4 c[i] + c[i+1]) / 6 = v[i], c[0] = v[0], c[n-1] = v[n-1]: Thomas algorithm. Its
     // factors reach their limit, 2 - sqrt(3), within a few steps.
@@ -169,59 +214,102 @@ static void spline_prefilter(float *v, size_t n, size_t stride)
     for (size_t i = 1; i < FACTORS; i++) factor[i] = 1 / (4 - factor[i - 1]);
     for (size_t i = 1; i + 1 < n; i++) {
         const float f = factor[i < FACTORS ? i : FACTORS - 1];
-        for (size_t c = 0; c < 3; c++)
-            v[i * stride + c] = (6 * v[i * stride + c] - v[(i - 1) * stride + c]) * f;
+        float *to = v + i * stride;
+        const float *before = to - stride;
+        for (size_t c = 0; c < width; c++) to[c] = (6 * to[c] - before[c]) * f;
     }
     for (size_t i = n - 2; i > 0; i--) {
         const float f = factor[i < FACTORS ? i : FACTORS - 1];
-        for (size_t c = 0; c < 3; c++) v[i * stride + c] -= f * v[(i + 1) * stride + c];
+        float *to = v + i * stride;
+        const float *after = to + stride;
+        for (size_t c = 0; c < width; c++) to[c] -= f * after[c];
     }
 }
 
 void sdm_template_prefilter(const template_network *k, float *points)
 {
-    const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2];
-    for (size_t i = 0; i < ny * nz; i++) spline_prefilter(points + 4 * nx * i, nx, 4);
-    for (size_t z = 0; z < nz; z++)
-        for (size_t x = 0; x < nx; x++)
-            spline_prefilter(points + 4 * (z * ny * nx + x), ny, 4 * nx);
-    for (size_t i = 0; i < nx * ny; i++) spline_prefilter(points + 4 * i, nz, 4 * nx * ny);
+    const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2], line = 4 * nx,
+                 plane = line * ny;
+    for (size_t i = 0; i < ny * nz; i++) spline_prefilter(points + line * i, nx, 4, 4);
+    for (size_t z = 0; z < nz; z++) spline_prefilter(points + plane * z, ny, line, line);
+    spline_prefilter(points, nz, plane, plane);
+}
+
+// y[3] = a start for the station `at`, from the lines of stations before it along y and z: what
+// makes its second differences along y and z together vanish. It does not wait for the station
+// before it on the same line.
+static void predict(const warp_scratch *w, const sdm_lattice *near, size_t at, size_t line,
+                    size_t plane, double y[3])
+{
+    const float *p = w->points + 4 * at;
+    for (size_t c = 0; c < 3; c++) {
+        double before[3]; // along z, combined along y
+        for (size_t k = 0; k < 3; k++) {
+            const float *from = p + c - 4 * k * plane;
+            before[k] = 2 * (double)*(from - 4 * line) - (double)*(from - 8 * line);
+            if (k > 0) before[k] -= (double)*from;
+        }
+        y[c] = (before[0] - 2 * before[1] + before[2]) * near->spacing + near->origin[c];
+    }
+}
+
+// Stores a station.
+static void set_station(const part_pose *pose, const sdm_lattice *near, const warp_scratch *w,
+                        size_t at, const double y[3], const double inverse[9])
+{
+    const double per_index = 1 / near->spacing;
+    double b[9];
+    for (int c = 0; c < 3; c++)
+        w->points[4 * at + (size_t)c] = (float)((y[c] - near->origin[c]) * per_index);
+    w->points[4 * at + 3] = 0;
+    m3_product(inverse, pose->inverse, b);
+    sdm_template_metric(b, w->metric + 8 * at);
+    w->metric[8 * at + 6] = w->metric[8 * at + 7] = 0;
+    if (!w->station) return;
+    memcpy(w->station[at].y, y, 3 * sizeof *y);
+    memcpy(w->station[at].inverse, inverse, 9 * sizeof *inverse);
+}
+
+// q[3] = the point of the frame, without the warp, of a station.
+static void station_in_frame(const part_pose *pose, const sdm_grid *grid, size_t x, size_t y,
+                             size_t z, double q[3])
+{
+    double world[3];
+    station_world(grid, x, y, z, world);
+    for (int c = 0; c < 3; c++) world[c] -= pose->b[c];
+    m3_apply(pose->inverse, world, q);
 }
 
 void sdm_template_invert(const template_network *k, const sdm_template_part *part,
                          const part_pose *pose, const sdm_grid *grid, const warp_scratch *w)
 {
-    const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2];
-    const double per_index = 1 / part->near.spacing;
+    const size_t *n = k->stations, line = n[0], plane = n[0] * n[1];
+    static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     size_t at = 0;
-    double row[3] = {0}, row_q[3] = {0};
-    for (size_t z = 0; z < nz; z++)
-        for (size_t j = 0; j < ny; j++) {
-            double y[3] = {0}, last[3] = {0}, inverse[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-            for (size_t i = 0; i < nx; i++, at++) {
-                double x[3], q[3], b[9];
-                station_world(grid, i, j, z, x);
-                for (int c = 0; c < 3; c++) x[c] -= pose->b[c];
-                m3_apply(pose->inverse, x, q);
-                // start: the station before it, moved to first order
-                double move[3], dy[3];
-                for (int c = 0; c < 3; c++) move[c] = q[c] - (i ? last[c] : row_q[c]);
-                m3_apply(inverse, move, dy);
-                for (int c = 0; c < 3; c++) y[c] = at == 0 ? q[c] : (i ? y[c] : row[c]) + dy[c];
+    double row[3] = {0}, row_q[3] = {0}; // the first station of the line before
+    for (size_t z = 0; z < n[2]; z++)
+        for (size_t j = 0; j < n[1]; j++) {
+            double first[3], second[3], y[3], inverse[9];
+            station_in_frame(pose, grid, 0, j, z, first);
+            station_in_frame(pose, grid, 1, j, z, second);
+            memcpy(inverse, unit, sizeof unit);
+            for (size_t i = 0; i < n[0]; i++, at++) {
+                double q[3], step[3], move[3];
+                for (int c = 0; c < 3; c++) {
+                    step[c] = second[c] - first[c];
+                    q[c] = first[c] + step[c] * (double)i;
+                }
+                if (j > 1 && z > 1) {
+                    predict(w, &part->near, at, line, plane, y);
+                } else if (i > 0) { // the station before it, moved to first order
+                    m3_apply(inverse, step, move);
+                    for (int c = 0; c < 3; c++) y[c] += move[c];
+                } else {
+                    for (int c = 0; c < 3; c++) y[c] = q[c] + (row[c] - row_q[c]);
+                }
                 newton(&part->warp, w->control, q, y, inverse);
-                memcpy(last, q, sizeof q);
                 if (i == 0) memcpy(row, y, sizeof y), memcpy(row_q, q, sizeof q);
-
-                for (int c = 0; c < 3; c++)
-                    w->points[4 * at + (size_t)c] =
-                        (float)((y[c] - part->near.origin[c]) * per_index);
-                w->points[4 * at + 3] = 0;
-                m3_product(inverse, pose->inverse, b);
-                sdm_template_metric(b, w->metric + 8 * at);
-                w->metric[8 * at + 6] = w->metric[8 * at + 7] = 0;
-                if (!w->station) continue;
-                memcpy(w->station[at].y, y, sizeof y);
-                memcpy(w->station[at].inverse, inverse, sizeof inverse);
+                set_station(pose, &part->near, w, at, y, inverse);
             }
         }
 }
@@ -266,5 +354,4 @@ void sdm_template_invert_slope(const template_network *k, const sdm_template_par
                 sdm_template_metric_slope(b, c2, metric + 8 * at);
                 metric[8 * at + 6] = metric[8 * at + 7] = 0;
             }
-    sdm_template_prefilter(k, points);
 }

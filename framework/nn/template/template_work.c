@@ -42,6 +42,7 @@ static void take_warp(template_work *w, size_t c, bool slopes, void *memory, siz
                                    4 * sdm_lattice_count(&k->parts[c].warp) * sizeof *s->control);
     s->points = sdm_template_take(memory, at, 4 * n * sizeof *s->points);
     s->metric = sdm_template_take(memory, at, 8 * n * sizeof *s->metric);
+    s->sample = sdm_template_take(memory, at, 8 * n * sizeof *s->sample);
     if (slopes) s->station = sdm_template_take(memory, at, n * sizeof *s->station);
     sdm_template_take_lines(k, memory, at, &w->lines[c]);
     w->lines[c].points = s->points;
@@ -52,8 +53,7 @@ size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_map
                           size_t correction_scratch, void *memory, template_work *w)
 {
     const template_network *k = m->network;
-    const size_t stations = k->stations[0] * k->stations[1] * k->stations[2];
-    size_t at = 0, warps = 0, corners = 1;
+    size_t at = 0, corners = 1;
     *w = (template_work){.model = m, .k = k, .grid = &m->info.grid, .n_blocks = 1};
     for (int a = 0; a < 3; a++) {
         w->blocks[a] = k->stations[a] - 3;
@@ -65,17 +65,12 @@ size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_map
                               (slopes ? m->info.n_params * k->n_numbers : 0) * sizeof *w->dg);
     w->phi = sdm_template_take(memory, &at, sdm_template_numbers_scratch(m) * sizeof *w->phi);
     w->pose = sdm_template_take(memory, &at, k->n_parts * sizeof *w->pose);
-    for (size_t c = 0; c < k->n_parts; c++) {
-        if (k->parts[c].n_modes == 0) continue;
-        take_warp(w, c, slopes, memory, &at);
-        warps++;
-    }
+    for (size_t c = 0; c < k->n_parts; c++)
+        if (k->parts[c].n_modes) take_warp(w, c, slopes, memory, &at);
     w->part = sdm_template_take(memory, &at, k->n_parts * sizeof *w->part);
     w->corner = sdm_template_take(memory, &at, 4 * k->n_parts * corners * sizeof *w->corner);
-    w->side = sdm_template_take(memory, &at, (warps ? k->n_parts * corners : 0) * sizeof *w->side);
     w->centre = sdm_template_take(
         memory, &at, (k->n_parts > 1 ? 4 * k->n_parts * w->n_blocks : 0) * sizeof *w->centre);
-    w->sample = sdm_template_take(memory, &at, (warps ? 8 * stations : 0) * sizeof *w->sample);
     w->value = sdm_template_take(memory, &at, SDM_TEMPLATE_BLOCK_VOXELS * sizeof *w->value);
     for (int a = 0; a < 3; a++)
         w->offset[a] =
@@ -99,16 +94,32 @@ bool sdm_template_is_rigid(const template_network *k, size_t c)
     return true;
 }
 
-template_block sdm_template_block(const template_work *w, size_t number)
+// Places block *b at `at` along an axis.
+static void place(const template_work *w, int axis, size_t at, template_block *b)
 {
-    template_block b = {.number = number};
-    for (int a = 0; a < 3; a++) {
-        b.at[a] = number % w->blocks[a];
-        number /= w->blocks[a];
-        const size_t left = (size_t)w->grid->n[a] - BLOCK * b.at[a];
-        b.n[a] = left < BLOCK ? left : BLOCK;
-    }
+    const size_t left = (size_t)w->grid->n[axis] - BLOCK * at;
+    b->at[axis] = at;
+    b->n[axis] = left < BLOCK ? left : BLOCK;
+}
+
+template_block sdm_template_first_block(const template_work *w)
+{
+    template_block b = {.number = 0};
+    for (int a = 0; a < 3; a++) place(w, a, 0, &b);
     return b;
+}
+
+bool sdm_template_next_block(const template_work *w, template_block *b)
+{
+    b->number++;
+    for (int a = 0; a < 3; a++) {
+        if (b->at[a] + 1 < w->blocks[a]) {
+            place(w, a, b->at[a] + 1, b);
+            return true;
+        }
+        place(w, a, 0, b);
+    }
+    return false;
 }
 
 void sdm_template_store(const template_work *w, const template_block *b, const float *value,

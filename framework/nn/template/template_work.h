@@ -32,6 +32,10 @@ typedef struct warp_lines {
     size_t plane_of, line_of;     /* the layer and the row of blocks to which they belong */
 } warp_lines;
 
+/* A sample of a part with a warp at a station: template f, its gradient g, factor s of the metric,
+   correction r. */
+enum { SAMPLE_F = 0, SAMPLE_G = 1, SAMPLE_S = 4, SAMPLE_R = 5, SAMPLE_SIZE = 8 };
+
 /* A part in the current map. */
 typedef struct part_state {
     bool warped;
@@ -59,13 +63,9 @@ typedef struct template_work {
        voxel of each block and of those that would follow the last ones, and its gradient by blocks;
        NAN where it is not known. Not of affine parts. */
     float *corner;
-    /* [n_parts][corners] on which sides of the lattice `near` a corner lies, a bit for each side;
-       parts with a warp only. */
-    uint8_t *side;
     /* [blocks][n_parts][4] the distance to each part at the centre of the block, and its gradient
        by voxels (not of parts with a warp); networks of several parts only. */
     float *centre;
-    float *sample;     /* [stations][8] template, gradient, factor, correction; parts with a warp */
     float *value;      /* [64] values of a block */
     size_t loaded;     /* the part of which `row` holds u, metric, f and g in the current block */
     float *offset[3];  /* [64] voxel indices of a block, relative to its first voxel */
@@ -87,12 +87,20 @@ void sdm_template_take_lines(const template_network *k, void *memory, size_t *at
 size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_maps,
                           size_t correction_scratch, void *memory, template_work *w);
 
-/* The block of the given number. Blocks are to be evaluated in the order of their numbers. */
-template_block sdm_template_block(const template_work *w, size_t number);
+/* The first block, and the one after *b: false if *b was the last one. Blocks are evaluated in the
+   order of their numbers. */
+template_block sdm_template_first_block(const template_work *w);
+bool sdm_template_next_block(const template_work *w, template_block *b);
 
 /* c[n_c][64] = the stations' values in the voxels of a block: u and metric (n_c = 9), or u (3). */
 void sdm_template_expand(const template_network *k, const template_block *b, warp_lines *l,
                          size_t n_c, float *const *c);
+
+/* row.u[n] = the indices of part c, which has no warp, at n points of the grid a block apart along
+   x, from the voxel index first[3]; by[a] = how the point of the template (mm) changes by a voxel
+   along axis a. */
+void sdm_template_row_points(const template_work *w, size_t c, const double first[3], size_t n,
+                             float by[3][3]);
 
 /* Distance and gradient of the template of part c at row.u[n], in row.f and row.g: from the lattice
    `near`, and from `far` for points outside of it. */
@@ -113,9 +121,37 @@ void sdm_template_store(const template_work *w, const template_block *b, const f
 /* True if distances are carried along unchanged: part c only rotates and moves. */
 bool sdm_template_is_rigid(const template_network *k, size_t c);
 
-/* template_corners.c. The corners of the blocks for part c: corner (and side). Before the stations
-   of a warp become coefficients of B-splines. */
+/* template_corners.c. The corners of the blocks for part c. Before the stations of a warp become
+   coefficients of B-splines. */
 void sdm_template_corners(template_work *w, size_t c);
+
+/* template_far.c. Rigid parts are interpolated in the blocks that do not lie within the lattice
+   `near`; parts with a warp in the blocks in which the smallest interpolated distance is at least
+   SDM_TEMPLATE_FAR_VOXELS + 1 voxels. From SDM_TEMPLATE_FAR_VOXELS on the share of the
+   interpolation grows from 0 to 1, so that maps do not jump as the parameters change. */
+#define SDM_TEMPLATE_FAR_VOXELS 3.0f
+
+/* Index in w->corner / 4 of the first corner of a block for part c; of its corner i = 0 .. 7
+   relative to the first. */
+size_t sdm_template_corner_at(const template_work *w, size_t c, const template_block *b);
+size_t sdm_template_corner_step(const template_work *w, size_t i);
+
+/* value[64] = a function in a block, from its values and slopes at the corners of all blocks;
+   corner: the first corner of the block. */
+void sdm_template_interpolate(const template_work *w, const float *corner, float *value);
+
+/* The share of the interpolated distances to part c in a block: 0 exact, 1 interpolated, between
+   them blended. Unless it is 0, value[64] = the interpolated distances. */
+float sdm_template_far(const template_work *w, size_t c, const template_block *b, float *value);
+
+/* value[64] = the distances in a block that is blended, from the interpolated and the exact ones;
+   value may be `exact`. */
+void sdm_template_blend(float share, const float *far, const float *exact, float *value);
+
+/* slope[64] = a derivative of these distances, from those of the interpolated distances and of the
+   exact ones, which it holds before. */
+void sdm_template_blend_slope(const template_work *w, float share, const float *far,
+                              const float *exact, const float *far_slope, float *slope);
 
 /* template_blocks.c. The centres of all blocks, and the bounds for the culling. */
 void sdm_template_centres(template_work *w);

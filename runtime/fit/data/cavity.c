@@ -56,7 +56,7 @@ static sdm_status walls_find(const sdm_fit_target *t, const sdm_fit_opts *o, int
 }
 
 sdm_status sdm_fit_mask_cavities(const sdm_fit_target *target, const sdm_fit_opts *opts,
-                                 float **values, size_t *count, sdm_error *err)
+                                 float **values, size_t *count, double *widest, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&target->grid);
     const int n_threads = sdm_threads(opts->n_threads);
@@ -64,11 +64,14 @@ sdm_status sdm_fit_mask_cavities(const sdm_fit_target *target, const sdm_fit_opt
     float *distance = NULL;
     *values = NULL;
     *count = 0;
+    *widest = 0;
     sdm_status s = sdm_fit_blur_check(&target->grid, "blur", opts->blur, opts->blur, err);
     if (!s) s = SDM_ALLOC(&distance, n, "distance to walls", err);
     if (!s) s = SDM_ALLOC(values, n, "image", err);
     if (!s) s = walls_find(target, opts, n_threads, distance, err);
     if (!s) s = sdm_fit_distance_transform(&target->grid, n_threads, distance, err);
+    for (size_t i = 0; i < n && !s; i++)
+        if (isfinite(distance[i])) *widest = fmax(*widest, sqrt((double)distance[i]));
     for (size_t i = 0; i < n && !s; i++)
         // 0 at the voxels where a ball can be centred
         distance[i] = (double)distance[i] >= square ? 0 : INFINITY;

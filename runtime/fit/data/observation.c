@@ -39,6 +39,8 @@ void sdm_fit_observation_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind,
                              .l_ref = state->l_ref,
                              .point_sd = state->point_sd,
                              .point_dof = opts->point_dof,
+                             .outliers = state->outliers,
+                             .outlier_density = state->outlier_density,
                              .n_in = appearance->n_inside,
                              .n_tissues = appearance->n_inside + appearance->n_outside,
                              .n_channels = 1};
@@ -241,17 +243,45 @@ static void likelihood_of_label(const fit_observation *obs, double u, double dis
     out->residual = variance > 0 ? (u - mu) / sqrt(variance) : 0;
 }
 
+// log density of the distance of a point that is no outlier; *t_weight as in log_law()
+static double log_point(const fit_observation *obs, double distance, double *t_weight)
+{
+    const double r = distance / obs->point_sd;
+    return log_law(law_constant(obs->point_dof), obs->point_dof, r * r, t_weight) -
+           log(obs->point_sd);
+}
+
+// the probability that the point is no outlier, and the log density of its distance
+static double point_belongs(const fit_observation *obs, double distance, double *t_weight,
+                            double *log_likelihood)
+{
+    const double log_p = log_point(obs, distance, t_weight);
+    *log_likelihood = log_p;
+    if (!(obs->outliers > 0)) return 1;
+    double u[2] = {log(1 - obs->outliers) + log_p, log(obs->outliers * obs->outlier_density)};
+    *log_likelihood = normalise(u, 2);
+    return u[0];
+}
+
+double sdm_fit_point_belongs(const fit_observation *obs, double distance)
+{
+    double ignored, t_weight;
+    return point_belongs(obs, distance, &t_weight, &ignored);
+}
+
+// Student's t about the surface, mixed with outliers at any distance
 static void likelihood_of_point(const fit_observation *obs, double distance, fit_likelihood *out)
 {
     const double r = distance / obs->point_sd,
                  information = (obs->point_dof + 1) / (obs->point_dof + 3);
     double t_weight;
-    out->log_likelihood = log_law(law_constant(obs->point_dof), obs->point_dof, r * r, &t_weight) -
-                          log(obs->point_sd);
-    out->score[0] = -t_weight * r / obs->point_sd;
-    out->complete[0] = out->observed[0] = information / (obs->point_sd * obs->point_sd);
+    const double belongs = point_belongs(obs, distance, &t_weight, &out->log_likelihood),
+                 score = -t_weight * r / obs->point_sd;
+    out->score[0] = belongs * score;
+    out->complete[0] = belongs * information / (obs->point_sd * obs->point_sd);
+    out->observed[0] = out->complete[0] - belongs * (1 - belongs) * score * score;
     out->root[0] = -sqrt(information) / obs->point_sd;
-    out->residual = t_weight * r / sqrt(information);
+    out->residual = belongs * t_weight * r / sqrt(information);
 }
 
 void sdm_fit_likelihood(const fit_observation *obs, double value, const float *log_weight,

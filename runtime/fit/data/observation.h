@@ -38,6 +38,8 @@ typedef struct fit_observation {
     /* scale of the logistic prior of labels (mm); sd (mm) and degrees of freedom of points about
      * the surface */
     double l_ref, point_sd, point_dof;
+    /* share of outliers among the points, and the density of their distances, per mm */
+    double outliers, outlier_density;
     /* numbers of inside tissues, all tissues, channels in use, pairs in use */
     size_t n_in, n_tissues, n_channels, n_pairs;
     /* [n_tissues] inside first; weights sum to 1 inside, and to 1 outside */
@@ -54,6 +56,9 @@ typedef struct fit_observation {
  * of `state`. */
 void sdm_fit_observation_prepare(const sdm_fit_opts *opts, sdm_fit_kind kind,
                                  const fit_state *state, fit_observation *obs);
+
+/* Probability that a point at this distance (mm) is no outlier. */
+double sdm_fit_point_belongs(const fit_observation *obs, double distance);
 
 /* Likelihood of one sample. Sets all members of *out if `derivatives`, else log_likelihood alone.
    log_weight[n_tissues - n_in]: log weights of the outside tissues at the sample (partial volume

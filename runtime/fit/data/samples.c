@@ -135,7 +135,7 @@ sdm_status sdm_fit_samples_choose(const sdm_fit_target *target, const sdm_fit_op
     sdm_status s = SDM_OK;
     samples->n = samples->n_nan = 0;
     if (target->kind == SDM_FIT_POINTS) {
-        for (size_t i = 0; i < target->n_points && !s; i++)
+        for (size_t i = 0; i < target->n_points && !s; i += stride)
             s = samples_append(samples, target->points + 3 * i, 0, i, &differ, err);
     } else {
         s = voxels_choose(target, opts, region, stride, samples, &differ, err);

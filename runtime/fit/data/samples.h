@@ -47,9 +47,9 @@ typedef struct fit_region {
     size_t max_samples;
 } fit_region;
 
-/* Chooses as samples the voxels of a region, every stride-th along each axis, or all points of a
-   point target. *changed: the samples differ from the earlier ones; the tissue field is then
-   removed. SDM_E_FORMAT: a value is infinite. */
+/* Chooses as samples the voxels of a region, every stride-th along each axis, or every
+   stride-th point of a point target. *changed: the samples differ from the earlier ones; the tissue
+   field is then removed. SDM_E_FORMAT: a value is infinite. */
 sdm_status sdm_fit_samples_choose(const sdm_fit_target *target, const sdm_fit_opts *opts,
                                   const fit_region *region, size_t stride, fit_samples *samples,
                                   bool *changed, sdm_error *err);

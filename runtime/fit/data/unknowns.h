@@ -24,6 +24,8 @@ typedef struct fit_state {
     double rotation[9], translation[3];
     /* mm: sd of the point spread; scale of the logistic prior; sd of points about the surface */
     double blur, l_ref, point_sd;
+    /* points: share of outliers, whose distances are spread evenly over this density, per mm */
+    double outliers, outlier_density;
     /* intensity distributions of the tissues */
     sdm_fit_appearance appearance;
 } fit_state;

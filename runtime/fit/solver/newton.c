@@ -9,6 +9,7 @@
 #include "anderson.h"
 #include "averaged_gradient.h"
 #include "objective.h"
+#include "open_motions.h"
 #include "prior.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
@@ -108,6 +109,7 @@ static bool step_find(const fit_problem *p, const fit_newton_opts *opts, double 
     memcpy(a, observed ? p->information.observed : p->information.complete, n * n * sizeof *a);
     (void)sdm_fit_prior(p, &p->state, gradient, a, NULL);
     sdm_fit_add_weak_prior(p, a);
+    sdm_fit_open_motions_stop(p, a);
     fit_limits limits;
     limits_set(p, opts, &limits);
     if (!sdm_fit_bounded_step(n, a, gradient, damping, &limits, step, work + n * n)) return false;
@@ -262,12 +264,13 @@ static void acceleration_advance(fit_problem *p, const fit_newton_opts *opts, fi
 /* One accelerated step. *size: size of the plain step, an estimate of the distance to the maximum.
  * *taken = false: there is no plain step, or the objective dropped. */
 static sdm_status accelerated_step(fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
-                                   fit_damping *d, double *step, double *work, double *size,
-                                   bool *taken, sdm_error *err)
+                                   fit_damping *d, double *step, double *plain, double *work,
+                                   double *size, bool *taken, sdm_error *err)
 {
     *taken = false;
     if (!step_find(p, opts, 0, true, step, work)) return SDM_OK;
     *size = step_size(p, step);
+    memcpy(plain, step, p->information.n_unknowns * sizeof *plain);
     step_accelerate(p, opts, r, step);
     const sdm_status s = step_try(p, step, d, taken, err);
     if (!s && *taken) acceleration_advance(p, opts, r, step);
@@ -277,20 +280,46 @@ static sdm_status accelerated_step(fit_problem *p, const fit_newton_opts *opts, 
 /* One accelerated step with the averaged gradient. The objective is not tested: the step may cross
  * the kink that is the maximum. */
 static sdm_status averaged_step(fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
-                                double *step, double *work, double *size, bool *taken,
-                                sdm_error *err)
+                                double *step, double *plain, double *work, double *size,
+                                bool *taken, sdm_error *err)
 {
     sdm_status s = sdm_fit_average_gradient(p, opts->half_width, err);
     if (s) return s;
     *taken = step_find(p, opts, 0, true, step, work) || step_find(p, opts, 0, false, step, work);
     if (!*taken) return SDM_OK;
     *size = step_size(p, step);
+    memcpy(plain, step, p->information.n_unknowns * sizeof *plain);
     step_accelerate(p, opts, r, step);
     const fit_state from = p->state;
     sdm_fit_state_move(p, &from, step, &p->state);
     s = sdm_fit_evaluate(p, err);
     if (!s) acceleration_advance(p, opts, r, step);
     return s;
+}
+
+// remembers where the step leads and, plain[n_params + 6], where the undamped one would lead; NULL:
+// there is none, or the damping hides it
+static void iteration_remember(fit_problem *p, const double *step, const double *plain)
+{
+    const size_t n = p->n_params + 6, now = p->n_recent % FIT_RECENT,
+                 before = (p->n_recent + FIT_RECENT - 1) % FIT_RECENT;
+    for (size_t i = 0; i < n; i++) {
+        p->recent_position[now][i] = (p->n_recent ? p->recent_position[before][i] : 0) + step[i];
+        p->recent_step[now][i] = plain ? plain[i] : INFINITY;
+    }
+    p->n_recent++;
+}
+
+double sdm_fit_unrest(const fit_problem *p, size_t i)
+{
+    double low = INFINITY, high = -INFINITY, mean = 0;
+    if (p->n_recent < FIT_RECENT) return INFINITY;
+    for (size_t k = 0; k < FIT_RECENT; k++) {
+        low = fmin(low, p->recent_position[k][i]);
+        high = fmax(high, p->recent_position[k][i]);
+        mean += p->recent_step[k][i] / FIT_RECENT;
+    }
+    return fmax(0.5 * (high - low), fabs(mean));
 }
 
 // reports an iteration and, except in the search, stores its objective
@@ -329,7 +358,7 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
                           sdm_error *err)
 {
     const size_t n = p->information.n_unknowns;
-    double step[FIT_UNKNOWNS_MAX], *work = NULL;
+    double step[FIT_UNKNOWNS_MAX], plain[FIT_UNKNOWNS_MAX], *work = NULL;
     fit_acceleration acceleration = {0};
     fit_damping damping = {.factor = opts->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4};
     double taken_before = INFINITY;
@@ -343,18 +372,21 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
         if (!opts->keep_appearance) s = sdm_fit_appearance_update(p, err);
         if (s) break;
         // unknowns: an accelerated step near the maximum, a damped one otherwise
-        bool taken = false;
+        bool taken = false, undamped = true;
         double size = INFINITY;
         if (opts->averaged)
-            s = averaged_step(p, opts, &acceleration, step, work, &size, &taken, err);
+            s = averaged_step(p, opts, &acceleration, step, plain, work, &size, &taken, err);
         else if (out->step <= ACCELERATED_BELOW)
-            s = accelerated_step(p, opts, &acceleration, &damping, step, work, &size, &taken, err);
+            s = accelerated_step(p, opts, &acceleration, &damping, step, plain, work, &size, &taken,
+                                 err);
         if (!s && !taken && !opts->averaged) {
             acceleration.anderson.count = 0;
             s = damped_step(p, opts, &damping, step, work, &taken, err);
             // with much damping the size of a step does not tell the distance to the maximum
             if (taken && (damping.factor <= DAMPING_SMALL || !isfinite(size)))
                 size = step_size(p, step);
+            undamped = damping.factor <= DAMPING_SMALL;
+            memcpy(plain, step, n * sizeof *plain);
         }
         if (s) break;
         if (!taken) {
@@ -364,6 +396,7 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
             break;
         }
         // converged?
+        iteration_remember(p, step, undamped ? plain : NULL);
         const double taken_size = step_size(p, step);
         const bool steep = opts->averaged && size <= STEEP_MAX * opts->eps &&
                            fmax(taken_size, taken_before) <= opts->eps;

@@ -38,6 +38,11 @@ typedef struct fit_newton_end {
 sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newton_end *out,
                           sdm_error *err);
 
+/* How much unknown i of n_params + 6 still moves: half of the range of its values in the last
+   FIT_RECENT iterations, or the mean of the undamped steps in them, if that is larger; infinite if
+   there were fewer iterations, or if damping hid the steps. In the unit of the covariance. */
+double sdm_fit_unrest(const fit_problem *p, size_t i);
+
 /* *to = *from moved by step[information.n_unknowns]: parameters are clamped to their bounds; the
    rotation step (rad) is a rotation vector about the world's axes, applied after the pose. */
 void sdm_fit_state_move(const fit_problem *p, const fit_state *from, const double *step,

@@ -21,6 +21,9 @@
 
 #include "information.h"
 
+/* number of the last iterations that are remembered */
+enum { FIT_RECENT = 8 };
+
 typedef struct fit_problem {
     /* inputs, owned by the caller of sdm_fit() or by its stack frame */
     const sdm_fit_source *source;
@@ -41,6 +44,12 @@ typedef struct fit_problem {
     double noise_factor;
     /* where the start shape lies on its map */
     fit_extent extent;
+
+    /* rigid motions that the data do not determine: rotation vector (rad), then translation at the
+     * origin of the shape (mm); and the largest eigenvalue of the information of the pose, with
+     * translations in units of the reach, see open_motions.h */
+    size_t n_motions;
+    double motion[6][6], pose_information;
 
     /* maps of the shape and their derivatives */
     fit_maps maps;
@@ -63,6 +72,11 @@ typedef struct fit_problem {
     /* [n_iterations] log-posterior density after each iteration, except those of the search */
     double *objective;
     size_t n_iterations, objective_capacity;
+    /* ring of the last n_recent iterations: sum of the steps of each unknown [n_params + 6], and
+     * the undamped step, see sdm_fit_unrest() */
+    double recent_position[FIT_RECENT][FIT_PARAMS_MAX + 6];
+    double recent_step[FIT_RECENT][FIT_PARAMS_MAX + 6];
+    size_t n_recent;
     /* number of iterations so far, including those of the search */
     size_t n_steps;
     /* where the search for the start is, for progress(); see sdm_fit_progress */

@@ -18,6 +18,9 @@ static double contrast(const fit_problem *p)
     return fabs(p->opts->appearance.inside[0].mean - p->opts->appearance.outside[0].mean);
 }
 
+// the share of outliers stays where it can still change
+static double outliers_limit(double share) { return fmin(fmax(share, 1e-6), 0.9); }
+
 static sdm_fit_law *tissue_law(sdm_fit_appearance *a, size_t i)
 {
     return i < a->n_inside ? &a->inside[i] : &a->outside[i - a->n_inside];
@@ -27,7 +30,10 @@ size_t sdm_fit_appearance_pack(const fit_problem *p, double *x)
 {
     fit_state s = p->state;
     size_t n = 0;
-    if (p->target->kind == SDM_FIT_POINTS) x[n++] = log(s.point_sd);
+    if (p->target->kind == SDM_FIT_POINTS) {
+        x[n++] = log(s.point_sd);
+        x[n++] = log(s.outliers / (1 - s.outliers));
+    }
     for (size_t i = 0; i < p->observation.n_tissues; i++) {
         const sdm_fit_law *t = tissue_law(&s.appearance, i);
         x[n++] = log(t->weight);
@@ -40,7 +46,10 @@ size_t sdm_fit_appearance_pack(const fit_problem *p, double *x)
 void sdm_fit_appearance_unpack(fit_problem *p, const double *x)
 {
     fit_state *s = &p->state;
-    if (p->target->kind == SDM_FIT_POINTS) s->point_sd = exp(*x);
+    if (p->target->kind == SDM_FIT_POINTS) {
+        s->point_sd = exp(x[0]);
+        s->outliers = outliers_limit(1 / (1 + exp(-x[1])));
+    }
     for (size_t i = 0; i < p->observation.n_tissues; i++) {
         sdm_fit_law *t = tissue_law(&s->appearance, i);
         t->weight = exp(*x++);
@@ -67,18 +76,27 @@ void sdm_fit_appearance_mark_absent(fit_problem *p)
     }
 }
 
+// points: share of the outliers, and scale of Student's t by iterated reweighting of the others
+static void points_update(fit_problem *p)
+{
+    const double dof = p->opts->point_dof;
+    double sum = 0, n = 0;
+    for (size_t i = 0; i < p->samples.n; i++) {
+        const double r = p->samples.field[i] / p->state.point_sd,
+                     w = sdm_fit_point_belongs(&p->observation, p->samples.field[i]);
+        sum += w * (dof + 1) / (dof + r * r) * r * r;
+        n += w;
+    }
+    p->state.point_sd *= sqrt(fmax(sum / fmax(n, 1), 1e-6));
+    p->state.outliers = outliers_limit(1 - n / (double)p->samples.n);
+}
+
 sdm_status sdm_fit_appearance_update(fit_problem *p, sdm_error *err)
 {
     const sdm_status s = sdm_fit_tissue_field_update(p, err);
     if (s) return s;
     if (p->target->kind == SDM_FIT_POINTS) {
-        // points: scale of Student's t, by iterated reweighting
-        double sum = 0;
-        for (size_t i = 0; i < p->samples.n; i++) {
-            const double r = p->samples.field[i] / p->state.point_sd;
-            sum += (p->opts->point_dof + 1) / (p->opts->point_dof + r * r) * r * r;
-        }
-        p->state.point_sd *= sqrt(fmax(sum / (double)p->samples.n, 1e-6));
+        points_update(p);
     } else if (p->target->kind == SDM_FIT_IMAGE) {
         fit_moments m;
         sdm_fit_samples_moments(&p->samples, &p->observation, p->opts->n_threads, &m);

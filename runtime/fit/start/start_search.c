@@ -76,7 +76,9 @@ static sdm_status samples_near_choose(fit_problem *p, double wanted, sdm_error *
     sdm_fit_to_world(&p->state, turns ? o->pivot : p->extent.centre, region.centre);
     if (turns) region.radius += sqrt(v3_dist2(o->pivot, p->extent.centre));
     p->stride = 1;
-    if (p->target->kind != SDM_FIT_POINTS) {
+    if (p->target->kind == SDM_FIT_POINTS) {
+        while ((double)p->target->n_points / (double)p->stride > 1.5 * wanted) p->stride++;
+    } else {
         const double *h = p->target->grid.spacing;
         double box = 1; // voxels of the ball's bounding box in the image
         for (int a = 0; a < 3; a++)
@@ -84,7 +86,14 @@ static sdm_status samples_near_choose(fit_problem *p, double wanted, sdm_error *
         while (box / pow((double)p->stride, 3) > 2 * wanted) p->stride++;
     }
     bool changed;
-    return sdm_fit_samples_choose(p->target, o, &region, p->stride, &p->samples, &changed, err);
+    sdm_status s =
+        sdm_fit_samples_choose(p->target, o, &region, p->stride, &p->samples, &changed, err);
+    // NaN in every second slice, for example, may meet the stride
+    while (!s && p->samples.n < p->samples.n_nan && p->stride > 1) {
+        p->stride--;
+        s = sdm_fit_samples_choose(p->target, o, &region, p->stride, &p->samples, &changed, err);
+    }
+    return s;
 }
 
 // error: no sample near the start

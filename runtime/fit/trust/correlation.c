@@ -22,17 +22,19 @@
 // terms of the Neumann series
 #define NEUMANN_TERMS 4
 
-// weighted mean of e_n e_(n+lag) over a subsample
+// weighted mean of e_n e_(n+lag) and e_n e_(n-lag) over a subsample
 static double correlation_at(const fit_neighbours *v, const uint32_t *list, size_t n,
                              const int lag[3])
 {
     double sum = 0, weight = 0;
     for (size_t k = 0; k < n; k++) {
-        const size_t i = list[k], j = sdm_fit_neighbour(v, i, lag, 1);
-        if (j == SIZE_MAX) continue;
-        const double w = (double)v->weight[i] * (double)v->weight[j];
-        sum += w * (double)v->residual[i] * (double)v->residual[j];
-        weight += w;
+        for (int sign = -1; sign <= 1; sign += 2) {
+            const size_t i = list[k], j = sdm_fit_neighbour(v, i, lag, sign);
+            if (j == SIZE_MAX) continue;
+            const double w = (double)v->weight[i] * (double)v->weight[j];
+            sum += w * (double)v->residual[i] * (double)v->residual[j];
+            weight += w;
+        }
     }
     return weight > 0 ? sum / weight : 0;
 }

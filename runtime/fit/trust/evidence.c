@@ -6,10 +6,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "neighbours.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
-// largest number of voxels in the subsample; number of iterations of expectation-maximisation
+// number of voxels in the subsample; number of iterations of expectation-maximisation
 #define SUBSAMPLE 20000
 #define ITERATIONS 40
 
@@ -31,12 +32,14 @@ static double mixture_log_density(const fit_observation *obs, double value, cons
     return most + log(sum);
 }
 
-// re-estimates the tissues on every step-th sample
-static void mixture_em_step(fit_observation *obs, const fit_samples *s, size_t step, double min_sd)
+// re-estimates the tissues on the samples list[n_list]
+static void mixture_em_step(fit_observation *obs, const fit_samples *s, const size_t *list,
+                            size_t n_list, double min_sd)
 {
     double n[FIT_TISSUES_MAX] = {0}, count[FIT_TISSUES_MAX] = {0}, first[FIT_TISSUES_MAX] = {0},
            square[FIT_TISSUES_MAX] = {0}, p[FIT_TISSUES_MAX], all = 0;
-    for (size_t i = 0; i < s->n; i += step) {
+    for (size_t l = 0; l < n_list; l++) {
+        const size_t i = list[l];
         (void)mixture_log_density(obs, (double)s->value[i], fit_sample_weights(s, i), p);
         all++;
         for (size_t k = 0; k < obs->n_tissues; k++) {
@@ -62,13 +65,20 @@ sdm_status sdm_fit_shapeless_log_likelihood(const fit_problem *p, double *log_li
 {
     fit_observation obs = p->observation;
     double *parts = NULL;
-    const sdm_status s = SDM_ALLOC(&parts, FIT_SLICES, "log-likelihood of the fit", err);
-    if (s) return s;
+    size_t *list = NULL, n = 0;
+    sdm_status s = SDM_ALLOC(&list, p->samples.n, "log-likelihood of the fit", err);
+    if (!s) s = SDM_ALLOC(&parts, FIT_SLICES, "log-likelihood of the fit", err);
+    if (s) {
+        sdm_free(list);
+        return s;
+    }
+    const double share = (double)SUBSAMPLE / (double)p->samples.n;
+    for (size_t i = 0; i < p->samples.n; i++)
+        if (sdm_fit_sample_draw(p, i) <= share) list[n++] = i;
     const double step = fabs(obs.tissue[0].mean - obs.tissue[obs.n_in].mean);
     // start: half inside, half outside
     for (size_t i = 0; i < obs.n_tissues; i++) obs.tissue[i].weight *= 0.5;
-    for (int i = 0; i < ITERATIONS; i++)
-        mixture_em_step(&obs, &p->samples, p->samples.n / SUBSAMPLE + 1, 1e-3 * step);
+    for (int i = 0; i < ITERATIONS; i++) mixture_em_step(&obs, &p->samples, list, n, 1e-3 * step);
     const int n_threads = sdm_threads(p->opts->n_threads);
     (void)n_threads; // without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
@@ -82,6 +92,7 @@ sdm_status sdm_fit_shapeless_log_likelihood(const fit_problem *p, double *log_li
     *log_likelihood = 0;
     for (size_t slice = 0; slice < FIT_SLICES; slice++) *log_likelihood += parts[slice];
     sdm_free(parts);
+    sdm_free(list);
     return SDM_OK;
 }
 

@@ -29,6 +29,21 @@ size_t sdm_fit_inner_band_count(const fit_problem *p)
     return n;
 }
 
+// positions are rounded to this part of the shortest edge of a voxel, after a shift that keeps the
+// voxels of common grids away from where the rounding changes
+#define QUANTUM 0.1
+#define SHIFT 0.37
+
+double sdm_fit_sample_draw(const fit_problem *p, size_t sample)
+{
+    const double *h = p->target->grid.spacing, *x = p->samples.world + 3 * sample;
+    const double quantum = QUANTUM * fmin(h[0], fmin(h[1], h[2]));
+    uint64_t hash = 0;
+    for (int k = 0; k < 3; k++)
+        hash = sdm_mix64(hash ^ (uint64_t)(int64_t)floor(x[k] / quantum + SHIFT));
+    return sdm_rng_uniform(0, 0, hash);
+}
+
 // bounding box of the inner band
 static void box_find(const fit_problem *p, fit_neighbours *v)
 {
@@ -80,7 +95,7 @@ static void neighbours_fill(const fit_problem *p, fit_neighbours *v)
         // residual, weight and position
         v->residual[count] = (float)r.residual;
         v->weight[count] = (float)fabs(r.root[0]);
-        v->draw[count] = (float)sdm_rng_uniform(0, 0, s->voxel[i]);
+        v->draw[count] = (float)sdm_fit_sample_draw(p, i);
         int64_t index[3];
         voxel_index(&p->target->grid, s->voxel[i], index);
         for (int a = 0; a < 3; a++)

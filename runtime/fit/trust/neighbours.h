@@ -25,8 +25,8 @@ typedef struct fit_neighbours {
     uint32_t *number_at;
     /* [n][3] index of each voxel in the box, in steps */
     int32_t *position;
-    /* [n] random number 0 .. 1, a function of the voxel's index in the image alone; a subsample is
-     * the voxels whose number is at most a threshold */
+    /* [n] random number of each voxel, see sdm_fit_sample_draw(); a subsample is the voxels whose
+     * number is at most a threshold */
     float *draw;
     /* [n] normalised residual; weight of the voxel in correlations */
     float *residual, *weight;
@@ -46,6 +46,10 @@ void sdm_fit_neighbours_dispose(fit_neighbours *v);
    returns the number of such samples. */
 bool sdm_fit_in_inner_band(const fit_problem *p, size_t sample);
 size_t sdm_fit_inner_band_count(const fit_problem *p);
+
+/* A random number 0 .. 1, a function of the position in the world alone: another order of the axes
+ * in memory, or another field of view, selects the same voxels. Images and label maps only. */
+double sdm_fit_sample_draw(const fit_problem *p, size_t sample);
 
 /* Threshold of `draw` that selects about `wanted` voxels; above 1 where there are fewer. */
 float sdm_fit_neighbours_threshold(const fit_neighbours *v, double wanted);

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "fit/solver/open_motions.h"
 #include "fit/solver/prior.h"
 #include "fit/solver/solve.h"
 #include "score_covariance.h"
@@ -55,6 +56,7 @@ static bool influence_compute(const fit_problem *p, bool with_priors, double *in
                n * n * sizeof *information);
         if (with_priors) (void)sdm_fit_prior(p, &p->state, NULL, information, NULL);
         sdm_fit_add_weak_prior(p, information);
+        sdm_fit_open_motions_stop(p, information);
         submatrix(n, information, m, list, small);
         if (!sdm_fit_cholesky(m, small, factor, scale)) continue;
         for (size_t j = 0; j < m; j++) {
@@ -83,6 +85,9 @@ static double sandwich(size_t n, const double *influence, const double *scatter,
 // voxels
 #define LABEL_ERROR 0.12
 #define LABEL_MAP_ERROR 0.03
+// rms error of the distance near the surface that is interpolated from an exact map, in voxels of
+// the map
+#define POINT_MAP_ERROR 0.01
 
 static double longest_edge(const sdm_grid *g)
 {
@@ -100,16 +105,18 @@ static double coarsest_voxel(const fit_problem *p)
 // maps); and of labels, whose surface is known to a part of a voxel
 static double model_error(const fit_problem *p)
 {
+    const bool points = p->target->kind == SDM_FIT_POINTS;
     double square = 0;
-    if (p->given_labels) {
-        const double labels = LABEL_ERROR * longest_edge(&p->target->grid),
-                     map = LABEL_MAP_ERROR * longest_edge(&p->maps.grid);
+    if (p->given_labels || points) {
+        const double labels = points ? 0 : LABEL_ERROR * longest_edge(&p->target->grid),
+                     map =
+                         (points ? POINT_MAP_ERROR : LABEL_MAP_ERROR) * longest_edge(&p->maps.grid);
         square = labels * labels + map * map;
     }
     if (!p->maps.exact) {
         const sdm_accuracy *a = &sdm_model_get_info(p->source->model)->accuracy;
         const double network = a->rmse_near_mm > 0 ? a->rmse_near_mm : a->rmse_mm;
-        if (!p->given_labels) return network;
+        if (!p->given_labels && !points) return network;
         square += network * network;
     }
     return sqrt(square);
@@ -124,8 +131,10 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
     size_t list[FIT_UNKNOWNS_MAX];
     // lost: share of the degrees of freedom that the fit of points uses up; residuals about a fit
     // are smaller than about the truth (MacKinnon and White 1985)
-    const double lost =
-        points ? fmin((double)free_unknowns(p, list) / fmax((double)p->samples.n, 1), 0.5) : 0;
+    const double lost = points ? fmin((double)free_unknowns(p, list) * scatter->noise_factor /
+                                          fmax((double)p->samples.n, 1),
+                                      0.5)
+                               : 0;
     // the score of a prior with weight w has the variance w^2 / sd^2; sdm_fit_prior() gives w /
     // sd^2
     memset(spread, 0, n * n * sizeof *spread);
@@ -142,6 +151,7 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
             const double c = sandwich(n, influence, spread, i, j);
             out->covariance[i * size + j] = out->covariance[j * size + i] = c;
         }
+    sdm_fit_open_motions_spread(p, out->covariance);
     for (size_t i = 0; i < size; i++) {
         const double variance = out->covariance[i * (size + 1)];
         // NaN, since 0 would mean that the unknown is known exactly

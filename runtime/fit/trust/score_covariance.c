@@ -17,6 +17,7 @@
 #include "correlation.h"
 #include "fit/solver/prior.h"
 #include "fit/solver/solve.h"
+#include "point_covariance.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
 
@@ -87,20 +88,6 @@ static void far_add(const fit_problem *p, double factor, double *out)
         for (size_t a = 1; a < p->observation.n_channels; a++)
             for (size_t b = 1; b < p->observation.n_channels; b++)
                 out[(nc + a - 1) * n + nc + b - 1] += factor * r.root[a] * r.root[b];
-    }
-}
-
-// adds the points, which are independent of each other (White 1980)
-static void points_add(const fit_problem *p, double *out)
-{
-    const size_t n = p->information.n_unknowns;
-    for (size_t i = 0; i < p->samples.n; i++) {
-        fit_likelihood r;
-        sdm_fit_likelihood(&p->observation, 0, NULL, p->samples.field[i], true, &r);
-        const float *c = p->samples.jacobian + p->samples.row[i] * n;
-        for (size_t a = 0; a < n; a++)
-            for (size_t b = 0; b < n; b++)
-                out[a * n + b] += r.score[0] * r.score[0] * (double)c[a] * (double)c[b];
     }
 }
 
@@ -192,7 +179,8 @@ sdm_status sdm_fit_score_covariance_create(const fit_problem *p, double model_mm
     sdm_status s = SDM_ALLOC(&out->noise, n * n, "covariance of the score", err);
     if (!s) s = SDM_ALLOC(&out->model, n * n, "covariance of the score", err);
     if (!s && p->target->kind == SDM_FIT_POINTS)
-        points_add(p, out->noise);
+        s = sdm_fit_point_covariance(p, model_mm, !influence, out->noise, out->model,
+                                     &out->noise_factor, err);
     else if (!s && sdm_fit_inner_band_count(p))
         s = voxels_covariance(p, model_mm, influence, out, err);
     if (s) sdm_fit_score_covariance_dispose(out);

@@ -11,7 +11,7 @@ typedef struct fit_score_covariance {
     /* caused by a map error of 1 mm (rms); multiply by the squared error in mm */
     double *model;
     /* sum of the correlations of a residual with all others, itself included; not corrected for the
-     * fit. 1 for points */
+     * fit */
     double noise_factor;
 } fit_score_covariance;
 

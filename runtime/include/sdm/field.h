@@ -6,6 +6,11 @@
    index in the model's grid is within 2^-25 of that of a voxel centre has the value of the map, bit
    for bit. The index of a point is rounded to multiples of 2^-24.
 
+   A model may have a fine level (sdm_model_info.fine_width, docs/grids.md). Then the map has half
+   the spacing before it is continued: halfway between its voxels the polynomial through the six
+   nearest ones, which a small network corrects at creases of the distance. "The map" below is then
+   this map; the voxels of the model's own grid keep their bits.
+
    The model knows the distance in its box: the box of the voxel centres of its grid. Let a point x
    lie outside of the box, let y be the nearest point of the box and r = |x - y|. Every point s of
    the box fulfils |x - s|^2 >= r^2 + |y - s|^2, since the box is convex. The distance of x to the

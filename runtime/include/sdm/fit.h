@@ -28,6 +28,7 @@
 #define SDM_FIT_H
 
 #include "sdm/grid.h"
+#include "sdm/mesh.h"
 #include "sdm/model.h"
 #include "sdm/pose.h"
 #include "sdm/registry.h"
@@ -157,7 +158,8 @@ typedef struct sdm_fit_opts {
        estimated unless keep_appearance is set */
     double point_sd;
     /* points: degrees of freedom of Student's t for the distances, > 0; small values tolerate
-       outliers */
+       outliers. Besides, a share of the points, estimated unless keep_appearance is set, may lie
+       anywhere: their distances are spread evenly over the size of the shape */
     double point_dof;
 
     /* [n_params] start values of the parameters; NULL: the defaults of the shape */
@@ -230,7 +232,95 @@ typedef struct sdm_fit_opts {
     bool (*cancelled)(void *user);
     /* passed to progress() and cancelled() */
     void *user;
+
+    /* 0 .. 1: share of the volume of the shape that need not be of the inside's material, see
+       SDM_FIT_CHECK_EMPTY; 0: the shape is exact, and residuals inside it must be noise. Labels and
+       points never show a surface exactly: for them at least 0.05, and the same outside. Real
+       organs differ from the model of a shape; this states by how much they may */
+    double tolerance;
+    /* images, >= 0: volume of the inside's material that may lie beside the shape, over the volume
+       of the shape, see SDM_FIT_CHECK_MISSING: other spaces of the same material */
+    double beside;
 } sdm_fit_opts;
+
+/* What is checked before a fit is trusted. New checks are added at the end. */
+typedef enum sdm_fit_check_kind {
+    /* image: evidence of the shape against the same voxels without a shape (Schwarz 1978) */
+    SDM_FIT_CHECK_NO_SHAPE = 0,
+    /* image: the inside is darker or brighter than the outside as at the start; figure: inside mean
+       less outside mean */
+    SDM_FIT_CHECK_CONTRAST,
+    /* radius of the largest ball in the shape, mm, below sdm_fit_opts.cavity */
+    SDM_FIT_CHECK_CAVITY,
+    /* share of the volume of the shape that lies in the image */
+    SDM_FIT_CHECK_IN_IMAGE,
+    /* the iterations converged; figure: their number */
+    SDM_FIT_CHECK_CONVERGED,
+    /* Residuals of whole neighbourhoods inside the surface, half as large as the shape is thick,
+       against the noise: mean of (mean residual)^2 / variance. 1 where the residuals are noise.
+       Size and correlation of the noise are robust statistics far from the surface (Hampel 1974;
+       Genton 1998); the limit is one that noise exceeds once in a thousand fits */
+    SDM_FIT_CHECK_RESIDUALS,
+    /* the same outside of the surface, where other spaces of the same material may lie */
+    SDM_FIT_CHECK_BESIDE,
+    /* Share of the volume of the shape that is not of the inside's material: where the residuals of
+       a neighbourhood exceed three standard deviations of the noise. Points: the volume between
+       their surface and that of the shape, inside the latter */
+    SDM_FIT_CHECK_EMPTY,
+    /* Volume outside of the surface, up to the margin, that is of the inside's material, over the
+       volume of the shape; measured in the same way */
+    SDM_FIT_CHECK_MISSING,
+    /* image: sd of the inside tissue in the fit over the robust sd of the voxels deep inside; a
+       second material inside the shape makes it large */
+    SDM_FIT_CHECK_INSIDE,
+    /* the same for the main tissue outside */
+    SDM_FIT_CHECK_OUTSIDE,
+    /* image: difference of the inside mean from that of the start, in sd of the start */
+    SDM_FIT_CHECK_GIVEN,
+    /* number of parameters at an end of their range */
+    SDM_FIT_CHECK_BOUNDS,
+    /* image: gain in log-likelihood, as of independent voxels, over the ellipsoid of the same
+       moments in the same place, per unknown of the shape; not for shapes that are ellipsoids
+       nearly */
+    SDM_FIT_CHECK_BLOB,
+    /* with keep_pose: gain of a free pose in log-likelihood, as of independent samples */
+    SDM_FIT_CHECK_KEPT_POSE,
+    /* the shape against its mirror image, see sdm_fit_compare() */
+    SDM_FIT_CHECK_MIRROR,
+    SDM_FIT_N_CHECKS
+} sdm_fit_check_kind;
+
+/* Name of a check, one or two words ("residuals"); NULL: no such check. [any thread] */
+SDM_API const char *sdm_fit_check_name(sdm_fit_check_kind kind);
+
+typedef enum sdm_fit_grade {
+    SDM_FIT_PASSED = 0,
+    /* noticed, but no reason to distrust the fit */
+    SDM_FIT_DOUBTFUL = 1,
+    SDM_FIT_FAILED = 2
+} sdm_fit_grade;
+
+/* The result of one check. */
+typedef struct sdm_fit_finding {
+    sdm_fit_check_kind kind;
+    sdm_fit_grade grade;
+    /* the figure, and the limit that separates passed from the rest; NaN: none */
+    double figure, limit;
+    /* why it did not pass; empty if it passed */
+    char text[240];
+} sdm_fit_finding;
+
+/* All checks of a fit in the order of their kinds, those that do not apply left out. */
+typedef struct sdm_fit_verdict {
+    /* the worst of the findings; failed also where the fit ended before they were made */
+    sdm_fit_grade grade;
+    size_t n_findings;
+    sdm_fit_finding findings[SDM_FIT_N_CHECKS];
+    /* number of neighbourhoods, and their mean (mean residual)^2 / variance, on both sides of the
+       surface together; 0: the fit ended before they were measured */
+    size_t n_units;
+    double chi_square;
+} sdm_fit_verdict;
 
 /* Default options. The tissues are fluid in bone, in Hounsfield units (mean +- sd): inside 40 +-
    170; outside bone 1300 +- 270 and air -880 +- 150. */
@@ -304,8 +394,8 @@ typedef struct sdm_fit_result {
     double noise_factor;
     /* error near the surface of the maps of the last phase, mm: that of the network on held-out
        data, 0 for exact maps; with a label map and partial volume, also that of the voxels of the
-       labels (0.12 of one) and of the maps (0.03 of one). The covariance includes it. NaN as
-       inside_share */
+       labels (0.12 of one) and of the maps (0.03 of one); with points that of the maps (0.01 of
+       one). The covariance includes it. NaN as inside_share */
     double model_error_mm;
     /* partial volume: sd of the point spread, mm; other fits: 0 */
     double blur;
@@ -321,18 +411,68 @@ typedef struct sdm_fit_result {
     /* wall-clock time in total, in maps of the network, in maps of the exact engine, and in the
        search for the start */
     double seconds, seconds_network, seconds_exact, seconds_search;
+
+    /* points: share of outliers, points that lie anywhere; other targets: 0 */
+    double outliers;
+    /* rigid motions that the target does not determine, such as "rotation about the axis (0, 0, 1)
+       through (1, 2, 3) mm" (LPS) of a shape that is symmetric about this axis; empty: none. The
+       fit leaves the pose where the search has it along these, and the covariance holds an angle
+       that may be any. With a prior of the rotation (translation) the prior decides */
+    char open_motions[512];
+    /* keep_pose: what a fit from here with a free pose does: rms motion of the surface along its
+       normal, mm, and gain in log posterior density, as of independent samples (about 3 for the
+       true pose). 0 where the pose is estimated */
+    double kept_pose_motion, kept_pose_gain;
+    /* with sdm_fit_opts.cavity: radius (mm) of the widest ball in a space of the image that looks
+       like the inside; else 0. A smaller cavity leaves out such spaces */
+    double widest_space;
+
+    /* whether and why the fit is to be trusted; sdm_fit() gives SDM_E_QUALITY where it failed */
+    sdm_fit_verdict verdict;
 } sdm_fit_result;
 
 /* Fits the shape of source to target. Errors: SDM_E_ARG: source, options or start, or no voxel near
    the start; SDM_E_RANGE: start parameters out of range; SDM_E_UNSUPPORTED: more than 64
    parameters; SDM_E_FORMAT: infinite or only NaN values, points that are not finite, labels outside
    0 .. 1; SDM_E_NOMEM; SDM_E_CANCELLED; SDM_E_QUALITY: not converged; a constant image; an image
-   that does not determine the shape, shows no such shape or the opposite contrast; less than
-   least_inside of the shape in it; or a shape as wide as the cavities that were left out. After
+   that does not determine the shape; or a check that failed, see sdm_fit_verdict. After
    SDM_E_QUALITY *out holds what is known so far, after other errors it is empty. [any thread] */
 SDM_API sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
                            const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err);
 SDM_API void sdm_fit_dispose(sdm_fit_result *r);
+
+/* points[n][3] = points on the surface of a mesh (mm), for a fit to the mesh: its vertices are
+   dense where it bends and absent from flat faces, and would weigh these places accordingly. The
+   points lie evenly on the boundary of the union of the mesh's volumes (sdm_exact_surface()):
+   surface of one part inside another has none. Each triangle has its share of the area to within
+   one point. The same bits for any number of threads. Errors of sdm_exact_create(); SDM_E_MESH: no
+   area. [any thread] */
+SDM_API sdm_status sdm_fit_surface_points(const sdm_mesh *mesh, size_t n, int n_threads,
+                                          double *points, sdm_error *err);
+
+/* Fits the mirror image of the shape: the shape of source to the target reflected in the world's x,
+   from the start pose reflected in the shape's y about the centroid of the shape. Parameters,
+   evidence and verdict are those of the mirrored shape; the pose belongs to the reflected world. A
+   rival for shapes with a left and a right form, see sdm_fit_compare(). Errors as sdm_fit(). [any
+   thread] */
+SDM_API sdm_status sdm_fit_mirrored(const sdm_fit_source *source, const sdm_fit_target *target,
+                                    const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err);
+
+/* Compares a fit with a rival fit of the same target, for example of the mirror image of the shape.
+   Returns by how much the fit is better, in units of log-likelihood of independent samples; below
+   0: the rival is better; infinite: only one of the two holds an estimate; NaN: neither does.
+   Images: the difference of the evidences. Other targets: the log-likelihood ratio of the mean
+   residuals of neighbourhoods, n / 2 log(chi-square of the rival / chi-square of the fit), whose
+   common variance is estimated. [any thread] */
+SDM_API double sdm_fit_compare(const sdm_fit_result *fit, const sdm_fit_result *rival);
+
+/* Least difference of two fits by which one is preferred, 3: "strong evidence" (Kass and Raftery
+   1995). */
+#define SDM_FIT_PREFERRED 3.0
+
+/* Adds a finding to a verdict in the order of the kinds, or replaces the one of its kind; the grade
+   follows. [any thread, on a verdict of its own] */
+SDM_API void sdm_fit_verdict_add(sdm_fit_verdict *v, const sdm_fit_finding *finding);
 
 /* Morphological closing of a label map by a ball of this radius (mm, > 0; Matheron 1975), in place:
    joins compartments of one shape that are labelled apart. Voxels of values[nz][ny][nx] above 1/2

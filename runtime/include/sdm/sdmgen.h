@@ -26,9 +26,10 @@
  *   fits                  sdm/volume.h          reads images and label maps [sdmgen::image]
  *                         sdm/phantom.h         test images of a shape
  *                         sdm/fit.h             fits a shape to an image, labels or points
+ *   training              sdm/train_file.h      a model from a configuration [sdmgen::training]
  *
  * In brackets: the CMake target of the library with the functions; all others are in
- * sdmgen::sdmgen. sdm/vdb.h is included where it is installed.
+ * sdmgen::sdmgen. sdm/vdb.h and sdm/train_file.h are included where they are installed.
  *
  * For many points of one map, sdm_field_create() computes the map once and sdm_field_points() reads
  * it. The map of a trained network, and the distance at a point:
@@ -79,6 +80,9 @@
 #include "sdm/volume.h"
 
 #if defined(__has_include)
+#if __has_include("sdm/train_file.h")
+#include "sdm/train_file.h"
+#endif
 #if __has_include("sdm/vdb.h")
 #include "sdm/vdb.h"
 #endif

@@ -125,6 +125,7 @@ typedef struct sdm_config {
         int modes;
         int degree;        /* total degree of the polynomial part, 0..12, default 6 */
         int input_degree;  /* total degree of the products fed to the MLP, 1..8, default 4 */
+        int fine;          /* units of a hidden layer of the fine level, 0..256, default 0: none */
         int channels;      /* sdmnn: channels of the first level, 1..512 */
         double dropout;    /* sdmnn: fraction dropped at the two deepest levels, 0..0.9 */
         int skip;          /* deepsdf: hidden layer that also gets the input, 1..15; 0: none */

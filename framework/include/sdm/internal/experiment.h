@@ -34,6 +34,7 @@ typedef enum sdm_figure {
     SDM_FIGURE_MAPS_NETWORK,
     SDM_FIGURE_MAPS_EXACT,
     SDM_FIGURE_WITHIN,
+    SDM_FIGURE_WITHIN_2,
     SDM_N_FIGURES
 } sdm_figure;
 
@@ -72,6 +73,14 @@ typedef enum sdm_experiment_fit {
     SDM_EXPERIMENT_FIT_NAIVE
 } sdm_experiment_fit;
 
+/* What is wrong with the test images of a method, whose fits must then be refused. */
+typedef enum sdm_experiment_wrong {
+    SDM_EXPERIMENT_RIGHT = 0,
+    SDM_EXPERIMENT_MIRRORED, /* the image is the mirror image */
+    SDM_EXPERIMENT_MOVED,    /* the start lies beside the shape, by its size */
+    SDM_EXPERIMENT_ABSENT    /* the image does not hold the shape */
+} sdm_experiment_wrong;
+
 /* An element of `methods`: a network to train, or an engine that needs no training. */
 typedef struct sdm_experiment_method {
     char name[SDM_NAME_MAX];
@@ -81,11 +90,20 @@ typedef struct sdm_experiment_method {
     int64_t samples;   /* number of shapes for measuring errors; 0: as given for the experiment */
     sdm_overrides set; /* keys of the training configuration for this method */
     sdm_mark mark;
+    /* the test images of a fit: name of the method whose shape they show, which makes the fit a
+     * wrong one; "": its own. What else is wrong (sdm_experiment_wrong). 1: labels in place of
+     * images */
+    char shows[SDM_NAME_MAX];
+    int wrong, labels;
+    /* factors on noise and texture, on the blur, and on the contrast of the images, default 1 */
+    double noise, blur, contrast;
 } sdm_experiment_method;
 
 /* An element of `variants`: every method is run once for each variant, e.g. on another grid. */
 typedef struct sdm_experiment_variant {
     char name[SDM_NAME_MAX];
+    /* the maps have (n - 1) finer + 1 voxels where the configuration has n; default 1 */
+    int64_t finer;
     sdm_overrides set;
     sdm_mark mark;
 } sdm_experiment_variant;
@@ -111,8 +129,12 @@ typedef struct sdm_experiment_row {
     const sdm_experiment_method *method;
     const sdm_experiment_variant *variant;     /* NULL: there are no variants */
     const sdm_experiment_reference *reference; /* NULL: none */
-    /* Index of the row whose network this row uses: its own index, except for FIT_POLISH. */
+    /* Index of the row whose network this row uses: its own index, except for FIT_POLISH and for
+       variants that differ in `finer` alone from one before them. */
     size_t network_row;
+    /* Index of the row whose shape the test images of a fit show: its own index, unless the method
+     * has `shows`. */
+    size_t shown_row;
     int64_t samples; /* number of shapes on which errors are measured */
 } sdm_experiment_row;
 

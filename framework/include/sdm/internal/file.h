@@ -22,9 +22,9 @@ sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, s
 typedef struct sdm_outfile sdm_outfile;
 
 /* Opens a new temporary file in the folder of `path`, with a unique name for every call. A regular
- * file that exists at `path` is replaced at commit and hands its permissions on; a link is replaced
- * by a file. SDM_E_IO if the folder is
- * not writable, or if `path` exists and is not a regular file. SDM_E_NOMEM. */
+ * file that exists at `path` is replaced at commit and hands its permissions on; its owner may
+ * write the new one. A link is replaced by a file. SDM_E_IO if the folder is not writable, or if
+ * `path` exists and is not a regular file. SDM_E_NOMEM. */
 SDM_INTERNAL_API sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err);
 
 /* Name of the temporary file, for libraries that open files by name; valid until commit or

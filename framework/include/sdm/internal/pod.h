@@ -57,8 +57,8 @@ void sdm_poly_eval(const uint8_t *exponents, size_t n_terms, size_t n, size_t de
                    const double *x, float *phi, float *dphi);
 
 /* Activation function: y[n] = f(x[n]), and dy[n] = f'(x[n]) unless dy is NULL. kind: 0 SiLU,
-   1 tanh, 2 ReLU, 3 leaky ReLU (slope 0.02 for x < 0; Chen and Zhang 2019). y may be x.
-   [any thread] */
+   1 tanh, 2 ReLU, 3 leaky ReLU (slope 0.02 for x < 0; Chen and Zhang 2019),
+   4 x / 2 (1 + x / sqrt(1 + x^2)), for the fine level. y may be x. [any thread] */
 void sdm_activate(int kind, size_t n, const float *x, float *y, float *dy);
 
 #define SDM_POD_MAX_LEVELS 8

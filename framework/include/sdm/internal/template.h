@@ -10,8 +10,10 @@
                                       (free-form deformation; Rueckert et al. 1999)
      x       = T_c(y + U_c(y))        carries a point y of the template to the point x of the map
      d_c(x)  = d0_c(y) / |grad_x d0_c(y(x))| + r(y)
-     map     = min over the parts c of d_c; in a block of 4 x 4 x 4 voxels beyond the lattice `near`
-   of a part (not an affine one), d_c is interpolated between the corners of the block
+     map     = min over the parts c of d_c
+   d_c is interpolated between the corners of a block of 4 x 4 x 4 voxels if the part is rigid and
+   the block lies beyond the lattice `near`, or if the part has a warp and the block lies 4 voxels
+   from its surface; between 3 and 4 voxels the interpolation is blended in.
 
    d0_c is the exact map of part c at the default parameters. The quotient is the distance to first
    order (Taubin 1994): it is exact on the surface, with its gradient. The correction r is a `pod`

@@ -23,6 +23,16 @@ static inline void v3_cross(const double a[3], const double b[3], double r[3])
     r[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+/* r = (b - a) x (c - a): normal of the triangle a, b, c, twice as long as its area */
+static inline void v3_triangle_normal(const double a[3], const double b[3], const double c[3],
+                                      double r[3])
+{
+    double u[3], v[3];
+    v3_sub(b, a, u);
+    v3_sub(c, a, v);
+    v3_cross(u, v, r);
+}
+
 /* length of a */
 static inline double v3_norm(const double a[3]) { return sqrt(v3_dot(a, a)); }
 

@@ -63,15 +63,33 @@ typedef struct sdm_train_report {
     int64_t steps, samples;
     double seconds;
     sdm_verdict verdict;
+    /* network.kind: auto has trained another kind, too, which was worse; its accuracy. */
+    bool compared;
+    sdm_network_kind other_kind;
+    sdm_accuracy other;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled
    in), metrics.jsonl, checkpoint.sdmc (removed at the end of the run), model.sdm, loss.png.
-   resume: continues from the checkpoint in `folder`; SDM_E_CONFIG if the checkpoint's configuration
-   differs in more than budget and output. hooks and report may be NULL. */
+   network.kind: auto may train two kinds, one after the other: model.sdm is first that of the
+   first, at the end that of the better one, and so are config.yaml and loss.png. resume: continues
+   from the checkpoint in `folder`; SDM_E_CONFIG if the checkpoint's configuration differs in more
+   than budget and output. hooks and report may be NULL. */
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder,
                      bool resume, const sdm_train_hooks *hooks, sdm_train_report *report,
                      sdm_error *err);
+
+/* Refuses a folder with a model or a checkpoint, unless `resume` (there must be a checkpoint then)
+   or `force` is set. SDM_E_ARG. */
+sdm_status sdm_train_check_folder(const char *folder, bool resume, bool force, sdm_error *err);
+
+/* *out = the configured shape with its options, to be freed with sdm_instance_free(); `shape` is
+   the one of the configured name. Relative paths start from the folder of the configuration; in *c
+   they become absolute, so that a copy of the configuration elsewhere names the same files.
+   SDM_E_CONFIG with a line "file:line:column: ..." for each mistake in options, ranges and
+   distributions. */
+sdm_status sdm_train_shape(sdm_config *c, const sdm_shape *shape, sdm_instance **out,
+                           sdm_error *err);
 
 /* Parameter ranges of the training, min[n] and max[n]: those of the shape, narrowed by the
    configuration. SDM_E_CONFIG with a line "file:line:column: ..." for every parameter that is

@@ -18,7 +18,7 @@ typedef enum sdm_grade {
     SDM_GRADE_POOR
 } sdm_grade;
 
-/* The causes of error. The first five add up to the mean square error of the model. */
+/* The causes of error. All but the last add up to the mean square error of the model. */
 typedef enum sdm_cause {
     /* `pod` and the correction of `template`: too few basis functions. Measured: what the best
        coefficients leave of training maps. */
@@ -33,6 +33,9 @@ typedef enum sdm_cause {
     /* `template`: motion, warp and the lattices of the template. Measured: model minus correction.
      */
     SDM_CAUSE_TEMPLATE,
+    /* `template` of several parts: inside overlaps the minimum over the parts is only a bound of
+       the distance. Measured: what errors towards the surface have more than others, inside. */
+    SDM_CAUSE_OVERLAP,
     /* The voxels are too large for the shape. Measured: exact maps, interpolated at points of the
        exact surface. Not a part of the error at the voxels. */
     SDM_CAUSE_GRID,
@@ -64,7 +67,7 @@ typedef struct sdm_verdict {
     char sentence[512]; /* what limits the model and what to do, one sentence */
 } sdm_verdict;
 
-/* "bases", "network", "maps", "rounding", "template" or "grid". [any thread] */
+/* "bases", "network", "maps", "rounding", "template", "overlap" or "grid". [any thread] */
 const char *sdm_cause_name(sdm_cause cause);
 
 /* How the part was measured, a few words. [any thread] */

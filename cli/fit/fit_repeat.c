@@ -1,0 +1,58 @@
+/* What a fit needs to be repeated: the command line, and checksums of the files that it read. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "fit_command.h"
+#include "sdm/internal/checksum.h"
+
+/* Appends a word as a shell reads it: in quotes where it holds more than plain characters. */
+static void add_word(sdm_text *t, const char *word)
+{
+    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+                                "-_=+.,:/@%";
+    if (*word && !word[strspn(word, plain)]) {
+        sdm_text_add(t, "%s", word);
+        return;
+    }
+    sdm_text_add(t, "'");
+    for (; *word; word++) sdm_text_add(t, *word == '\'' ? "'\\''" : "%c", *word);
+    sdm_text_add(t, "'");
+}
+
+/* Adds a file with its checksum; no file of this name: nothing. */
+static void add_file(sdm_json *j, const char *path)
+{
+    uint64_t crc = 0;
+    char text[20];
+    if (!path || sdm_file_checksum(path, &crc, NULL)) return;
+    snprintf(text, sizeof text, "%016" PRIx64, crc);
+    sdm_json_open(j, NULL, '{');
+    sdm_json_text(j, "file", path);
+    sdm_json_text(j, "crc64", text);
+    sdm_json_close(j, '}');
+}
+
+void cli_fit_json_repeat(const cli_fit *f, sdm_json *j)
+{
+    const cli_args *a = f->args;
+    sdm_text command = {0};
+    sdm_text_add(&command, "sdmgen");
+    for (int i = 1; i < a->argc; i++) {
+        sdm_text_add(&command, " ");
+        add_word(&command, a->argv[i]);
+    }
+    sdm_json_text(j, "command", command.data);
+    sdm_text_dispose(&command);
+    sdm_json_open(j, "inputs", '[');
+    add_file(j, f->model_path);
+    add_file(j, f->path);
+    add_file(j, a->fit.reference);
+    add_file(j, a->fit.start_points);
+    for (size_t i = 0; i < a->plugins.n; i++) add_file(j, a->plugins.items[i]);
+    for (size_t i = 0; i < a->options.n; i++) { // options of shapes may name files
+        const char *value = strchr(a->options.items[i], '=');
+        if (value) add_file(j, value + 1);
+    }
+    sdm_json_close(j, ']');
+}

@@ -1,0 +1,84 @@
+/* Derivatives of the distances at the corners of the blocks, for parts with a warp: the derivatives
+   of the formulas in template_corners.c. */
+#include "template_derivative.h"
+
+void sdm_template_station_slopes(const template_work *w, size_t c, point_slope *at)
+{
+    const size_t *n = w->k->stations;
+    const sdm_lattice *near = &w->k->parts[c].near;
+    const warp_scratch *warp = &w->warp[c];
+    for (size_t i = 0; i < n[0] * n[1] * n[2]; i++) {
+        float u[3];
+        for (int a = 0; a < 3; a++)
+            u[a] = (float)((warp->station[i].y[a] - near->origin[a]) / near->spacing);
+        sdm_template_point_slope(w, c, u, warp->metric + 8 * i, &at[i]);
+    }
+}
+
+// out[8] = the derivative of a sample, without the change of the correction at a fixed point.
+static void sample_slope(const point_slope *p, const float du[3], const float metric[6], float *out)
+{
+    for (int e = 0; e < SAMPLE_SIZE; e++) out[e] = 0;
+    for (int a = 0; a < 3; a++) {
+        out[SAMPLE_F] += p->df[a] * du[a];
+        out[SAMPLE_S] += p->by_u[a] * du[a];
+        out[SAMPLE_R] += p->dr[a] * du[a];
+        for (int i = 0; i < 3; i++) out[SAMPLE_G + i] += p->dg[a][i] * du[a];
+    }
+    for (int a = 0; a < 6; a++) out[SAMPLE_S] += p->by_metric[a] * metric[a];
+}
+
+// The samples of a row of n stations.
+static void row_slopes(const template_work *w, const point_slope *at, const station_motion *m,
+                       size_t first, size_t n, float *sample)
+{
+    const template_row *r = &w->row;
+    for (size_t x = 0; x < n; x++) {
+        const size_t i = first + x;
+        sample_slope(&at[i], m->points + 4 * i, m->metric + 8 * i, sample + SAMPLE_SIZE * i);
+        for (int a = 0; a < 3; a++) r->u[a][x] = at[i].u[a];
+        r->value[x] = sample[SAMPLE_SIZE * i + SAMPLE_R];
+    }
+    if (!m->change.map) return;
+    sdm_template_kernels()->correct(&m->change, n, (const float *const *)r->u, r->value);
+    for (size_t x = 0; x < n; x++) sample[SAMPLE_SIZE * (first + x) + SAMPLE_R] = r->value[x];
+}
+
+// The derivative of the corner at a station; stride[a]: stations between neighbours along axis a.
+static void corner_slope(const template_work *w, size_t c, const point_slope *at,
+                         const station_motion *m, const float *sample, size_t i,
+                         const size_t stride[3], float corner[4])
+{
+    const float *all = w->warp[c].sample, *s = all + SAMPLE_SIZE * i,
+                *ds = sample + SAMPLE_SIZE * i;
+    const float half = 0.5f, h = (float)w->k->parts[c].near.spacing;
+    corner[0] = ds[SAMPLE_F] * s[SAMPLE_S] + s[SAMPLE_F] * ds[SAMPLE_S] + ds[SAMPLE_R];
+    for (size_t a = 0; a < 3; a++) {
+        const size_t above = i + stride[a], below = i - stride[a];
+        const float *up = all + SAMPLE_SIZE * above, *down = all + SAMPLE_SIZE * below,
+                    *dup = sample + SAMPLE_SIZE * above, *ddown = sample + SAMPLE_SIZE * below;
+        float change = 0, dchange = 0;
+        for (size_t e = 0; e < 3; e++) {
+            const float du = at[above].u[e] - at[below].u[e];
+            change += s[SAMPLE_G + e] * du;
+            dchange += ds[SAMPLE_G + e] * du +
+                       s[SAMPLE_G + e] * (m->points[4 * above + e] - m->points[4 * below + e]);
+        }
+        corner[1 + a] = half * (h * (ds[SAMPLE_S] * change + s[SAMPLE_S] * dchange) +
+                                ds[SAMPLE_F] * (up[SAMPLE_S] - down[SAMPLE_S]) +
+                                s[SAMPLE_F] * (dup[SAMPLE_S] - ddown[SAMPLE_S]) +
+                                (dup[SAMPLE_R] - ddown[SAMPLE_R]));
+    }
+}
+
+void sdm_template_corner_slopes(const template_work *w, size_t c, const point_slope *at,
+                                const station_motion *m, float *sample, float *corner)
+{
+    const size_t *n = w->k->stations, stride[3] = {1, n[0], n[0] * n[1]};
+    for (size_t row = 0; row < n[1] * n[2]; row++) row_slopes(w, at, m, row * n[0], n[0], sample);
+    for (size_t z = 0; z <= w->blocks[2]; z++)
+        for (size_t y = 0; y <= w->blocks[1]; y++)
+            for (size_t x = 0; x <= w->blocks[0]; x++, corner += 4)
+                corner_slope(w, c, at, m, sample, 1 + x + stride[1] * (1 + y) + stride[2] * (1 + z),
+                             stride, corner);
+}

@@ -1,0 +1,106 @@
+"""The exceptions of the package: one for each status of the C library."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from . import _abi
+
+
+class Error(Exception):
+    """An error of sdmgen. `status` is its name, as in sdm/status.h ("range", "format", ...), and
+    `text` the message."""
+
+    def __init__(self, status: str, text: str) -> None:
+        super().__init__(text)
+        self.status = status
+        self.text = text
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __reduce__(self) -> Any:
+        return (type(self), (self.status, self.text))
+
+
+class ArgumentError(Error, ValueError):
+    """An argument is not valid."""
+
+
+class OutOfMemoryError(Error, MemoryError):
+    """Not enough memory."""
+
+
+class FileError(Error, OSError):
+    """A file cannot be opened, read or written."""
+
+    def __new__(cls, status: str, text: str) -> FileError:
+        return OSError.__new__(cls, text)  # type: ignore[call-arg]
+
+
+class FormatError(Error, ValueError):
+    """The content of a file is damaged or of another type."""
+
+
+class ConfigError(Error, ValueError):
+    """A configuration has mistakes: `text` has one line for each."""
+
+
+class MeshError(Error, ValueError):
+    """A mesh cannot be used."""
+
+
+class ShapeError(Error, RuntimeError):
+    """A shape returned invalid data, is not known or cannot be loaded."""
+
+
+class RangeError(Error, ValueError):
+    """Parameters or points outside of the allowed range."""
+
+
+class UnsupportedError(Error, NotImplementedError):
+    """Valid input that this build or shape does not support."""
+
+
+class CancelledError(Error, RuntimeError):
+    """Stopped on request."""
+
+
+class QualityError(Error, ArithmeticError):
+    """Completed, but the result is below the required quality. `result` holds it where there is
+    one: a map for a bound on the error, a FitResult for a fit that is not to be trusted."""
+
+    result: Any = None
+
+
+class InternalError(Error, RuntimeError):
+    """A bug in sdmgen."""
+
+
+_CLASSES: dict[int, tuple[str, type[Error]]] = {
+    _abi.constants[name]: (status, kind)
+    for name, status, kind in (
+        ("SDM_E_ARG", "argument", ArgumentError),
+        ("SDM_E_NOMEM", "memory", OutOfMemoryError),
+        ("SDM_E_IO", "io", FileError),
+        ("SDM_E_FORMAT", "format", FormatError),
+        ("SDM_E_CONFIG", "config", ConfigError),
+        ("SDM_E_MESH", "mesh", MeshError),
+        ("SDM_E_PLUGIN", "plugin", ShapeError),
+        ("SDM_E_RANGE", "range", RangeError),
+        ("SDM_E_UNSUPPORTED", "unsupported", UnsupportedError),
+        ("SDM_E_CANCELLED", "cancelled", CancelledError),
+        ("SDM_E_QUALITY", "quality", QualityError),
+        ("SDM_E_INTERNAL", "internal", InternalError),
+    )
+}
+
+
+def error_of(code: int, text: str) -> Error:
+    """The exception of a status of the C library."""
+    status, kind = _CLASSES.get(code, ("internal", InternalError))
+    return kind(status, text)
+
+
+def argument_error(text: str) -> ArgumentError:
+    return ArgumentError("argument", text)

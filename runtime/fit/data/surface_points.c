@@ -1,0 +1,68 @@
+/* Points on the surface of a mesh, for a fit to the mesh. */
+#include <math.h>
+
+#include "sdm/exact.h"
+#include "sdm/fit.h"
+#include "sdm/internal/vec3.h"
+#include "sdm/memory.h"
+
+// the golden ratio less 1: its multiples fill 0 .. 1 evenly (Weyl 1916)
+#define GOLDEN 0.61803398874989485
+
+static double triangle_area(const sdm_mesh *m, size_t t)
+{
+    const double *a = m->vert + 3 * (size_t)m->tri[3 * t],
+                 *b = m->vert + 3 * (size_t)m->tri[3 * t + 1],
+                 *c = m->vert + 3 * (size_t)m->tri[3 * t + 2];
+    double u[3], v[3], n[3];
+    v3_sub(b, a, u);
+    v3_sub(c, a, v);
+    v3_cross(u, v, n);
+    return 0.5 * sqrt(v3_dot(n, n));
+}
+
+// x = the point of triangle t that (u, v) in the unit square stand for; evenly distributed pairs
+// give evenly distributed points (Turk 1990)
+static void triangle_point(const sdm_mesh *m, size_t t, double u, double v, double x[3])
+{
+    const double *a = m->vert + 3 * (size_t)m->tri[3 * t],
+                 *b = m->vert + 3 * (size_t)m->tri[3 * t + 1],
+                 *c = m->vert + 3 * (size_t)m->tri[3 * t + 2];
+    const double root = sqrt(u), wb = root * (1 - v), wc = root * v, wa = 1 - root;
+    for (int k = 0; k < 3; k++) x[k] = wa * a[k] + wb * b[k] + wc * c[k];
+}
+
+// Point i lies at the share (i + 1/2) / n of the area, counted over the triangles in their order:
+// each triangle has its share of the points to within one. Its place within the triangle comes from
+// what is left of this share and from a multiple of the golden ratio.
+static void points_spread(const sdm_mesh *m, double area, size_t n, double *points)
+{
+    double before = 0, own = triangle_area(m, 0);
+    size_t t = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double at = area * ((double)i + 0.5) / (double)n;
+        while (at > before + own && t + 1 < m->n_tri) {
+            before += own;
+            own = triangle_area(m, ++t);
+        }
+        const double u = own > 0 ? fmin(fmax((at - before) / own, 0), 1) : 0;
+        const double turn = GOLDEN * (double)i;
+        triangle_point(m, t, u, turn - floor(turn), points + 3 * i);
+    }
+}
+
+sdm_status sdm_fit_surface_points(const sdm_mesh *mesh, size_t n, int n_threads, double *points,
+                                  sdm_error *err)
+{
+    const sdm_exact_opts opts = {.n_threads = n_threads};
+    sdm_exact *engine = NULL;
+    const sdm_status s = sdm_exact_create(mesh, &opts, &engine, err);
+    if (s) return s;
+    const sdm_mesh *surface = sdm_exact_surface(engine);
+    double area = 0;
+    for (size_t t = 0; t < surface->n_tri; t++) area += triangle_area(surface, t);
+    if (area > 0 && isfinite(area)) points_spread(surface, area, n, points);
+    sdm_exact_free(engine);
+    if (area > 0 && isfinite(area)) return SDM_OK;
+    return sdm_fail(err, SDM_E_MESH, "the surface of the mesh has the area %g mm^2", area);
+}

@@ -1,0 +1,230 @@
+/* The checks, each a figure and a limit. The most basic ones come first: their texts are the most
+ * helpful ones. */
+#include "judgement.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include "blob.h"
+#include "misfit.h"
+#include "sdm/internal/shared.h"
+
+// the sd of a tissue may exceed the robust sd by this factor where the shape is right; the sd of
+// the texture and the tails of a distribution that is not Gaussian make up the difference
+#define WIDER_MAX 1.3
+// the inside may differ from the values at the start by this number of their sd
+#define GIVEN_MAX 3.0
+// empty and missing volumes up to this share of that of the shape are below what labels, points and
+// the grids of maps resolve
+#define VOLUME_MIN 0.05
+// the same for images with the older observation model, which is biased where they are blurred
+#define VOLUME_MIN_BIASED 0.2
+// a shape whose blob has this Dice coefficient is a blob itself
+#define BLOB_ALIKE 0.9
+
+const char *sdm_fit_check_name(sdm_fit_check_kind kind)
+{
+    static const char *const names[SDM_FIT_N_CHECKS] = {
+        [SDM_FIT_CHECK_CONVERGED] = "convergence", [SDM_FIT_CHECK_NO_SHAPE] = "no shape",
+        [SDM_FIT_CHECK_CONTRAST] = "contrast",     [SDM_FIT_CHECK_CAVITY] = "cavity",
+        [SDM_FIT_CHECK_IN_IMAGE] = "in the image", [SDM_FIT_CHECK_RESIDUALS] = "residuals",
+        [SDM_FIT_CHECK_BESIDE] = "beside",         [SDM_FIT_CHECK_EMPTY] = "empty",
+        [SDM_FIT_CHECK_MISSING] = "missing",       [SDM_FIT_CHECK_INSIDE] = "inside",
+        [SDM_FIT_CHECK_OUTSIDE] = "outside",       [SDM_FIT_CHECK_GIVEN] = "given values",
+        [SDM_FIT_CHECK_BOUNDS] = "bounds",         [SDM_FIT_CHECK_BLOB] = "blob",
+        [SDM_FIT_CHECK_KEPT_POSE] = "kept pose",   [SDM_FIT_CHECK_MIRROR] = "mirror image"};
+    return kind >= 0 && kind < SDM_FIT_N_CHECKS ? names[kind] : NULL;
+}
+
+void sdm_fit_verdict_add(sdm_fit_verdict *v, const sdm_fit_finding *finding)
+{
+    size_t at = 0;
+    while (at < v->n_findings && v->findings[at].kind < finding->kind) at++;
+    if (at == v->n_findings || v->findings[at].kind != finding->kind) {
+        for (size_t i = v->n_findings++; i > at; i--) v->findings[i] = v->findings[i - 1];
+    }
+    v->findings[at] = *finding;
+    v->grade = SDM_FIT_PASSED;
+    for (size_t i = 0; i < v->n_findings; i++)
+        if (v->findings[i].grade > v->grade) v->grade = v->findings[i].grade;
+}
+
+// adds a finding: passed, or `grade` with a text
+static void add(sdm_fit_verdict *v, sdm_fit_check_kind kind, bool passed, sdm_fit_grade grade,
+                double figure, double limit, const char *fmt, ...) SDM_PRINTF(7, 8);
+static void add(sdm_fit_verdict *v, sdm_fit_check_kind kind, bool passed, sdm_fit_grade grade,
+                double figure, double limit, const char *fmt, ...)
+{
+    sdm_fit_finding f = {
+        .kind = kind, .grade = passed ? SDM_FIT_PASSED : grade, .figure = figure, .limit = limit};
+    va_list args;
+    va_start(args, fmt);
+    if (!passed) vsnprintf(f.text, sizeof f.text, fmt, args);
+    va_end(args);
+    sdm_fit_verdict_add(v, &f);
+}
+
+// the tissue with the largest weight
+static const sdm_fit_law *main_law(const sdm_fit_law *law, size_t n)
+{
+    size_t most = 0;
+    for (size_t i = 1; i < n; i++)
+        if (law[i].weight > law[most].weight) most = i;
+    return &law[most];
+}
+
+static bool is_image(const fit_problem *p)
+{
+    return p->target->kind == SDM_FIT_IMAGE && !p->given_labels;
+}
+
+// evidence, contrast, cavities, field of view, convergence
+static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)
+{
+    const sdm_fit_opts *o = p->opts;
+    const sdm_fit_appearance *a = &r->appearance, *b = &o->appearance;
+    const double in = main_law(a->inside, a->n_inside)->mean,
+                 out = main_law(a->outside, a->n_outside)->mean;
+    const bool darker =
+        main_law(b->inside, b->n_inside)->mean < main_law(b->outside, b->n_outside)->mean;
+    add(v, SDM_FIT_CHECK_CONVERGED, r->converged, SDM_FIT_FAILED, (double)r->n_iterations, NAN,
+        "not converged after %zu iterations (%.120s); allow more of them, or give a nearer start",
+        r->n_iterations, r->reason);
+    if (is_image(p)) {
+        add(v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > 0, SDM_FIT_FAILED, r->evidence, 0,
+            "the image shows no such shape near the start: explaining it without one is better by "
+            "%.3g (log-likelihood of independent voxels); check the start pose, and whether the "
+            "inside is %s than the outside in this image",
+            -r->evidence, darker ? "darker" : "brighter");
+        add(v, SDM_FIT_CHECK_CONTRAST, (in < out) == darker, SDM_FIT_FAILED, in - out, 0,
+            "the contrast is the opposite of the start's: inside %.4g, outside %.4g, but the start "
+            "says that the inside is %s; give tissue values of this kind of image",
+            in, out, darker ? "darker" : "brighter");
+    }
+    const double widest = sdm_fit_inradius(&p->maps);
+    if (r->n_cavity)
+        add(v, SDM_FIT_CHECK_CAVITY, widest < o->cavity, SDM_FIT_FAILED, widest, o->cavity,
+            "the fitted shape holds a ball of %.3g mm, but spaces that hold one of %.3g mm were "
+            "left out (cavity): give a radius above that of the shape",
+            widest, o->cavity);
+    if (p->target->kind != SDM_FIT_POINTS)
+        add(v, SDM_FIT_CHECK_IN_IMAGE, r->inside_share >= o->least_inside, SDM_FIT_FAILED,
+            r->inside_share, o->least_inside,
+            "only %.0f %% of the shape lies in the image, need %.0f %% (least_inside)",
+            100 * r->inside_share, 100 * o->least_inside);
+    size_t bounds = 0;
+    for (size_t k = 0; k < p->n_params && !o->keep_params; k++) bounds += r->at_bound[k];
+    add(v, SDM_FIT_CHECK_BOUNDS, !bounds, SDM_FIT_DOUBTFUL, (double)bounds, 0,
+        "%zu of %zu parameters at an end of their range", bounds, p->n_params);
+}
+
+// the residuals on both sides of the surface. The older observation model (labels) is biased in
+// blurred images, so that its residuals are not noise alone
+static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
+{
+    const bool exact = is_image(p) && p->maps.share && !(p->opts->tolerance > 0);
+    add(v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1],
+        exact ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, m->chi_square[1], m->limit[1],
+        "the residuals inside the shape are not noise: neighbourhoods deviate by %.2g times what "
+        "noise explains; another shape lies there, or the organ differs from the model (then say "
+        "by how much it may: tolerance)",
+        sqrt(m->chi_square[1]));
+    if (p->target->kind == SDM_FIT_POINTS) return;
+    add(v, SDM_FIT_CHECK_BESIDE, m->chi_square[0] <= m->limit[0], SDM_FIT_DOUBTFUL,
+        m->chi_square[0], m->limit[0],
+        "the residuals beside the shape are not noise: neighbourhoods deviate by %.2g times what "
+        "noise explains",
+        sqrt(m->chi_square[0]));
+}
+
+// the volumes that the data contradict
+static void check_volumes(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
+{
+    const bool points = p->target->kind == SDM_FIT_POINTS;
+    const char *what = points ? "points" : is_image(p) ? "image" : "labels";
+    const bool biased = is_image(p) && !p->maps.share;
+    const double most = fmax(p->opts->tolerance, biased ? VOLUME_MIN_BIASED : VOLUME_MIN),
+                 beside = is_image(p) ? fmax(p->opts->beside, most) : most;
+    add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
+        "%.0f %% of the volume of the shape is empty in the %s, allowed %.0f %% (tolerance)",
+        100 * m->empty, what, 100 * most);
+    add(v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED, m->missing, beside,
+        "beside the shape the %s hold%s as much of its material as %.0f %% of its volume, allowed "
+        "%.0f %% (%s)",
+        what, is_image(p) ? "s" : "", 100 * m->missing, 100 * beside,
+        is_image(p) ? "beside" : "tolerance");
+}
+
+// the tissues against the robust statistics, and against the values at the start
+static void check_tissues(const fit_problem *p, const fit_residuals *s, const sdm_fit_result *r,
+                          sdm_fit_verdict *v)
+{
+    const sdm_fit_appearance *a = &r->appearance;
+    const sdm_fit_law *law[2] = {main_law(a->outside, a->n_outside),
+                                 main_law(a->inside, a->n_inside)},
+                      *given = main_law(p->opts->appearance.inside, p->opts->appearance.n_inside);
+    for (int side = 1; side >= 0; side--) {
+        const double wider = law[side]->sd / s->spread[side];
+        if (!isfinite(wider) || (side ? a->n_inside : a->n_outside) > 2) continue;
+        add(v, side ? SDM_FIT_CHECK_INSIDE : SDM_FIT_CHECK_OUTSIDE, wider <= WIDER_MAX,
+            SDM_FIT_DOUBTFUL, wider, WIDER_MAX,
+            "the values %s spread by %.3g, but most of them by %.3g only: a second material lies "
+            "there",
+            side ? "inside" : "outside", law[side]->sd, s->spread[side]);
+    }
+    const double off = fabs(law[1]->mean - given->mean) / given->sd;
+    add(v, SDM_FIT_CHECK_GIVEN, off <= GIVEN_MAX, SDM_FIT_DOUBTFUL, off, GIVEN_MAX,
+        "the inside has the mean %.4g, the start %.4g: other values than those of this kind of "
+        "image were given",
+        law[1]->mean, given->mean);
+}
+
+// the blob must be worse by more than the cost of the unknowns that the shape has beyond its nine
+static sdm_status check_blob(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v,
+                             sdm_error *err)
+{
+    double gain, alike;
+    if (!p->maps.share) return SDM_OK;
+    const sdm_status s = sdm_fit_against_blob(p, &gain, &alike, err);
+    if (s || alike > BLOB_ALIKE) return s;
+    gain /= fmax(r->noise_factor, 1);
+    add(v, SDM_FIT_CHECK_BLOB, gain > SDM_FIT_PREFERRED, SDM_FIT_FAILED, gain, SDM_FIT_PREFERRED,
+        "a blob of the same size in its place explains the image as well as the shape does");
+    return s;
+}
+
+sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err)
+{
+    sdm_fit_verdict *v = &r->verdict;
+    fit_residuals residuals;
+    fit_misfit misfit;
+    check_basics(p, r, v);
+    sdm_status s = sdm_fit_residuals_create(p, &residuals, err);
+    if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
+    if (!s) {
+        check_residuals(p, &misfit, v);
+        check_volumes(p, &misfit, v);
+        v->n_units = misfit.n_units[0] + misfit.n_units[1];
+        for (int side = 0; side < 2; side++)
+            v->chi_square += misfit.chi_square[side] * (double)misfit.n_units[side] /
+                             fmax((double)v->n_units, 1);
+    }
+    if (!s && is_image(p)) check_tissues(p, &residuals, r, v);
+    sdm_fit_residuals_dispose(&residuals);
+    if (!s && is_image(p)) s = check_blob(p, r, v, err);
+    for (size_t i = 0; i < v->n_findings && !s; i++)
+        if (v->findings[i].grade == SDM_FIT_FAILED)
+            s = sdm_fail(err, SDM_E_QUALITY, "%s", v->findings[i].text);
+    return s;
+}
+
+double sdm_fit_compare(const sdm_fit_result *fit, const sdm_fit_result *rival)
+{
+    const bool one = fit->verdict.n_units > 0, other = rival->verdict.n_units > 0;
+    if (!one || !other) return one ? INFINITY : other ? -INFINITY : NAN;
+    if (!isnan(fit->evidence) && !isnan(rival->evidence)) return fit->evidence - rival->evidence;
+    const double n = 0.5 * (double)(fit->verdict.n_units + rival->verdict.n_units);
+    return 0.5 * n *
+           log(fmax(rival->verdict.chi_square, 1e-3) / fmax(fit->verdict.chi_square, 1e-3));
+}

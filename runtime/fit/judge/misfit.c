@@ -1,0 +1,174 @@
+/* Units of samples, their mean residuals and the variances of these. */
+#include "misfit.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "noise.h"
+#include "sdm/internal/heap.h"
+
+// members of a unit between which correlations are computed; of more, every second, third ... one
+#define MEMBERS_MAX 64
+// a unit contradicts the shape if its mean exceeds this number of standard deviations
+#define BEYOND 3.0
+// smallest sd of a unit's mean, as a share: errors of the maps and of the scale of the shares
+#define MEAN_SD_MIN 0.02
+// rms error of the place of a surface that labels show, in voxels
+#define LABEL_ERROR 0.12
+// relative uncertainty of the variance of the noise
+#define NOISE_UNCERTAINTY 0.2
+// standard normal deviate that noise exceeds once in a thousand fits
+#define ONCE_IN_THOUSAND 3.09
+
+/* A sample and the unit to which it belongs. */
+typedef struct member {
+    uint64_t unit;
+    uint32_t sample;
+} member;
+
+static int by_unit(const void *a, const void *b)
+{
+    const member *x = a, *y = b;
+    if (x->unit != y->unit) return x->unit < y->unit ? -1 : 1;
+    return (x->sample > y->sample) - (x->sample < y->sample);
+}
+
+// number of the cube and the side of sample i; 20 bits along each axis
+static uint64_t unit_of(const fit_residuals *r, size_t i)
+{
+    uint64_t unit = 0;
+    for (size_t a = 0; a < 3; a++) {
+        const int64_t cube = (int64_t)floor((double)r->place[3 * i + a] / (double)r->edge[a]);
+        unit = unit << 20 | ((uint64_t)(cube + (1 << 19)) & 0xfffff);
+    }
+    return unit << 1 | (r->expected[i] > 0.5);
+}
+
+static double pair_correlation(const fit_residuals *r, size_t i, size_t j)
+{
+    double c = 1;
+    for (size_t a = 0; a < 3; a++) {
+        const int lag = abs(r->place[3 * i + a] - r->place[3 * j + a]);
+        c *= lag <= FIT_RESIDUAL_LAGS ? r->correlation[a][lag] : 0;
+    }
+    return c;
+}
+
+// mean correlation of two different members of a unit
+static double mean_correlation(const fit_residuals *r, const member *m, size_t n)
+{
+    const size_t step = (n + MEMBERS_MAX - 1) / MEMBERS_MAX;
+    double sum = 0, pairs = 0;
+    for (size_t x = 0; x < n; x += step)
+        for (size_t y = 0; y < x; y += step, pairs++)
+            sum += pair_correlation(r, m[x].sample, m[y].sample);
+    return pairs > 0 ? sum / pairs : 0;
+}
+
+/* Mean residual of a unit, and its variance. */
+typedef struct unit_mean {
+    double mean, variance;
+} unit_mean;
+
+static unit_mean unit_measure(const fit_residuals *r, const member *m, size_t n, double least)
+{
+    double sum = 0, variance = 0;
+    for (size_t k = 0; k < n; k++) {
+        sum += r->residual[m[k].sample];
+        variance += r->sd[m[k].sample] * r->sd[m[k].sample];
+    }
+    const double one = 1 / (double)n, shared = (1 - one) * mean_correlation(r, m, n);
+    return (unit_mean){sum * one, variance * one * (one + shared) + least * least};
+}
+
+/* Points: the sd of every distance is the robust scatter within the units, which a displacement of
+ * a whole unit does not change. */
+static sdm_status points_scatter(fit_residuals *r, const member *m, size_t n, sdm_error *err)
+{
+    double *list = NULL, *all = NULL;
+    sdm_status s = SDM_ALLOC(&list, n, "residuals of the fit", err);
+    if (!s) s = SDM_ALLOC(&all, n, "residuals of the fit", err);
+    for (size_t from = 0, to; from < n && !s; from = to) {
+        for (to = from; to < n && m[to].unit == m[from].unit; to++)
+            list[to - from] = r->residual[m[to].sample];
+        const double middle = sdm_fit_median(list, to - from);
+        for (size_t k = from; k < to; k++) all[k] = r->residual[m[k].sample] - middle;
+    }
+    const double sd = s ? 0 : sdm_fit_robust_sd(all, n, 0);
+    for (size_t i = 0; i < r->n; i++) r->sd[i] = sd;
+    sdm_free(list);
+    sdm_free(all);
+    return s;
+}
+
+// area of the surface times the largest radius, over the volume of the shape: the part of the
+// volume that a displacement of the whole surface by this radius stands for
+static double points_volume_factor(const fit_problem *p)
+{
+    const sdm_grid *g = &p->maps.grid;
+    const double h = fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
+    size_t inside = 0, near = 0;
+    for (size_t v = 0; v < p->maps.n_voxels; v++) {
+        inside += p->maps.distance[v] < 0;
+        near += fabs(p->maps.distance[v]) < h;
+    }
+    return inside ? (double)near / (2 * h) * sdm_fit_inradius(&p->maps) / (double)inside : 0;
+}
+
+// chi-square with correlated units: neighbours share the noise that reaches over the cubes' faces
+static double chi_square_limit(const fit_residuals *r, double n_units)
+{
+    double shared = 1;
+    for (int a = 0; a < 3; a++) {
+        const int lag = r->edge[a] <= FIT_RESIDUAL_LAGS ? r->edge[a] : FIT_RESIDUAL_LAGS;
+        shared *= 1 + 2 * r->correlation[a][lag] * r->correlation[a][lag];
+    }
+    const double sd = sqrt(2 * shared / n_units);
+    return (1 + NOISE_UNCERTAINTY) * (1 + ONCE_IN_THOUSAND * sd);
+}
+
+static sdm_status members_create(const fit_residuals *r, member **out, size_t *n, sdm_error *err)
+{
+    const sdm_status s = SDM_ALLOC(out, r->n, "residuals of the fit", err);
+    *n = 0;
+    for (size_t i = 0; i < r->n && !s; i++)
+        if (r->used[i]) (*out)[(*n)++] = (member){unit_of(r, i), (uint32_t)i};
+    if (!s) qsort(*out, *n, sizeof **out, by_unit);
+    return s;
+}
+
+sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *out, sdm_error *err)
+{
+    const bool points = p->target->kind == SDM_FIT_POINTS;
+    member *m = NULL;
+    size_t n;
+    *out = (fit_misfit){0};
+    sdm_status s = members_create(r, &m, &n, err);
+    if (!s && points) s = points_scatter(r, m, n, err);
+    double volume = 0;
+    for (size_t i = 0; i < r->n; i++) volume += r->expected[i];
+    // labels show the place of the surface to 0.12 of their voxels
+    const bool labels = p->given_labels || p->target->kind == SDM_FIT_LABEL;
+    const double least = labels ? fmax(LABEL_ERROR / r->edge[0], MEAN_SD_MIN) : MEAN_SD_MIN;
+    const double factor = points ? points_volume_factor(p) : 1;
+    for (size_t from = 0, to; from < n && !s; from = to) {
+        for (to = from; to < n && m[to].unit == m[from].unit; to++) {
+        }
+        if (to - from < 2) continue;
+        const unit_mean u = unit_measure(r, m + from, to - from, least);
+        const double z2 = u.mean * u.mean / u.variance;
+        const int side = m[from].unit & 1;
+        out->n_units[side]++;
+        out->chi_square[side] += z2;
+        if (z2 > BEYOND * BEYOND)
+            *(u.mean < 0 ? &out->empty : &out->missing) +=
+                factor * fabs(u.mean) * (double)(to - from) / volume;
+    }
+    for (int side = 0; side < 2; side++) {
+        const double units = fmax((double)out->n_units[side], 1);
+        out->chi_square[side] /= units;
+        out->limit[side] = chi_square_limit(r, units);
+    }
+    sdm_free(m);
+    return s;
+}

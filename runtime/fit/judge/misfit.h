@@ -1,0 +1,29 @@
+/* Misfit: where the data contradict the fitted shape, measured against the noise.
+
+   Where the shape is right, residuals are noise. Where it is wrong, the residuals of a whole
+   neighbourhood have one sign. The samples are therefore grouped into units: the samples in a cube
+   whose edge is half of the largest radius of the shape, separately on both sides of the surface.
+   The mean residual of a unit is compared with its standard deviation, which follows from the size
+   and the correlation of the noise. */
+#pragma once
+
+#include "residuals.h"
+
+typedef struct fit_misfit {
+    /* outside of the surface [0] and inside [1]; points count as inside */
+    /* number of units */
+    size_t n_units[2];
+    /* mean over the units of (mean residual)^2 / variance. 1: the residuals are noise */
+    double chi_square[2];
+    /* largest chi_square that noise alone exceeds once in a thousand fits, with the uncertainty of
+       the noise itself; the units count as correlated with their neighbours as the noise is */
+    double limit[2];
+    /* Volume that the data contradict over the volume of the shape: inside the surface without the
+       material of the inside (empty), and outside of it with this material (missing). Only units
+       count whose mean exceeds three standard deviations. Points: the volumes between the surface
+       of the shape and that of the points, inside and outside of the shape */
+    double empty, missing;
+} fit_misfit;
+
+/* Measures the misfit from the residuals; points: sets their sd first. */
+sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *out, sdm_error *err);

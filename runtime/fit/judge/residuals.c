@@ -1,0 +1,259 @@
+/* Residuals of voxels and of points, and the noise that they contain. */
+#include "residuals.h"
+
+#include <math.h>
+
+#include "noise.h"
+#include "sdm/internal/heap.h"
+
+// a voxel whose share differs from 0 or 1 by at most this much lies deep outside or deep inside
+#define DEEP 0.01
+// where fewer voxels lie deep, as in a thin shape, the purest ones take their place: this much
+#define DEEP_MIN 50
+#define NEARLY_DEEP 0.2
+// most values of which a median is computed; of more, every second, third ... one is taken
+#define VALUES_MAX 20000
+// a value so many sd beyond that of the inside is a third material (air beside fluid)
+#define BEYOND 4.0
+// smallest sd of the noise, as a share: labels have none, but show shares only to a few per cent
+#define SD_MIN 0.02
+// the spread inside is at most this factor above what the differences of neighbours say
+#define WIDER 1.5
+// correlations below this count as none
+#define CORRELATION_MIN 0.05
+
+static bool is_voxels(const fit_problem *p) { return p->target->kind != SDM_FIT_POINTS; }
+static bool is_labels(const fit_problem *p)
+{
+    return p->given_labels || p->target->kind == SDM_FIT_LABEL;
+}
+
+// share of the inside that the shape predicts; where the field is the distance: the edge of labels
+// or of the point spread
+static double predicted_share(const fit_problem *p, double field)
+{
+    if (p->maps.share) return fmin(fmax(field, 0), 1);
+    if (is_labels(p)) return fmin(fmax(0.5 - field / p->target->grid.spacing[0], 0), 1);
+    return 0.5 * erfc(field / p->opts->blur * 0.70710678118654752);
+}
+
+// by how much the mean of all outside tissues at sample i differs from that of the main one
+static double outside_shift(const fit_problem *p, size_t i)
+{
+    const fit_observation *o = &p->observation;
+    const float *local = fit_sample_weights(&p->samples, i);
+    double sum = 0;
+    size_t main = o->n_in;
+    for (size_t k = o->n_in; k < o->n_tissues; k++)
+        if (o->tissue[k].weight > o->tissue[main].weight) main = k;
+    for (size_t k = o->n_in; k < o->n_tissues; k++)
+        sum += (o->tissue[k].mean - o->tissue[main].mean) *
+               (local ? exp((double)local[k - o->n_in]) : o->tissue[k].weight);
+    return sum;
+}
+
+// whether sample i lies inside (side 1) or outside (side 0), at most `limit` from pure
+static bool is_pure(const fit_residuals *r, size_t i, int side, double limit)
+{
+    return fabs(r->expected[i] - side) <= limit;
+}
+
+// middle and spread of the values on one side
+static void side_measure(const fit_problem *p, fit_residuals *r, int side, double *list)
+{
+    double limit = DEEP;
+    size_t n = 0;
+    for (int attempt = 0; attempt < 2 && n < DEEP_MIN; attempt++, limit = NEARLY_DEEP) {
+        n = 0;
+        for (size_t i = 0; i < r->n; i++) n += is_pure(r, i, side, limit);
+        const size_t step = n / VALUES_MAX + 1;
+        size_t seen = 0, kept = 0;
+        for (size_t i = 0; i < r->n; i++)
+            if (is_pure(r, i, side, limit) && seen++ % step == 0)
+                list[kept++] = (double)p->samples.value[i];
+        r->n_deep[side] = n;
+        r->middle[side] = sdm_fit_shortest_half(list, kept, &r->spread[side]);
+    }
+    if (is_labels(p)) r->middle[side] = side;
+}
+
+// places, predicted shares, and observed ones less these
+static void shares_fill(const fit_problem *p, fit_residuals *r, double *list)
+{
+    const fit_samples *s = &p->samples;
+    for (size_t i = 0; i < r->n; i++) {
+        const int64_t *size = p->target->grid.n, v = (int64_t)s->voxel[i], k = (int64_t)p->stride;
+        r->place[3 * i] = (int32_t)(v % size[0] / k);
+        r->place[3 * i + 1] = (int32_t)(v / size[0] % size[1] / k);
+        r->place[3 * i + 2] = (int32_t)(v / size[0] / size[1] / k);
+        r->expected[i] = predicted_share(p, s->field[i]);
+        r->used[i] = true;
+    }
+    for (int side = 0; side < 2; side++) side_measure(p, r, side, list);
+    const double contrast = r->middle[1] - r->middle[0];
+    for (size_t i = 0; i < r->n; i++) {
+        r->residual[i] = ((double)s->value[i] - r->middle[0]) / contrast - r->expected[i];
+        r->sd[i] = 1;
+        // inside the surface, what remains of the outside is that of all its tissues
+        if (r->expected[i] > 0.5)
+            r->residual[i] -= (1 - r->expected[i]) * outside_shift(p, i) / contrast;
+    }
+}
+
+// sd of the noise of every voxel; leaves out a third material, and limits what is beyond the
+// outside
+static void noise_fill(fit_residuals *r)
+{
+    const double contrast = fabs(r->middle[1] - r->middle[0]);
+    double sd[2];
+    for (int side = 0; side < 2; side++) sd[side] = fmax(r->spread[side] / contrast, SD_MIN);
+    for (size_t i = 0; i < r->n; i++) {
+        const double a = r->expected[i], share = r->residual[i] + a;
+        r->used[i] = share < 1 + BEYOND * sd[1];
+        r->sd[i] = sqrt(a * sd[1] * sd[1] + (1 - a) * sd[0] * sd[0]);
+        r->residual[i] = fmax(share, -BEYOND * sd[0]) - a;
+    }
+}
+
+/* Look-up of the sample at a place. */
+typedef struct lookup {
+    int32_t low[3];
+    size_t size[3];
+    uint32_t *number; /* 1 + sample; 0: none */
+} lookup;
+
+static uint32_t *lookup_at(const lookup *l, const int32_t place[3])
+{
+    size_t k[3];
+    for (int a = 0; a < 3; a++) {
+        if (place[a] < l->low[a] || (size_t)(place[a] - l->low[a]) >= l->size[a]) return NULL;
+        k[a] = (size_t)(place[a] - l->low[a]);
+    }
+    return &l->number[(k[2] * l->size[1] + k[1]) * l->size[0] + k[0]];
+}
+
+static sdm_status lookup_create(const fit_residuals *r, lookup *l, sdm_error *err)
+{
+    int32_t high[3];
+    for (size_t a = 0; a < 3; a++) {
+        l->low[a] = INT32_MAX, high[a] = INT32_MIN;
+        for (size_t i = 0; i < r->n; i++) {
+            if (r->place[3 * i + a] < l->low[a]) l->low[a] = r->place[3 * i + a];
+            if (r->place[3 * i + a] > high[a]) high[a] = r->place[3 * i + a];
+        }
+        l->size[a] = (size_t)(high[a] - l->low[a]) + 1;
+    }
+    size_t count;
+    sdm_status s = sdm_mul(l->size[0] * l->size[1], l->size[2], &count, err);
+    if (!s) s = SDM_ALLOC(&l->number, count, "residuals of the fit", err);
+    for (size_t i = 0; i < r->n && !s; i++) *lookup_at(l, r->place + 3 * i) = (uint32_t)i + 1;
+    return s;
+}
+
+// list = differences, in sd of the noise, of pure voxels that lie `lag` steps apart along an axis;
+// side 0 or 1: only of that side; returns their number
+static size_t differences(const fit_residuals *r, const lookup *l, int axis, int lag, int only,
+                          double *list)
+{
+    const size_t step = r->n / (4 * VALUES_MAX) + 1;
+    size_t n = 0;
+    for (size_t i = 0; i < r->n && n < VALUES_MAX; i += step) {
+        const int side = r->expected[i] > 0.5;
+        int32_t at[3] = {r->place[3 * i], r->place[3 * i + 1], r->place[3 * i + 2]};
+        at[axis] += lag;
+        const uint32_t *found = lookup_at(l, at);
+        if ((only >= 0 && side != only) || !r->used[i] || !is_pure(r, i, side, DEEP) || !found ||
+            !*found)
+            continue;
+        const size_t j = *found - 1;
+        if (!r->used[j] || !is_pure(r, j, side, DEEP)) continue;
+        list[n++] = r->residual[i] / r->sd[i] - r->residual[j] / r->sd[j];
+    }
+    return n;
+}
+
+/* Two materials inside a wrong shape widen the spread there, but hardly the differences of
+ * neighbours. Image noise is as smooth inside as outside, so that these differences, compared with
+ * those outside, limit the spread inside. */
+static void spread_limit(fit_residuals *r, const lookup *l, double *list)
+{
+    double difference[2];
+    for (int side = 0; side < 2; side++) {
+        const size_t n = differences(r, l, 0, 1, side, list);
+        difference[side] = sdm_fit_robust_sd(list, n, 0);
+    }
+    const double limit = WIDER * r->spread[0] * difference[1] / difference[0];
+    if (isfinite(limit)) r->spread[1] = fmin(r->spread[1], limit);
+}
+
+static void correlations_measure(fit_residuals *r, const lookup *l, double *list)
+{
+    for (int axis = 0; axis < 3; axis++)
+        for (int lag = 1; lag <= FIT_RESIDUAL_LAGS; lag++) {
+            const size_t n = differences(r, l, axis, lag, -1, list);
+            const double c = sdm_fit_robust_correlation(list, n);
+            if (c < CORRELATION_MIN) break;
+            r->correlation[axis][lag] = c;
+        }
+}
+
+static sdm_status voxels_fill(const fit_problem *p, fit_residuals *r, double radius, double *list,
+                              sdm_error *err)
+{
+    lookup l = {0};
+    shares_fill(p, r, list);
+    const sdm_status s = lookup_create(r, &l, err);
+    if (!s) {
+        spread_limit(r, &l, list);
+        noise_fill(r);
+        correlations_measure(r, &l, list);
+    }
+    for (int a = 0; a < 3; a++)
+        r->edge[a] = (int32_t)fmax(
+            floor(0.5 * radius / (p->target->grid.spacing[a] * (double)p->stride) + 0.5), 2);
+    sdm_free(l.number);
+    return s;
+}
+
+// points: distances over the largest radius; their noise is the scatter of the distances
+static void points_fill(const fit_problem *p, fit_residuals *r, double radius)
+{
+    for (size_t i = 0; i < r->n; i++) {
+        r->expected[i] = 1;
+        r->used[i] = true;
+        r->residual[i] = p->samples.field[i] / radius;
+        for (size_t a = 0; a < 3; a++)
+            r->place[3 * i + a] = (int32_t)floor(2 * p->samples.world[3 * i + a] / radius);
+    }
+}
+
+sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sdm_error *err)
+{
+    fit_residuals *r = out;
+    *r = (fit_residuals){.n = p->samples.n, .edge = {1, 1, 1}};
+    for (int a = 0; a < 3; a++) r->correlation[a][0] = 1;
+    double *list = NULL;
+    sdm_status s = SDM_ALLOC(&r->expected, r->n, "residuals of the fit", err);
+    if (!s) s = SDM_ALLOC(&r->residual, r->n, "residuals of the fit", err);
+    if (!s) s = SDM_ALLOC(&r->sd, r->n, "residuals of the fit", err);
+    if (!s) s = SDM_ALLOC(&r->used, r->n, "residuals of the fit", err);
+    if (!s) s = SDM_ALLOC(&r->place, 3 * r->n, "residuals of the fit", err);
+    if (!s) s = SDM_ALLOC(&list, r->n, "residuals of the fit", err);
+    const double radius = sdm_fit_inradius(&p->maps);
+    if (!s && is_voxels(p))
+        s = voxels_fill(p, r, radius, list, err);
+    else if (!s)
+        points_fill(p, r, radius);
+    sdm_free(list);
+    return s;
+}
+
+void sdm_fit_residuals_dispose(fit_residuals *r)
+{
+    sdm_free(r->expected);
+    sdm_free(r->residual);
+    sdm_free(r->sd);
+    sdm_free(r->used);
+    sdm_free(r->place);
+    *r = (fit_residuals){0};
+}

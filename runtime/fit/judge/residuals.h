@@ -1,0 +1,39 @@
+/* Residuals: what the data show at the samples, less what the fitted shape predicts there.
+
+   Voxels: the observed share of the inside material is the value of the voxel on the scale from the
+   outside (0) to the inside (1); the prediction is the share that the shape fills. Both ends of the
+   scale are least medians of squares over the voxels deep inside and deep outside. They and the
+   noise are robust: the tissues of the fit itself would not do, because a wrong shape widens them
+   until they excuse everything. Points: the residual is the signed distance from the surface over
+   the largest radius of the shape. */
+#pragma once
+
+#include "fit/solver/problem.h"
+
+/* largest distance of voxels, in steps along an axis, over which noise is correlated */
+enum { FIT_RESIDUAL_LAGS = 10 };
+
+typedef struct fit_residuals {
+    /* number of samples */
+    size_t n;
+    /* [n] predicted share, 0 .. 1 (points: 1); observed less predicted; sd of the noise */
+    double *expected, *residual, *sd;
+    /* [n] false: the sample holds a third material, and its residual says nothing */
+    bool *used;
+    /* [n][3] place of the sample, in steps of the image (points: in halves of the largest radius)
+     */
+    int32_t *place;
+    /* edge of the cubes in which residuals are averaged, in steps along each axis, >= 1 */
+    int32_t edge[3];
+    /* correlation of the noise of voxels that lie so many steps apart along each axis */
+    double correlation[3][FIT_RESIDUAL_LAGS + 1];
+    /* voxels: middle and robust sd of the values deep outside [0] and deep inside [1], and the
+       number of these voxels; points: 0 */
+    double middle[2], spread[2];
+    size_t n_deep[2];
+} fit_residuals;
+
+/* Computes the residuals at problem->state from its samples. Call sdm_fit_residuals_dispose() even
+ * after an error. */
+sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sdm_error *err);
+void sdm_fit_residuals_dispose(fit_residuals *r);

@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# sdmgen fit: the verdict with its reasons, wrong shapes that are refused, the mirror image of a shape.
+# Tests: fit_mirror.c fit_verdict.c
+. "$(dirname "$0")/common.sh"
+export OMP_WAIT_POLICY=passive
+
+# A right fit: the list of checks as text and as JSON.
+expect 0 - sdmgen phantom --shape torus -O edge=0.5 --spacing 0.4 -o torus.nii --label torus-label.nii --quiet
+expect 0 - sdmgen fit --shape torus -O edge=0.5 torus.nii --quiet --rotation 0.05,0.05,0 --spacing 0.4 --eps 1e-3
+has '^verdict: (passed|doubtful)$'
+has '^  residuals    passed '
+has '^  no shape     passed '
+expect 0 - sdmgen fit --shape torus -O edge=0.5 torus.nii --quiet --rotation 0.05,0.05,0 --spacing 0.4 --eps 1e-3 --json
+has '"verdict": *\{"grade": *"(passed|doubtful)", *"checks": *\[\{"name": *"no shape", *"grade": *"passed"'
+has '"trusted": *true'
+grep -q '"mirror"' out && bad 'a torus has no mirror image'
+
+# A wrong shape is refused, from an image and from labels; the reason and the file are named.
+wrong='sdmgen fit --shape capsule -O edge=0.5 --rotation 0,0,0 --spacing 0.4 --eps 1e-3 --quiet'
+expect 4 '^sdmgen: error: torus.nii: ' $wrong torus.nii
+has 'NOT TO BE TRUSTED'
+has '^verdict: failed$'
+expect 4 '^sdmgen: error: torus-label.nii: ' $wrong torus-label.nii --label 1
+has '^  (empty|missing)  +FAILED '
+expect 2 '--beside does nothing in a fit to labels' $wrong torus-label.nii --label 1 --beside 1
+
+# The side of an ear is found; the wrong one is refused.
+expect 0 - sdmgen phantom --shape cochlea -O edge=0.6 -O ear=left --spacing 0.4 --seed 5 -o left.nii --quiet
+ear='sdmgen fit --shape cochlea -O edge=0.6 left.nii --quiet --rotation 0,0,0 --spacing 0.4 --eps 1e-3'
+expect 0 - $ear --json
+has '"mirror": *\{"option": *"ear", *"value": *"left", *"better_by": *[1-9]'
+expect 0 - $ear -O ear=left
+has '^  mirror image passed '
+expect 4 '^sdmgen: error: left.nii: ' $ear -O ear=right --json
+has '"name": *"mirror image", *"grade": *"failed"'
+has "the mirror image of the shape fits better, by [0-9.]+ .*the other value of the option 'ear' is right"
+expect 4 '^sdmgen: error: left.nii: ' $ear -O ear=right --mirror no --json
+grep -q '"mirror' out && bad '--mirror no fits no mirror image'
+finish

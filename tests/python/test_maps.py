@@ -1,0 +1,235 @@
+"""Maps, derivatives and distances: the same bits as those of the program."""
+
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+from conftest import ball
+
+import sdmgen
+
+P = {"a": 4.1, "alpha": 0.5}
+WORDS = ["-p", "a=4.1", "-p", "alpha=0.5"]
+
+
+def same(array, file):
+    expected = np.load(file)
+    assert array.dtype == expected.dtype and array.shape == expected.shape
+    assert np.ascontiguousarray(array).tobytes() == expected.tobytes()
+
+
+def test_a_map_has_the_bits_of_the_program(run, model, model_file, tmp_path):
+    out = tmp_path / "map.npy"
+    run("generate", model_file, *WORDS, "-o", out)
+    map = model(**P)
+    same(map.values, out)
+    assert map.values.flags.c_contiguous and map.shape == model.grid.shape
+    assert map.info == sdmgen.MapInfo("network", error_mm=model.accuracy.rmse_mm)
+    same(model(params=P).values, out)
+    same(model(model.values(P)).values, out)
+    same(np.asarray(map), out)
+    # negative inside: the middle of the tube of the exact shape is inside
+    assert map.values.min() < 0 < map.values.max()
+
+
+def test_maps_on_other_grids(run, model, model_file, tmp_path):
+    out = tmp_path / "map.npy"
+    run("generate", model_file, *WORDS, "--spacing", "0.5", "-o", out)
+    same(model(**P, spacing=0.5).values, out)
+    run("generate", model_file, *WORDS, "--size", "20,21,22", "--outside", "bound", "-o", out)
+    same(model(P, size=(20, 21, 22), outside="bound").values, out)
+    turn = "0,-1,0,1,0,0,0,0,1"
+    words = ["--size", "9,8,7", "--spacing", "0.3,0.4,0.5", "--origin", "-1,-2,-1", "--direction", turn]
+    run("generate", model_file, *WORDS, *words, "-o", out)
+    grid = sdmgen.Grid((9, 8, 7), (0.3, 0.4, 0.5), (-1, -2, -1), [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    same(model(P, grid=grid).values, out)
+    same(model.field(P).grid(grid).values, out)
+    run("generate", model_file, *WORDS, "--size", "40,40,40", "--spacing", "0.5", "--outside", "bound", "-o", out)
+    same(model(P, size=(40, 40, 40), spacing=0.5, outside="bound").values, out)
+    with pytest.raises(sdmgen.RangeError):
+        model(P, size=(40, 40, 40), spacing=0.5)
+    # a band has the values of the map
+    dense = model(P, spacing=0.25)
+    band = model.band(1.0, P, spacing=0.25)
+    near = np.abs(dense.values) < 1
+    assert near.sum() > 100 and np.array_equal(band.dense().values[near], dense.values[near])
+    assert np.array_equal(band.dense().values < 0, dense.values < 0)
+
+
+def test_derivatives(run, model, model_file, tmp_path):
+    out, slopes = tmp_path / "map.npy", tmp_path / "jacobian.npy"
+    run("generate", model_file, *WORDS, "-o", out, "--jacobian", slopes, "--gradient", tmp_path / "gradient.npy")
+    both = model.jacobian(P)
+    same(both.values, slopes)
+    same(both.map.values, out)
+    same(both.map.gradient(), tmp_path / "gradient.npy")
+    rng = np.random.default_rng(1)
+    v, w = rng.normal(size=4), rng.normal(size=model.grid.shape).astype(np.float32)
+    along = np.tensordot(v, both.values.astype(float), 1)
+    assert np.abs(model.jvp(v, P).values - along).max() < 1e-2 * np.abs(along).max()
+    back = (both.values.astype(float) * w).sum((1, 2, 3))
+    assert np.abs(model.vjp(w, P) - back).max() < 1e-2 * np.abs(back).max()
+
+
+def test_batches_and_policies(run, model, model_file, tmp_path):
+    rows = np.array([[4.1, 0.5, 0.15, 0.1], [4.4, 0.2, 0.16, 0.0], [3.9, 0.6, 0.15, 0.3]])
+    batch = model.batch(rows)
+    assert batch.values.shape == (3, *model.grid.shape) and len(batch) == 3
+    for map, row in zip(batch, rows):
+        assert np.array_equal(map.values, model(row).values)
+    assert model.batch(np.empty((0, 4))).values.shape == (0, *model.grid.shape)
+    with pytest.raises(sdmgen.RangeError, match="'a'"):
+        model(a=9)
+    with pytest.raises(ValueError):
+        model.batch([[9, 0.5, 0.15, 0.1]])
+    out = tmp_path / "map.npy"
+    run("generate", model_file, "-p", "a=9", "--policy", "clamp", "-o", out)
+    clamped = model(a=9, policy="clamp")
+    same(clamped.values, out)
+    assert clamped.info.clamped and clamped.info.source == "network"
+    low = model.params[0].min - 0.5 * (model.params[0].min - 1)
+    with pytest.raises(sdmgen.RangeError):
+        model(a=low, max_error=0.1)
+    # a bound on the error replaces the map of this small network by an exact one
+    run("generate", model_file, *WORDS, "--max-error", "0.01", "-o", out)
+    exact = model(P, max_error=0.01)
+    same(exact.values, out)
+    assert exact.info.source == "exact" and exact.info.reason == "error" and exact.info.check.max > 0.01
+    with pytest.raises(sdmgen.QualityError) as caught:
+        model(P, max_error=0.01, policy="clamp")
+    assert np.array_equal(caught.value.result.values, model(P).values)
+    assert model.check(P) == model(P, check=True).info.check == model.check_map(model(P), P)
+
+
+def test_points(run, model, model_file, tmp_path):
+    x = np.random.default_rng(2).uniform(-3, 3, (200, 3))
+    np.save(tmp_path / "x.npy", x)
+    words = ["--points", tmp_path / "x.npy", "--columns", "distance,gradient"]
+    run("generate", model_file, *WORDS, *words, "-o", tmp_path / "at.npy", "--jacobian", tmp_path / "slopes.npy")
+    samples = model.sample(x, P, gradient=True, slopes=True)
+    table = np.load(tmp_path / "at.npy")
+    assert np.array_equal(table[:, 0], samples.distance) and np.array_equal(table[:, 1:], samples.gradient)
+    same(samples.slopes, tmp_path / "slopes.npy")
+    assert model.sample(x, P).gradient is None
+
+
+def test_the_description_of_a_model(model, model_file):
+    assert [p.name for p in model.params] == ["a", "alpha", "b", "phi"] and model.params[0].unit == "mm"
+    assert all(p.min <= p.default <= p.max for p in model.params)
+    assert model.kind == "pod" and model.shape_name == "cochlea" and len(model.checksum) == 16
+    assert model.accuracy.samples == 8 and "grid" in model.config and model.options["ear"] == "right"
+    assert sdmgen.Model(model_file.read_bytes()).checksum == model.checksum
+    again = pickle.loads(pickle.dumps(model))
+    assert np.array_equal(again(P).values, model(P).values)
+
+
+def test_exact_maps(run, tmp_path):
+    out = tmp_path / "exact.npy"
+    files = {name: tmp_path / f"{name}.npy" for name in ("closest", "normal", "triangle", "jacobian")}
+    words = [word for name, file in files.items() for word in (f"--{name}", file)]
+    run("exact", "--shape", "torus", "-p", "major=2.5", "--spacing", "0.4", "-o", out, *words)
+    shape = sdmgen.Shape("torus")
+    map = sdmgen.exact(shape, params={"major": 2.5}, spacing=0.4, layers=list(files))
+    same(map.values, out)
+    for name, file in files.items():
+        same(getattr(map, name), file)
+    # the default grid, a mesh, a pair of arrays
+    run("exact", "--shape", "torus", "-o", out)
+    mesh = shape.mesh()
+    for source in (shape, mesh, (mesh.vertices, mesh.triangles)):
+        same(sdmgen.exact(source).values, out)
+    run("exact", "--shape", "torus", "--size", "20,20,10", "--narrow", "2", "--keep-overlap", "-o", out)
+    same(sdmgen.exact(shape, size=(20, 20, 10), narrow=2, keep_overlap=True).values, out)
+    run("exact", "--shape", "cochlea", "-O", "edge=0.5", "--size", "20,18,16", "-o", out)
+    same(sdmgen.exact(sdmgen.Shape("cochlea", edge=0.5), size=(20, 18, 16)).values, out)
+    # a band
+    band = sdmgen.exact_band(shape, sdmgen.exact(shape).grid, 0.5).dense()
+    full = sdmgen.exact(shape).values
+    assert np.array_equal(band.values, np.clip(full, np.float32(-0.5), np.float32(0.5)))
+
+
+def test_exact_points(run, tmp_path):
+    x = np.random.default_rng(3).uniform(-4, 4, (500, 3))
+    np.save(tmp_path / "x.npy", x)
+    words = ["--points", tmp_path / "x.npy", "--columns", "distance,gradient,closest,triangle"]
+    run("exact", "--shape", "torus", *words, "-o", tmp_path / "at.npy")
+    table = np.load(tmp_path / "at.npy")
+    at = sdmgen.exact_points(sdmgen.Shape("torus"), x)
+    assert np.array_equal(table, np.column_stack([at.distance, at.normal, at.closest, at.triangle]))
+    mesh = sdmgen.Mesh(*ball(2.0, n=40))
+    r = np.linalg.norm(x, axis=1)
+    assert np.abs(mesh.distance(x) - (r - 2)).max() < 0.02
+    assert np.array_equal(mesh.distance(x), sdmgen.exact_points(mesh, x).distance)
+    assert mesh.audit().closed and mesh.report().sign == "crossings" and mesh.audit().volume > 0
+
+
+def test_surfaces():
+    mesh = sdmgen.Mesh(*ball(2.0, n=30))
+    map = sdmgen.exact(mesh, spacing=0.1)
+    surface = map.surface()
+    assert not surface.cut and abs(surface.audit().volume - mesh.audit().volume) < 0.05
+    assert sdmgen.surface(map, 0.5).audit().volume > surface.audit().volume
+    assert sdmgen.Map(map.values[:10], sdmgen.Grid((*map.grid.size[:2], 10), map.spacing, map.origin)).surface().cut
+
+
+def test_eight_threads(model):
+    rows = model.defaults + np.random.default_rng(4).uniform(-0.05, 0.05, (64, 4)) * [1, 1, 0.1, 0]
+    expected = [model(row).values for row in rows]
+    mesh, x = sdmgen.Mesh(*ball()), np.random.default_rng(5).uniform(-2, 2, (50, 3))
+    distances, wrong = mesh.distance(x), []
+
+    def work(first):
+        for i in range(first, 64, 8):
+            try:
+                with pytest.raises(sdmgen.RangeError, match=f"{100 + i}"):
+                    model(a=100 + i)
+                ok = np.array_equal(model(rows[i]).values, expected[i]) and np.array_equal(mesh.distance(x), distances)
+            except BaseException as error:
+                ok = error
+            if ok is not True:
+                wrong.append(ok)
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_ctrl_c_stops_an_exact_map():
+    mesh, finished = sdmgen.Shape("cochlea").mesh(), False
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        timer.start()
+        sdmgen.exact(mesh, size=(320, 320, 320), threads=1)
+        finished = True
+        time.sleep(60)
+    assert not finished
+    # the handler of before is back, and the mesh serves as before
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert sdmgen.exact(mesh, size=(5, 5, 5)).shape == (5, 5, 5)
+
+
+def test_fork_after_use(model):
+    """The child of a process that has used all threads computes the same."""
+    expected = model(P, threads=4).values
+    exact = sdmgen.exact(sdmgen.Shape("torus"), spacing=0.3, threads=4).values
+
+    def child(queue):
+        same_map = np.array_equal(model(P, threads=4).values, expected)
+        same_exact = np.array_equal(sdmgen.exact(sdmgen.Shape("torus"), spacing=0.3, threads=4).values, exact)
+        queue.put(same_map and same_exact)
+
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    process = context.Process(target=child, args=(queue,))
+    process.start()
+    assert queue.get(timeout=60) is True
+    process.join(60)
+    assert process.exitcode == 0

@@ -1,0 +1,161 @@
+/* The pose of a fit: motions that the data leave open, and a pose that is kept but wrong.
+ * Tests: kept_pose.c open_motions.c */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include "fit/solver/open_motions.h"
+#include "oracle/fit_tools.h"
+
+// Eigenvectors of a matrix that is made from known ones.
+static void test_eigenvectors(void **state)
+{
+    (void)state;
+    const double values[3] = {-2, 0.5, 7};
+    double r[9], a[9] = {0}, value[3], vector[9];
+    sdm_pose_matrix(&(sdm_pose){{0.4, -0.7, 1.1}, {0, 0, 0}}, r);
+    for (size_t i = 0; i < 9; i++)
+        for (size_t k = 0; k < 3; k++) a[i] += values[k] * r[3 * k + i / 3] * r[3 * k + i % 3];
+    sdm_fit_eigen(3, a, value, vector);
+    for (size_t k = 0; k < 3; k++) {
+        assert_true(fabs(value[k] - values[k]) < 1e-12);
+        double dot = 0;
+        for (size_t i = 0; i < 3; i++) dot += vector[3 * k + i] * r[3 * k + i];
+        assert_true(fabs(fabs(dot) - 1) < 1e-12);
+    }
+}
+
+// A fit of `name` to 3000 points on its own surface in POSE; the start has its axis 0.1 rad off.
+static sdm_fit_result fit_surface(const char *name, const double *p)
+{
+    enum { N = 3000 };
+    sdm_named_text edge = {"edge", "0.1"};
+    sdm_instance *shape = NULL;
+    sdm_mesh m = {0};
+    double x[3 * N];
+    assert_int_equal(
+        sdm_instance_create(sdm_registry_find(registry, name, NULL), &edge, 1, NULL, &shape, NULL),
+        SDM_OK);
+    assert_int_equal(sdm_instance_mesh(shape, p, &m, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_surface_points(&m, N, 2, x, NULL), SDM_OK);
+    for (size_t i = 0; i < N; i++) {
+        double y[3];
+        for (size_t k = 0; k < 3; k++) // independent errors of 0.02 mm
+            y[k] = x[3 * i + k] + 0.02 * sdm_rng_normal(1, k, i);
+        sdm_pose_apply(&POSE, y, x + 3 * i);
+    }
+    const sdm_fit_source source = {
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){40, 40, 40}, 0.25, (double[3]){0, 0, 0})};
+    const sdm_fit_target target = {.kind = SDM_FIT_POINTS, .points = x, .n_points = N};
+    sdm_fit_opts o = sdm_fit_defaults();
+    o.start_pose = POSE;
+    o.start_pose.rotation[1] += 0.1;
+    o.n_threads = 2;
+    sdm_fit_result r;
+    sdm_error err = {0};
+    if (sdm_fit(&source, &target, &o, &r, &err)) fail_msg("%s: %s", name, err.text);
+    sdm_mesh_dispose(&m);
+    sdm_instance_free(shape);
+    return r;
+}
+
+// sd of the rotation about the unit vector `axis` of the world.
+static double turn_sd(const sdm_fit_result *r, const double axis[3])
+{
+    const size_t n = r->n_params, size = n + 6;
+    double sum = 0;
+    for (size_t i = 0; i < 3; i++)
+        for (size_t k = 0; k < 3; k++)
+            sum += axis[i] * axis[k] * r->covariance[(n + i) * size + n + k];
+    return sqrt(sum);
+}
+
+static void test_axis_of_symmetry(void **state)
+{
+    (void)state;
+    const struct {
+        const char *name;
+        double p[3];
+    } cases[] = {{"torus", {2.6, 0.9, 0}}, {"capsule", {1.2, 3.1, 0}}, {"ellipsoid", {2, 2, 3}}};
+    double r[9];
+    sdm_pose_matrix(&POSE, r);
+    const double along[3] = {r[2], r[5], r[8]}, across[3] = {r[0], r[3], r[6]};
+    for (size_t c = 0; c < 3; c++) {
+        sdm_fit_result f = fit_surface(cases[c].name, cases[c].p);
+        double axis[3], x[3];
+        if (sscanf(f.open_motions,
+                   "rotation about the axis (%lf, %lf, %lf) through (%lf, %lf, %lf) mm", &axis[0],
+                   &axis[1], &axis[2], &x[0], &x[1], &x[2]) != 6)
+            fail_msg("%s: '%s'", cases[c].name, f.open_motions);
+        double dot = 0;
+        for (size_t k = 0; k < 3; k++) {
+            dot += axis[k] * along[k];
+            assert_true(fabs(x[k] - POSE.translation[k]) < 0.02);
+        }
+        assert_true(fabs(fabs(dot) - 1) < 0.01);
+        // an angle that may be any has the sd pi / sqrt(3)
+        assert_true(fabs(turn_sd(&f, along) - 1.81) < 0.1 && turn_sd(&f, across) < 0.05);
+        sdm_fit_dispose(&f);
+    }
+}
+
+static void test_sphere_has_any_axis(void **state)
+{
+    (void)state;
+    sdm_fit_result f = fit_surface("ellipsoid", (const double[3]){2, 2, 2});
+    assert_non_null(strstr(f.open_motions, "rotation about any axis"));
+    sdm_fit_dispose(&f);
+}
+
+static void test_determined_pose(void **state)
+{
+    (void)state;
+    sdm_fit_result f = fit_surface("ellipsoid", (const double[3]){2, 2.3, 3});
+    assert_string_equal(f.open_motions, "");
+    for (size_t k = 3; k < 6; k++) assert_true(f.sd[k] < 0.05);
+    sdm_fit_dispose(&f);
+}
+
+// A kept pose passes where it is true, and is refused half a millimetre beside the truth.
+static void test_kept_pose(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 4);
+    const sdm_fit_target t = image_of(v);
+    const sdm_fit_source source = exact_source();
+    for (int off = 0; off < 2; off++) {
+        sdm_fit_opts o = near_start();
+        o.start_pose = POSE;
+        o.start_pose.translation[1] += 0.5 * off;
+        o.keep_pose = true;
+        sdm_fit_result r;
+        sdm_error err = {0};
+        const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);
+        assert_int_equal(s, off ? SDM_E_QUALITY : SDM_OK);
+        assert_true(!off || strstr(err.text, "the kept pose does not match"));
+        for (int k = 0; k < 3; k++)
+            assert_true(r.pose.translation[k] == o.start_pose.translation[k]);
+        // a translation by d moves a sphere's surface by d / sqrt(3) along its normal, rms
+        if (off) assert_true(r.kept_pose_motion > 0.2 && r.kept_pose_motion < 0.5);
+        assert_true(off ? r.kept_pose_gain > 20 : r.kept_pose_gain < 10);
+        sdm_fit_dispose(&r);
+    }
+    free(v);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_eigenvectors),        cmocka_unit_test(test_axis_of_symmetry),
+        cmocka_unit_test(test_sphere_has_any_axis), cmocka_unit_test(test_determined_pose),
+        cmocka_unit_test(test_kept_pose),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

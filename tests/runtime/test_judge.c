@@ -1,0 +1,252 @@
+/* The verdict of a fit: robust noise, right fits that pass, wrong ones that are refused with a
+ * reason, the mirror image.
+ * Tests: blob.c judgement.c mirror.c misfit.c noise.c residuals.c */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "fit/judge/noise.h"
+#include "oracle/fit_tools.h"
+
+static sdm_instance *shape_of(const char *name)
+{
+    sdm_instance *s = NULL;
+    const sdm_named_text edge = {"edge", "0.4"};
+    sdm_error err = {0};
+    if (sdm_instance_create(sdm_registry_find(registry, name, NULL), &edge, 1, NULL, &s, &err))
+        fail_msg("%s", err.text);
+    return s;
+}
+
+// An image of a shape at its defaults in the pose POSE (caller frees); labels: 1 inside, 0 outside.
+static float *image_of_shape(const sdm_instance *shape, const sdm_grid *g, double noise,
+                             bool labels, uint64_t seed)
+{
+    const size_t n = sdm_grid_count(g);
+    sdm_phantom_opts o = sdm_phantom_defaults();
+    o.seed = seed;
+    o.inside.sd *= noise, o.outside.sd *= noise, o.noise *= noise;
+    float *v = calloc(n, sizeof *v);
+    uint8_t *label = calloc(n, 1);
+    sdm_error err = {0};
+    if (!v || !label) abort();
+    if (sdm_phantom_make(shape, NULL, &POSE, &o, g, v, label, &err)) fail_msg("%s", err.text);
+    for (size_t i = 0; i < n && labels; i++) v[i] = label[i];
+    free(label);
+    return v;
+}
+
+static sdm_grid cube(double half, double voxel)
+{
+    const int64_t n = (int64_t)(2 * half / voxel);
+    return sdm_grid_centred((int64_t[3]){n, n, n}, voxel, POSE.translation);
+}
+
+// Fits a shape from its defaults in the pose POSE.
+static sdm_status fit_of(const sdm_instance *shape, const sdm_fit_target *t, double tolerance,
+                         sdm_fit_result *r, sdm_error *err)
+{
+    sdm_fit_opts o = sdm_fit_defaults();
+    const sdm_fit_source source = {
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){34, 34, 34}, 0.35, (double[3]){0, 0, 0})};
+    o.start_pose = POSE;
+    o.polish_eps = 1e-4;
+    o.appearance.n_outside = 1;
+    o.tolerance = tolerance;
+    *err = (sdm_error){0};
+    return sdm_fit(&source, t, &o, r, err);
+}
+
+static const sdm_fit_finding *finding(const sdm_fit_result *r, sdm_fit_check_kind kind)
+{
+    for (size_t i = 0; i < r->verdict.n_findings; i++)
+        if (r->verdict.findings[i].kind == kind) return &r->verdict.findings[i];
+    return NULL;
+}
+
+static void test_noise_is_robust(void **state)
+{
+    (void)state;
+    enum { N = 4000 };
+    double *x = malloc(N * sizeof *x), *d = malloc(N * sizeof *d), last = 0;
+    if (!x || !d) abort();
+    // 10 % of the values are wrong: their sd is 12.4
+    for (size_t i = 0; i < N; i++) x[i] = sdm_rng_normal(1, 0, i) * 3 + (i % 10 ? 0 : 40);
+    memcpy(d, x, N * sizeof *x);
+    const double median = sdm_fit_median(d, N);
+    assert_true(fabs(median) < 0.6);
+    assert_true(fabs(sdm_fit_robust_sd(x, N, median) - 3) < 0.8);
+    // an autoregressive series of correlation 0.6 at lag 1
+    for (size_t i = 0; i < N; i++) x[i] = last = 0.6 * last + 0.8 * sdm_rng_normal(2, 0, i);
+    for (size_t i = 1; i < N; i++) d[i - 1] = x[i] - x[i - 1];
+    assert_true(fabs(sdm_fit_robust_correlation(d, N - 1) - 0.6) < 0.05);
+    assert_true(sdm_fit_robust_correlation(d, 5) == 0);
+    double three[3] = {5, 1, 3}, two[2] = {1, 4};
+    assert_true(sdm_fit_median(three, 3) == 3 && sdm_fit_median(two, 2) == 2.5);
+    assert_true(isnan(sdm_fit_median(x, 0)));
+    // two modes: the larger one counts
+    double sd;
+    for (size_t i = 0; i < N; i++) x[i] = sdm_rng_normal(3, 0, i) + (i % 5 < 2 ? 30 : 0);
+    assert_true(fabs(sdm_fit_shortest_half(x, N, &sd)) < 0.3);
+    assert_true(sd > 1 && sd < 2.5);
+    assert_true(isnan(sdm_fit_shortest_half(x, 0, &sd)) && isnan(sd));
+    free(x), free(d);
+}
+
+static void test_findings_are_sorted(void **state)
+{
+    (void)state;
+    sdm_fit_verdict v = {0};
+    sdm_fit_finding f = {.kind = SDM_FIT_CHECK_BOUNDS, .grade = SDM_FIT_DOUBTFUL};
+    sdm_fit_verdict_add(&v, &f);
+    f = (sdm_fit_finding){.kind = SDM_FIT_CHECK_EMPTY, .grade = SDM_FIT_FAILED};
+    sdm_fit_verdict_add(&v, &f);
+    assert_int_equal(v.n_findings, 2);
+    assert_int_equal(v.findings[0].kind, SDM_FIT_CHECK_EMPTY);
+    assert_int_equal(v.grade, SDM_FIT_FAILED);
+    f.grade = SDM_FIT_PASSED;
+    sdm_fit_verdict_add(&v, &f); // replaces it
+    assert_int_equal(v.n_findings, 2);
+    assert_int_equal(v.grade, SDM_FIT_DOUBTFUL);
+    for (int k = 0; k < SDM_FIT_N_CHECKS; k++) assert_non_null(sdm_fit_check_name(k));
+    assert_null(sdm_fit_check_name(SDM_FIT_N_CHECKS));
+}
+
+static void test_right_fits_pass(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"torus", "capsule"};
+    for (size_t k = 0; k < 2; k++)
+        for (int labels = 0; labels < 2; labels++) {
+            sdm_instance *shape = shape_of(names[k]);
+            const sdm_grid g = cube(5.5, 0.35);
+            float *v = image_of_shape(shape, &g, 1, labels, 3 + k);
+            const sdm_fit_target t = {
+                .kind = labels ? SDM_FIT_LABEL : SDM_FIT_IMAGE, .grid = g, .values = v};
+            sdm_fit_result r;
+            sdm_error err;
+            if (fit_of(shape, &t, 0, &r, &err)) fail_msg("%s: %s", names[k], err.text);
+            assert_true(r.verdict.grade != SDM_FIT_FAILED);
+            if (!labels) {
+                const sdm_fit_finding *noise = finding(&r, SDM_FIT_CHECK_RESIDUALS);
+                assert_true(noise->figure > 0.5 && noise->figure < noise->limit);
+                assert_int_equal(finding(&r, SDM_FIT_CHECK_INSIDE)->grade, SDM_FIT_PASSED);
+            }
+            sdm_fit_dispose(&r);
+            free(v);
+            sdm_instance_free(shape);
+        }
+}
+
+static void test_wrong_shapes_are_refused(void **state)
+{
+    (void)state;
+    sdm_instance *torus = shape_of("torus"), *round = shape_of("ellipsoid"),
+                 *capsule = shape_of("capsule");
+    const sdm_instance *const pairs[][2] = {{round, torus}, {torus, capsule}, {capsule, torus}};
+    const sdm_grid g = cube(5.5, 0.35);
+    for (size_t k = 0; k < 3; k++)
+        for (int labels = 0; labels < 2; labels++) {
+            float *v = image_of_shape(pairs[k][1], &g, 1, labels, 7 + k);
+            const sdm_fit_target t = {
+                .kind = labels ? SDM_FIT_LABEL : SDM_FIT_IMAGE, .grid = g, .values = v};
+            sdm_fit_result r;
+            sdm_error err;
+            if (fit_of(pairs[k][0], &t, 0, &r, &err) != SDM_E_QUALITY)
+                fail_msg("pair %zu, labels %d: accepted: residuals %.3g, empty %.3g, missing %.3g",
+                         k, labels, finding(&r, SDM_FIT_CHECK_RESIDUALS)->figure,
+                         finding(&r, SDM_FIT_CHECK_EMPTY)->figure,
+                         finding(&r, SDM_FIT_CHECK_MISSING)->figure);
+            assert_int_equal(r.verdict.grade, SDM_FIT_FAILED);
+            assert_true(*err.text);
+            sdm_fit_dispose(&r);
+            free(v);
+        }
+    // the reason is named, and a tolerance states that the model may be wrong
+    float *v = image_of_shape(torus, &g, 1, false, 5);
+    const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = v};
+    sdm_fit_result r;
+    sdm_error err;
+    assert_int_equal(fit_of(round, &t, 0, &r, &err), SDM_E_QUALITY);
+    assert_int_equal(finding(&r, SDM_FIT_CHECK_RESIDUALS)->grade, SDM_FIT_FAILED);
+    assert_non_null(strstr(finding(&r, SDM_FIT_CHECK_RESIDUALS)->text, "not noise"));
+    sdm_fit_dispose(&r);
+    (void)fit_of(round, &t, 1, &r, &err);
+    assert_int_equal(finding(&r, SDM_FIT_CHECK_RESIDUALS)->grade, SDM_FIT_DOUBTFUL);
+    assert_int_equal(finding(&r, SDM_FIT_CHECK_EMPTY)->grade, SDM_FIT_PASSED);
+    sdm_fit_dispose(&r);
+    free(v);
+    sdm_instance_free(torus);
+    sdm_instance_free(round);
+    sdm_instance_free(capsule);
+}
+
+static void test_points_of_another_shape_are_refused(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"ellipsoid", "torus"};
+    sdm_instance *round = shape_of("ellipsoid");
+    for (size_t k = 0; k < 2; k++) {
+        sdm_instance *shown = shape_of(names[k]);
+        size_t n;
+        const sdm_param *p = sdm_instance_params(shown, &n);
+        double at[8];
+        for (size_t i = 0; i < n; i++) at[i] = p[i].def;
+        sdm_mesh m = {0};
+        assert_int_equal(sdm_instance_mesh(shown, at, &m, NULL), SDM_OK);
+        for (size_t i = 0; i < m.n_vert; i++) {
+            double x[3];
+            sdm_pose_apply(&POSE, m.vert + 3 * i, x);
+            for (size_t a = 0; a < 3; a++)
+                m.vert[3 * i + a] = x[a] + 0.02 * sdm_rng_normal(1, i, a);
+        }
+        const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = m.vert, .n_points = m.n_vert};
+        sdm_fit_result r;
+        sdm_error err;
+        const sdm_status s = fit_of(round, &t, 0, &r, &err);
+        if (s != (k ? SDM_E_QUALITY : SDM_OK)) fail_msg("%s: %s", names[k], err.text);
+        sdm_fit_dispose(&r);
+        sdm_mesh_dispose(&m);
+        sdm_instance_free(shown);
+    }
+    sdm_instance_free(round);
+}
+
+// An ellipsoid is its own mirror image: both fits reach the same evidence and parameters.
+static void test_mirror_of_an_ellipsoid(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 4);
+    const sdm_fit_target t = image_of(v);
+    const sdm_fit_opts o = near_start();
+    const sdm_fit_source source = exact_source();
+    sdm_fit_result a, b;
+    sdm_error err = {0};
+    if (sdm_fit(&source, &t, &o, &a, &err)) fail_msg("%s", err.text);
+    if (sdm_fit_mirrored(&source, &t, &o, &b, &err)) fail_msg("%s", err.text);
+    for (size_t k = 0; k < 3; k++) assert_true(fabs(a.params[k] - b.params[k]) < 0.02);
+    assert_true(fabs(sdm_fit_compare(&a, &b)) < 0.05 * fabs(a.evidence));
+    sdm_fit_result none = {0};
+    assert_true(sdm_fit_compare(&a, &none) > 0 && isinf(sdm_fit_compare(&a, &none)));
+    assert_true(sdm_fit_compare(&none, &a) < 0 && isnan(sdm_fit_compare(&none, &none)));
+    sdm_fit_dispose(&a);
+    sdm_fit_dispose(&b);
+    free(v);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_noise_is_robust),
+        cmocka_unit_test(test_findings_are_sorted),
+        cmocka_unit_test(test_right_fits_pass),
+        cmocka_unit_test(test_wrong_shapes_are_refused),
+        cmocka_unit_test(test_points_of_another_shape_are_refused),
+        cmocka_unit_test(test_mirror_of_an_ellipsoid),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

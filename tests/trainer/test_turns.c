@@ -1,0 +1,313 @@
+/* network.kind: auto trains one kind or two: the better model is kept, with the same bits for any
+ * number of threads and after a resume.
+ * Tests: race.c train.c training.c turns.c trilinear.c */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "data/trilinear.h"
+#include "state/history.h"
+#include "template_shapes.h"
+#include "train_tools.h"
+
+/* A link that turns on a base: two parts that overlap in the joint. */
+static const char link_text[] =
+    "shape: {name: linkage, options: {links: 1, motion: planar, limit: 0.5, edge: 0.5}}\n"
+    "grid: {size: [19, 22, 10], spacing: 0.34, centre: [0.6, 0, 0]}\n"
+    "network: {width: 16, modes: 24, rank: 6, degree: 3}\n"
+    "data: {static: 0, static_share: 0, start: 60, online: 20, holdout: 12, memory_gb: 0.5}\n"
+    "train: {steps: 60, batch: 16, refine_batch: 8}\n";
+
+/* A ring that bends: one part with a warp and a correction. */
+static const char ring_text[] =
+    "shape: {name: ring}\n"
+    "grid: {size: [26, 26, 16], spacing: 0.4}\n"
+    "network: {degree: 2, width: 16, modes: 24}\n"
+    "data: {static: 0, static_share: 0, start: 40, online: 40, holdout: 4, memory_gb: 0.5}\n"
+    "train: {steps: 150, batch: 16}\n";
+
+/* Makes pod worse than the template. */
+#define FEW_MAPS "shape.options.limit=1", "data.start=20", "data.online=0", "train.steps=10"
+
+static char said[8192];
+
+static void listen(void *user, const char *text)
+{
+    (void)user;
+    strncat(said, text, sizeof said - strlen(said) - 2);
+    strcat(said, "\n");
+}
+
+static sdm_config config_of(const char *text, const char *const *overrides, size_t n)
+{
+    sdm_config c;
+    sdm_error e = {0};
+    if (sdm_config_parse("test.yaml", text, strlen(text), overrides, n, &c, &e))
+        fail_msg("%s", e.text);
+    return c;
+}
+
+static sdm_instance *shape_of(const sdm_config *c)
+{
+    sdm_instance *out;
+    sdm_error e = {0};
+    const sdm_shape *shape =
+        strcmp(c->shape.name, "ring") ? sdm_registry_find(registry, c->shape.name, NULL) : &ring;
+    sdm_named_text options[SDM_MAX_OPTIONS];
+    for (size_t i = 0; i < c->shape.n_options; i++)
+        options[i] = (sdm_named_text){c->shape.options[i].name, c->shape.options[i].value};
+    if (sdm_instance_create(shape, options, c->shape.n_options, NULL, &out, &e))
+        fail_msg("%s", e.text);
+    return out;
+}
+
+static sdm_train_report train(const sdm_config *c)
+{
+    const sdm_train_hooks hooks = {.message = listen};
+    sdm_error e = {0};
+    sdm_train_report r;
+    sdm_instance *shape = shape_of(c);
+    run_files_remove();
+    said[0] = '\0';
+    if (sdm_train(c, shape, folder, false, &hooks, &r, &e)) fail_msg("%s", e.text);
+    assert_false(exists("checkpoint.sdmc"));
+    sdm_instance_free(shape);
+    return r;
+}
+
+/* Kind of the model and of config.yaml. */
+static void assert_kind(const char *kind)
+{
+    sdm_model *m;
+    sdm_config c;
+    assert_int_equal(sdm_model_open(in_folder("model.sdm"), &m, NULL), SDM_OK);
+    assert_string_equal(sdm_model_get_info(m)->kind, kind);
+    sdm_model_free(m);
+    assert_int_equal(sdm_config_read(in_folder("config.yaml"), NULL, 0, &c, NULL), SDM_OK);
+    assert_int_equal(c.network.kind, strcmp(kind, "pod") ? SDM_NETWORK_TEMPLATE : SDM_NETWORK_POD);
+}
+
+static double score(const sdm_accuracy *a) { return hypot(a->rmse_near_mm, 0.1 * a->rmse_mm); }
+
+// The model that is kept has the bits of a training of its kind alone: a template without a
+// correction leaves all steps to pod. The other kind has the larger error.
+static void better_is_kept(void **state)
+{
+    (void)state;
+    static const char *const few[] = {FEW_MAPS, "network.kind=template"};
+    static const char *const pod[] = {"network.kind=pod"};
+    for (int which = 0; which < 2; which++) {
+        const char *const *set = which ? few : pod;
+        const size_t n = which ? 4 : 0;
+        const sdm_config alone = config_of(link_text, set, n + 1);
+        const sdm_train_report single = train(&alone);
+        assert_false(single.compared);
+        const uint64_t expected = hash_of("model.sdm");
+        uint64_t metrics = 0;
+        for (int threads = 1; threads <= 3; threads++) {
+            sdm_config c = config_of(link_text, set, n);
+            c.threads = c.data.workers = threads;
+            const sdm_train_report r = train(&c);
+            if (!strstr(said, "ready, then pod is trained")) fail_msg("%s", said);
+            assert_kind(which ? "template" : "pod");
+            assert_true(hash_of("model.sdm") == expected);
+            if (threads > 1) assert_true(hash_of("metrics.jsonl") == metrics);
+            metrics = hash_of("metrics.jsonl");
+            assert_true(r.compared && score(&r.other) > score(&r.accuracy));
+            assert_int_equal(r.other_kind, which ? SDM_NETWORK_POD : SDM_NETWORK_TEMPLATE);
+            assert_true(r.accuracy.mse_mm2 == single.accuracy.mse_mm2);
+            assert_int_equal(r.steps, single.steps);
+            assert_string_equal(r.verdict.key, single.verdict.key);
+        }
+    }
+}
+
+// A template that needs training gets a third of the steps, pod the others.
+static void budget_is_shared(void **state)
+{
+    (void)state;
+    sdm_config c = config_of(ring_text, NULL, 0);
+    const sdm_train_report r = train(&c);
+    if (!r.compared) fail_msg("%s", said);
+    sdm_config stored;
+    assert_int_equal(sdm_config_read(in_folder("config.yaml"), NULL, 0, &stored, NULL), SDM_OK);
+    const bool first = stored.network.kind == SDM_NETWORK_TEMPLATE;
+    assert_int_equal(r.steps, first ? 50 : 100);
+    assert_int_equal(stored.train.steps, first ? 50 : 100);
+}
+
+/* A place at which a run is stopped: `after` calls of cancelled() after a message with the first
+   words and, if there are second ones, a later message with those. */
+typedef struct stop_place {
+    const char *first, *second;
+    int after;
+    bool model, checkpoint; /* the files that the folder has then */
+} stop_place;
+
+static bool stop(void *user)
+{
+    stop_place *p = user;
+    const char *at = strstr(said, p->first);
+    if (at && p->second) at = strstr(at, p->second);
+    return at && --p->after < 0;
+}
+
+// A run may be stopped in either training: it goes on where it was, and ends with the same bits.
+static void resume_is_bit_exact(void **state)
+{
+    (void)state;
+    static const char *const few[] = {FEW_MAPS};
+    static const stop_place places[2][3] = {
+        {{"", NULL, 30, false, false},
+         {"pod is trained with", NULL, 5, true, false},
+         {"pod is trained with", "a decoder of", 4, true, true}},
+        {{"trained with a third", NULL, 3, false, false},
+         {"a decoder of", NULL, 20, false, true},
+         {"pod is trained with", "a decoder of", 70, true, true}}};
+    for (int which = 0; which < 3; which++) {
+        sdm_config c = config_of(which == 2 ? ring_text : link_text, few, which == 1 ? 4 : 0);
+        c.threads = 1;
+        train(&c);
+        const uint64_t model = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl"),
+                       config = hash_of("config.yaml");
+        sdm_instance *shape = shape_of(&c);
+        for (int i = 0; i < 3; i++) {
+            stop_place p = places[which == 2][i];
+            const sdm_train_hooks hooks = {.cancelled = stop, .message = listen, .user = &p};
+            sdm_error e = {0};
+            run_files_remove();
+            said[0] = '\0';
+            assert_int_equal(sdm_train(&c, shape, folder, false, &hooks, NULL, &e),
+                             SDM_E_CANCELLED);
+            if (exists("model.sdm") != p.model || exists("checkpoint.sdmc") != p.checkpoint)
+                fail_msg("case %d, stop %d: %s: %s", which, i, e.text, said);
+            if (p.model) assert_kind("template");
+            if (p.model && !p.checkpoint) assert_non_null(strstr(e.text, "model of kind template"));
+            if (!p.checkpoint) continue;
+            if (sdm_train(&c, shape, folder, true, NULL, NULL, &e)) fail_msg("%s", e.text);
+            assert_true(hash_of("model.sdm") == model && hash_of("metrics.jsonl") == metrics &&
+                        hash_of("config.yaml") == config);
+        }
+        sdm_instance_free(shape);
+    }
+}
+
+// If pod cannot be trained, or no time is left for it, the template is kept.
+static void template_remains(void **state)
+{
+    (void)state;
+    static const char *const much[] = {"data.start=100000", "data.memory_gb=0.02"},
+                             *const short_time[] = {"train.steps=0", "train.minutes=0.0001"};
+    const sdm_config large = config_of(link_text, much, 2),
+                     brief = config_of(link_text, short_time, 2);
+    sdm_train_report r = train(&large);
+    assert_non_null(strstr(said, "template is kept, because pod failed: test.yaml: data.static"));
+    assert_kind("template");
+    assert_false(r.compared);
+    r = train(&brief);
+    assert_non_null(strstr(said, "hardly any of the budget is left for pod"));
+    assert_kind("template");
+    assert_false(r.compared);
+}
+
+// Thick parts that overlap: the verdict names the bound inside, and the remedy.
+static void overlap_is_named(void **state)
+{
+    (void)state;
+    static const char *const thick[] = {
+        "network.kind=template",
+        "shape.options.length=1",
+        "shape.options.radius=1",
+        "shape.options.tip=1",
+        "shape.options.joint=1",
+        "shape.options.base=1",
+        "grid={size: [40, 40, 24], spacing: 0.12, centre: [0.4, 0, 0]}"};
+    const sdm_config c = config_of(link_text, thick, 7);
+    const sdm_train_report r = train(&c);
+    const double *part = r.verdict.part_mm2;
+    assert_int_equal(r.verdict.limit, SDM_CAUSE_OVERLAP);
+    assert_true(fabs(part[SDM_CAUSE_OVERLAP] + part[SDM_CAUSE_TEMPLATE] - r.accuracy.mse_mm2) <
+                1e-9 * r.accuracy.mse_mm2);
+    if (!strstr(r.verdict.sentence, "set network.kind to auto")) fail_msg("%s", r.verdict.sentence);
+}
+
+// Budgets of the turns, in all three units; the history begins anew with each kind.
+static void turns_share_the_budget(void **state)
+{
+    (void)state;
+    static const char *const budgets[][2] = {{"train.steps=100", "train.minutes=0"},
+                                             {"train.steps=0", "train.samples=1600"},
+                                             {"train.steps=0", "train.minutes=3"}};
+    for (int i = 0; i < 3; i++) {
+        const sdm_config asked = config_of(link_text, budgets[i], 2);
+        training_turns r = {.n = 2,
+                            .kind = {SDM_NETWORK_TEMPLATE, SDM_NETWORK_POD},
+                            .share = 0.25,
+                            .first = {.steps = 10, .seconds = 60}};
+        sdm_config c;
+        trainer_turn_config(&r, &asked, &c);
+        assert_int_equal(c.network.kind, SDM_NETWORK_TEMPLATE);
+        assert_true(c.train.steps == (i ? 0 : 25) && c.train.samples == (i == 1 ? 400 : 0) &&
+                    c.train.minutes == (i == 2 ? 0.75 : 0));
+        r.at = 1;
+        trainer_turn_config(&r, &asked, &c);
+        assert_int_equal(c.network.kind, SDM_NETWORK_POD);
+        assert_true(c.train.steps == (i ? 0 : 90) && c.train.samples == (i == 1 ? 1440 : 0) &&
+                    c.train.minutes == (i == 2 ? 2 : 0));
+        assert_true(fabs(trainer_turns_left(&r, &asked) - (i == 2 ? 2 / 3.0 : 0.9)) < 1e-12);
+    }
+    const sdm_accuracy near = {.rmse_near_mm = 3, .mse_mm2 = 1600, .rmse_mm = 40},
+                       far = {.rmse_near_mm = 4, .mse_mm2 = 100, .rmse_mm = 10};
+    const training_turns r = {.first = {.accuracy = near}};
+    assert_true(trainer_score(&near) == 5 && trainer_second_wins(&r, &far));
+    sdm_text metrics = {0};
+    const trainer t = {.metrics = &metrics};
+    const turn_figures figures = {SDM_NETWORK_TEMPLATE, &near};
+    history h;
+    sdm_text_add(&metrics, "{\"phase\": \"refine\", \"step\": 7, \"heldout_mse_mm2\": 1}\n");
+    assert_int_equal(trainer_turns_record(&metrics, SDM_NETWORK_POD, NULL, &figures, 1, NULL),
+                     SDM_OK);
+    sdm_text_add(&metrics, "{\"phase\": \"fit\", \"step\": 3, \"heldout_mse_mm2\": 1}\n");
+    assert_non_null(strstr(metrics.data, "\"template_score_mm\": 5}"));
+    assert_int_equal(trainer_history_read(&t, &h, NULL), SDM_OK);
+    assert_true(h.n == 1 && h.point[0].step == 3);
+    trainer_history_dispose(&h);
+    sdm_text_dispose(&metrics);
+}
+
+// A function that is linear along each axis is reproduced, also at the ends and in a flat grid.
+static void interpolation_is_trilinear(void **state)
+{
+    (void)state;
+    for (int flat = 0; flat < 2; flat++) {
+        const sdm_grid g = {.n = {4, 3, flat ? 1 : 5}};
+        float map[60];
+        for (int i = 0; i < 60; i++) {
+            const int x = i % 4, y = i / 4 % 3, z = i / 12;
+            map[i] = (float)((1 + 2 * x) * (3 - y) * (1 + 4 * z));
+        }
+        const double points[][3] = {{0, 0, 0}, {3, 2, 4}, {1.25, 0.5, 3.75}, {2.5, 2, 0.5}};
+        for (size_t i = 0; i < 4; i++) {
+            double p[3] = {points[i][0], points[i][1], flat ? 0 : points[i][2]};
+            const double expected = (1 + 2 * p[0]) * (3 - p[1]) * (1 + 4 * p[2]);
+            assert_true(fabs(trainer_trilinear(&g, map, p) - expected) < 1e-12);
+        }
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(better_is_kept),
+                                       cmocka_unit_test(budget_is_shared),
+                                       cmocka_unit_test(resume_is_bit_exact),
+                                       cmocka_unit_test(template_remains),
+                                       cmocka_unit_test(overlap_is_named),
+                                       cmocka_unit_test(turns_share_the_budget),
+                                       cmocka_unit_test(interpolation_is_trilinear)};
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

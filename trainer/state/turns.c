@@ -1,0 +1,81 @@
+/* The trainings of a run: their order, their budgets, their comparison. */
+#include "turns.h"
+
+#include <math.h>
+#include <stdio.h>
+
+/* The used part of a budget in the unit of each of its three keys. */
+static double used_of(const training_turns *r, const sdm_config *asked)
+{
+    if (asked->train.minutes > 0) return r->first.seconds / 60;
+    const double steps = (double)r->first.steps;
+    return asked->train.steps > 0 ? steps : steps * asked->train.batch;
+}
+
+static double budget_of(const sdm_config *c)
+{
+    return c->train.minutes > 0 ? c->train.minutes
+           : c->train.steps > 0 ? (double)c->train.steps
+                                : (double)c->train.samples;
+}
+
+void trainer_turn_config(const training_turns *r, const sdm_config *asked, sdm_config *out)
+{
+    *out = *asked;
+    sdm_config_choose_kind(out, r->kind[r->at]);
+    const double all = budget_of(asked), mine = r->at      ? all - used_of(r, asked)
+                                                : r->n > 1 ? all * r->share
+                                                           : all;
+    if (asked->train.minutes > 0)
+        out->train.minutes = mine;
+    else if (asked->train.steps > 0)
+        out->train.steps = (int64_t)ceil(mine);
+    else
+        out->train.samples = (int64_t)ceil(mine);
+}
+
+double trainer_turns_left(const training_turns *r, const sdm_config *asked)
+{
+    return 1 - used_of(r, asked) / budget_of(asked);
+}
+
+const char *trainer_turn_name(sdm_network_kind kind)
+{
+    return kind == SDM_NETWORK_POD ? "pod" : "template";
+}
+
+double trainer_score(const sdm_accuracy *a)
+{
+    return sqrt(a->rmse_near_mm * a->rmse_near_mm + 0.01 * a->mse_mm2);
+}
+
+bool trainer_second_wins(const training_turns *r, const sdm_accuracy *second)
+{
+    return trainer_score(second) < trainer_score(&r->first.accuracy);
+}
+
+sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
+                                const sdm_network_kind *then, const turn_figures *e, size_t n,
+                                sdm_error *err)
+{
+    char key[64];
+    sdm_json j = {0};
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "phase", "auto");
+    sdm_json_text(&j, "kind", trainer_turn_name(kind));
+    if (then) sdm_json_text(&j, "then", trainer_turn_name(*then));
+    for (size_t i = 0; i < n; i++) {
+        const char *name = trainer_turn_name(e[i].kind);
+        snprintf(key, sizeof key, "%s_rmse_mm", name);
+        sdm_json_real(&j, key, e[i].accuracy->rmse_mm);
+        snprintf(key, sizeof key, "%s_rmse_near_mm", name);
+        sdm_json_real(&j, key, e[i].accuracy->rmse_near_mm);
+        snprintf(key, sizeof key, "%s_score_mm", name);
+        sdm_json_real(&j, key, trainer_score(e[i].accuracy));
+    }
+    sdm_json_close(&j, '}');
+    if (!j.text.failed) sdm_text_add(metrics, "%s\n", j.text.data);
+    const bool failed = j.text.failed || metrics->failed;
+    sdm_json_dispose(&j);
+    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : SDM_OK;
+}

@@ -1,0 +1,42 @@
+/* The trainings of a run, one after the other: one, or two with network.kind: auto, of which the
+   better one is kept. */
+#pragma once
+
+#include "sdm/internal/train.h"
+
+typedef struct training_turns {
+    int n, at;                /* number of kinds to train, 1 or 2; the one in training */
+    sdm_network_kind kind[2]; /* in the order of training */
+    bool chosen;              /* by network.kind: auto */
+    double share;             /* part of the budget that the first of two may use, 0 .. 1 */
+    sdm_train_report first;   /* result of the first, while the second trains */
+} training_turns;
+
+/* *out = `asked` with the kind of the present turn, its defaults for all keys that have those of
+   `auto`, and its budget: the first of two has its share, the second has what is left. */
+void trainer_turn_config(const training_turns *r, const sdm_config *asked, sdm_config *out);
+
+/* Part of the budget of `asked` that is left for the second of two. */
+double trainer_turns_left(const training_turns *r, const sdm_config *asked);
+
+/* "pod" or "template". */
+const char *trainer_turn_name(sdm_network_kind kind);
+
+/* The figure by which kinds are compared, mm, the smaller the better: the root of the sum of the
+   mean square error near the surface and a hundredth of that of all voxels. */
+double trainer_score(const sdm_accuracy *a);
+
+/* true if the second kind with this accuracy is better than the first. */
+bool trainer_second_wins(const training_turns *r, const sdm_accuracy *second);
+
+/* One of the kinds that a line of the metrics compares. */
+typedef struct turn_figures {
+    sdm_network_kind kind;
+    const sdm_accuracy *accuracy;
+} turn_figures;
+
+/* Appends a line with phase "auto" to *metrics: `kind` is trained next, or kept; then: the kind to
+   be trained after it, NULL: none; e[n]: the errors of the kinds so far. Writes no file. */
+sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
+                                const sdm_network_kind *then, const turn_figures *e, size_t n,
+                                sdm_error *err);

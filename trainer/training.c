@@ -1,0 +1,172 @@
+/* The training of one kind of network from beginning to end: maps, network, training, model file.
+ */
+#include "training.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "data/dataset_fill.h"
+#include "fine/fine_fit.h"
+#include "sdm/internal/file.h"
+#include "sdm/internal/text.h"
+#include "sdm/memory.h"
+#include "set_up.h"
+#include "state/checkpoint.h"
+#include "state/export_model.h"
+#include "state/new_samples.h"
+#include "state/progress.h"
+
+/* true: the folder holds the model of the kind that was trained before. */
+static bool is_second(const trainer *t) { return t->turns->at > 0; }
+
+static void fill_report(void *user, size_t done, size_t all)
+{
+    trainer *t = user;
+    t->pace.done = (int64_t)done;
+    trainer_report(t, trainer_start_fraction(t), done == all);
+}
+
+static bool fill_cancelled(void *user) { return trainer_cancelled(user); }
+
+/* true when the computation of the data has used half of a time budget. */
+static bool fill_enough(void *user) { return trainer_start_fraction(user) > 0.5; }
+
+/* Makes all maps needed before training. resumed: exactly as many as the interrupted run made, else
+ * as many as the time budget allows. */
+static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
+{
+    const size_t start = t->data.n_start;
+    const fill_hooks hooks = {.report = fill_report,
+                              .cancelled = fill_cancelled,
+                              .enough = resumed ? NULL : fill_enough,
+                              .user = t};
+    t->phase = SDM_PHASE_DATA;
+    trainer_pace_start(t, 1);
+    t->data.known = t->tried.n_voxels ? &t->tried : NULL;
+    const sdm_status s = trainer_dataset_fill(&t->data, t->n_threads, &hooks, err);
+    t->data.known = NULL;
+    trainer_dataset_dispose(&t->tried);
+    if (s) return s;
+    if (t->data.n_start < start)
+        trainer_message(t,
+                        "half of the budget is over after %zu of %zu random maps: training starts "
+                        "with these (lower "
+                        "data.start or raise "
+                        "train.minutes)",
+                        t->data.n_start, start);
+    return trainer_check_grid(t, err);
+}
+
+/* Prepares everything for the first step: maps, network, producer. A resumed run makes the n_taken
+ * random samples of the checkpoint again. */
+static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_error *err)
+{
+    sdm_status s = train_make_maps(t, resumed, err);
+    t->phase = SDM_PHASE_BASES;
+    trainer_pace_start(t, 0);
+    trainer_report(t, trainer_start_fraction(t), true);
+    if (!s) s = t->kind->begin(t, err);
+    if (!s) s = trainer_samples_start(t, err);
+    if (!s && resumed) s = trainer_samples_retake(t, n_taken, err);
+    if (s == SDM_E_CANCELLED && is_second(t))
+        s = sdm_fail(err, s,
+                     "stopped on request before the training of pod began: %s holds the model of "
+                     "kind template",
+                     t->folder);
+    else if (s == SDM_E_CANCELLED)
+        s = sdm_fail(err, s, "stopped on request before the training began: %s is as it was",
+                     t->folder);
+    return s;
+}
+
+/* Runs all steps from set-up to trained weights. config: the open temporary file of config.yaml. It
+   is committed, and the files of an older run are removed, only after all checks of the
+   configuration: until then the folder stays as it was. The second training of a run leaves the
+   files of the first alone. */
+static sdm_status train_run(trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
+{
+    bool found = false;
+    sdm_status s = trainer_set_up(t, err);
+    if (!s && resume) {
+        s = trainer_checkpoint_read(t, &found, err);
+        if (!s && !found)
+            trainer_message(t, "no checkpoint in %s: training starts from the beginning",
+                            t->folder);
+    }
+    if (s) return s;
+    const sdm_phase from = t->phase;
+    const double resumed_seconds = trainer_seconds(t);
+    s = train_prepare(t, found, t->data.n_taken, err);
+    if (!s && !resume && !is_second(t)) s = trainer_checkpoint_clear_folder(t, err);
+    if (!s && !is_second(t)) s = sdm_outfile_commit(config, err);
+    if (s) return s;
+
+    if (found) {
+        // the time in which the maps were made again does not count
+        t->started += trainer_seconds(t) - resumed_seconds;
+        t->phase = from;
+    } else {
+        trainer_enter(t, SDM_PHASE_MODE_FIT);
+    }
+    t->last_checkpoint = t->prepared_seconds = trainer_seconds(t);
+    return t->kind->run(t, found, err);
+}
+
+/* Tells if the run took longer than its budget of time, and why. measured: seconds of the
+ * measurement of the model. */
+static void tell_overrun(trainer *t, double measured)
+{
+    const double budget = t->config->train.minutes * 60, over = trainer_seconds(t) - budget;
+    if (!trainer_by_time(t) || over < fmax(1, 0.02 * budget)) return;
+    trainer_message(
+        t,
+        "the run took %.0f s longer than train.minutes: the maps, bases and trials before "
+        "the first step took %.0f s, the measurement of the model %.0f s (lower "
+        "data.start, data.static or data.holdout, or raise train.minutes)",
+        over, t->prepared_seconds, measured);
+}
+
+/* Measures the model, and writes it unless the one that the folder holds is better. If it cannot be
+ * written, a checkpoint keeps the trained weights. */
+static sdm_status train_finish(trainer *t, sdm_outfile **config, sdm_train_report *report,
+                               sdm_error *err)
+{
+    const sdm_phase phase = t->phase;
+    const double started = trainer_seconds(t);
+    const size_t lines = t->metrics->size;
+    t->phase = SDM_PHASE_EVALUATE;
+    trainer_report(t, 1, true);
+    sdm_status s = trainer_export_judge(t, report, err);
+    if (!s && (!is_second(t) || trainer_second_wins(t->turns, &report->accuracy))) {
+        s = trainer_export_model(t, err);
+        if (!s && is_second(t)) s = sdm_outfile_commit(config, err);
+        if (!s) s = trainer_fine_add(t, err);
+    }
+    report->seconds = trainer_seconds(t);
+    if (!s) {
+        tell_overrun(t, report->seconds - started);
+        return trainer_checkpoint_remove(t, err);
+    }
+    t->phase = phase;
+    t->metrics->size = lines;
+    if (s != SDM_E_QUALITY && !trainer_checkpoint_write(t, NULL))
+        trainer_message(t, "a checkpoint is in %s: go on with --resume", t->folder);
+    return s;
+}
+
+sdm_status trainer_training(trainer *t, bool resume, sdm_train_report *report, sdm_error *err)
+{
+    sdm_outfile *config = NULL;
+    t->kind = trainer_kind_find(t->config->network.kind);
+    sdm_status s = trainer_export_config(t, &config, err);
+    if (!s) s = train_run(t, resume, &config, err);
+    trainer_producer_stop(t->producer);
+    t->producer = NULL;
+    if (!s) s = train_finish(t, &config, report, err);
+    sdm_outfile_discard(&config);
+    t->kind->dispose(t);
+    trainer_dataset_dispose(&t->data);
+    trainer_dataset_dispose(&t->tried);
+    sdm_free(t->blocks);
+    return s;
+}

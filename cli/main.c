@@ -30,6 +30,7 @@ static sdm_status (*const functions[CLI_N_COMMANDS])(const cli_args *args, sdm_e
     [CLI_EXPERIMENT] = cmd_experiment,
     [CLI_PHANTOM] = cmd_phantom,
     [CLI_FIT] = cmd_fit,
+    [CLI_EXPORT] = cmd_export,
     [CLI_HELP] = cmd_help};
 
 static int print_help(const cli_command *command)

@@ -9,7 +9,7 @@
 #define WITH_SHAPES                                                                                \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) |              \
      ON(CLI_SHAPES) | ON(CLI_VERIFY) | ON(CLI_CONFIG) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |       \
-     ON(CLI_PHANTOM) | ON(CLI_FIT))
+     ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_EXPORT))
 #define REPORTS                                                                                    \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) |              \
      ON(CLI_SHAPES) | ON(CLI_INFO) | ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |         \
@@ -130,6 +130,13 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "sdmgen fit runs/cochlea/model.sdm ct.nii.gz --start-centre 4,-2,7 --start-axis 0,0,1 -o "
      "fit.stl -o fit.png",
      1, 2},
+    {"export", "MODEL -o FILE.onnx | --shape NAME -o FILE.glb",
+     "write a network or a shape for other programs",
+     "MODEL: the network as ONNX (opset 13): input `params` [N][P] in the units of the\n"
+     "parameters, output `sdm` [N][nz][ny][nx] in mm. Networks of kind pod, sdmnn, deepsdf\n"
+     "and imnet. --shape: the mesh as binary glTF 2.0; if it is linear in its parameters, as a\n"
+     "statistical shape is, with a morph target for each of its first eight parameters.",
+     "sdmgen export runs/cochlea/model.sdm -o cochlea.onnx", 0, 1},
     {"help", "[COMMAND]", "print help, manual pages or completion scripts", NULL,
      "sdmgen help --completion bash > ~/.local/share/bash-completion/completions/sdmgen", 0, 1},
 };
@@ -137,17 +144,19 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
 const cli_option cli_options[] = {
     /* the shape and its parameters */
     {"shape", 0, CLI_TEXT, "NAME", NULL, 0, 0,
-     ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM) | ON(CLI_FIT), AT(shape),
-     "name of the shape; `sdmgen shapes` lists them"},
+     ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_EXPORT),
+     AT(shape), "name of the shape; `sdmgen shapes` lists them"},
     {"mesh", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH),
      AT(mesh), "mesh file instead of a shape"},
     {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0,
-     ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(params),
-     "value of a shape parameter; may be repeated"},
+     ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM) |
+         ON(CLI_EXPORT),
+     AT(params), "value of a shape parameter; may be repeated"},
     {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_FIT), AT(params),
      "start value of a shape parameter (default: the shape's); may be repeated"},
     {"option", 'O', CLI_LIST, "name=value", NULL, 0, 0,
-     ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES) | ON(CLI_BENCH) | ON(CLI_PHANTOM) | ON(CLI_FIT),
+     ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES) | ON(CLI_BENCH) | ON(CLI_PHANTOM) | ON(CLI_FIT) |
+         ON(CLI_EXPORT),
      AT(options), "value of a shape option; may be repeated"},
     {"params", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_GENERATE), AT(rows),
      "parameters from a table: a header line of names, then one output per row"},
@@ -227,6 +236,8 @@ const cli_option cli_options[] = {
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(outputs),
      "output: .vdb .ply .stl .obj .off .nii .nii.gz .nrrd .mha .npy .png .svg .pdf .json; may "
      "be repeated"},
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_EXPORT), AT(outputs),
+     "output: .onnx (MODEL) or .glb (--shape); may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_SHAPES), AT(outputs),
      "check: a picture of nine shapes: .png .svg .pdf; may be repeated"},
     {"closest", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(closest),

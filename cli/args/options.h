@@ -62,6 +62,7 @@ enum {
     CLI_EXPERIMENT,
     CLI_PHANTOM,
     CLI_FIT,
+    CLI_EXPORT,
     CLI_HELP,
     CLI_N_COMMANDS
 };

@@ -243,6 +243,11 @@ static void integer_panels_are_exact(void **state)
                             (int16_t)(extreme ? (r % 2 ? limit : -limit) : (int)(u * limit));
                     }
                 sdm_panel_pack_i8(outputs, wide, k, w, packed);
+                for (size_t o = 0; o < outputs; o++) {
+                    float row[128];
+                    sdm_panel_row_i8(wide, k, packed, o, row);
+                    for (size_t i = 0; i < k; i++) assert_true(row[i] == (float)w[o * k + i]);
+                }
                 for (size_t rows = 1; rows <= ROWS; rows += rows < 7 ? 1 : 6) {
                     const size_t n_mean = rows / 2;
                     const sdm_panel_out plain = {.y = y, .ld = N_MAX, .line = SDM_PANEL_ROW},

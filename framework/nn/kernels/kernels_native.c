@@ -134,6 +134,22 @@ void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w
                 }
 }
 
+void sdm_panel_row_i8(size_t n_wide, size_t k, const int8_t *panels, size_t row, float *w)
+{
+    const size_t wide = sdm_panel_even(n_wide), even = sdm_panel_even(k);
+    const int8_t *panel = panels + row / SDM_PANEL * SDM_PANEL * (wide + even);
+    for (size_t i = 0; i < even; i += 2) {
+        const size_t size = i < wide ? 2 : 1;
+        for (size_t q = i; q < i + 2 && q < k; q++) {
+            const int8_t *from = panel + (row % SDM_PANEL * 2 + q - i) * size;
+            int16_t two = 0;
+            memcpy(&two, from, size);
+            w[q] = size == 2 ? (float)two : (float)*from;
+        }
+        panel += 2 * SDM_PANEL * size;
+    }
+}
+
 void sdm_quantise(size_t rows, size_t n, const float *y, size_t ldy, const float *factor, int limit,
                   int16_t *x, size_t ldx, float *scale)
 {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "model_text.h"
+#include "onnx/onnx.h"
 #include "sdm/internal/container.h"
 #include "sdm/internal/fine.h"
 #include "sdm/model.h"
@@ -37,6 +38,11 @@ typedef struct sdm_model_kind {
     size_t (*vjp_scratch_bytes)(const sdm_model *m);
     void (*vjp)(const sdm_model *m, const double *params, const float *adjoint, double *gradient,
                 void *scratch);
+
+    /* Appends the network to a graph: returns the maps [N][nz][ny][nx], mm, at x[N][P], the
+       parameters scaled to [-1, 1]. The model must outlive the graph. NULL: ONNX cannot express
+       the network. */
+    sdm_onnx_value (*onnx)(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x);
 } sdm_model_kind;
 
 struct sdm_model {
@@ -88,6 +94,9 @@ sdm_status sdm_model_pack(const sdm_model_info *info, const sdm_text *descriptio
    over `bytes`, which are freed with the model or after an error. Errors as sdm_model_open(). */
 sdm_status sdm_model_read(uint8_t *bytes, size_t size, const sdm_model_kind *const *kinds,
                           sdm_model **out, sdm_error *err);
+
+/* The maps rows[N][voxels] as [N][nz][ny][nx], for the functions `onnx`. */
+sdm_onnx_value sdm_model_onnx_maps(const sdm_model *m, sdm_onnx *g, sdm_onnx_value rows);
 
 extern const sdm_model_kind sdm_kind_pod, sdm_kind_template, sdm_kind_deepsdf, sdm_kind_imnet,
     sdm_kind_sdmnn;

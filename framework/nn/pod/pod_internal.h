@@ -231,3 +231,6 @@ void sdm_pod_jvp(const sdm_model *m, const double *params, const double *directi
 size_t sdm_pod_vjp_scratch_bytes(const sdm_model *m);
 void sdm_pod_vjp(const sdm_model *m, const double *params, const float *adjoint, double *gradient,
                  void *scratch);
+
+/* pod_onnx.c: entry of the function table. */
+sdm_onnx_value sdm_pod_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x);

@@ -293,4 +293,5 @@ const sdm_model_kind sdm_kind_pod = {.name = "pod",
                                      .jvp_scratch_bytes = sdm_pod_jvp_scratch_bytes,
                                      .jvp = sdm_pod_jvp,
                                      .vjp_scratch_bytes = sdm_pod_vjp_scratch_bytes,
-                                     .vjp = sdm_pod_vjp};
+                                     .vjp = sdm_pod_vjp,
+                                     .onnx = sdm_pod_onnx};

@@ -77,9 +77,8 @@ static void bias_set(const sdm_model *m, const double *p, bool tangents, map_bia
     }
 }
 
-// q[n][3] = scaled coordinates of the voxels from `first` on
-static void coordinates_fill(const sdm_grid *g, const sdm_point_arch *a, size_t first, size_t n,
-                             float *q)
+void sdm_point_coordinates(const sdm_grid *g, const sdm_point_arch *a, size_t first, size_t n,
+                           float *q)
 {
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
     for (size_t v = first; v < first + n; v++, q += 3) {
@@ -191,7 +190,7 @@ static void map_forward(const sdm_model *m, const double *p, float *values, floa
         float q[3 * 192];
         workspace w;
         carve(k, sets * k->rows, memory + (size_t)sdm_thread() * each, &w);
-        coordinates_fill(&m->info.grid, &k->arch, first, n, q);
+        sdm_point_coordinates(&m->info.grid, &k->arch, first, n, q);
         points_forward(k, &b, n, q, &w, values + first, jacobian ? jacobian + first : NULL, voxels);
     }
 }

@@ -33,3 +33,10 @@ void sdm_point_forward(const sdm_model *m, const double *params, size_t n, float
 size_t sdm_point_jacobian_scratch_bytes(const sdm_model *m, int n_threads);
 void sdm_point_jacobian(const sdm_model *m, const double *params, float *values, float *jacobian,
                         void *scratch, int n_threads);
+
+/* point_forward.c: q[n][3] = scaled coordinates of n voxels, from the index `first` on. */
+void sdm_point_coordinates(const sdm_grid *g, const sdm_point_arch *a, size_t first, size_t n,
+                           float *q);
+
+/* point_onnx.c: entry of the function table. */
+sdm_onnx_value sdm_point_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x);

@@ -68,7 +68,8 @@ static void network_free(void *network) { sdm_free(network); }
     {                                                                                              \
         .name = text, .open = open_network, .dispose = network_free,                               \
         .scratch_bytes = sdm_point_scratch_bytes, .forward = sdm_point_forward, .threaded = true,  \
-        .jacobian_scratch_bytes = sdm_point_jacobian_scratch_bytes, .jacobian = sdm_point_jacobian \
+        .jacobian_scratch_bytes = sdm_point_jacobian_scratch_bytes,                                \
+        .jacobian = sdm_point_jacobian, .onnx = sdm_point_onnx                                     \
     }
 const sdm_model_kind sdm_kind_deepsdf = POINT_KIND("deepsdf");
 const sdm_model_kind sdm_kind_imnet = POINT_KIND("imnet");

@@ -48,3 +48,6 @@ void sdm_sdmnn_model_jvp(const sdm_model *m, const double *params, const double 
 size_t sdm_sdmnn_vjp_scratch_bytes(const sdm_model *m);
 void sdm_sdmnn_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
                          double *gradient, void *scratch);
+
+/* sdmnn_onnx.c: entry of the function table. */
+sdm_onnx_value sdm_sdmnn_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x);

@@ -86,4 +86,5 @@ const sdm_model_kind sdm_kind_sdmnn = {.name = "sdmnn",
                                        .jvp_scratch_bytes = sdm_sdmnn_jvp_scratch_bytes,
                                        .jvp = sdm_sdmnn_model_jvp,
                                        .vjp_scratch_bytes = sdm_sdmnn_vjp_scratch_bytes,
-                                       .vjp = sdm_sdmnn_model_vjp};
+                                       .vjp = sdm_sdmnn_model_vjp,
+                                       .onnx = sdm_sdmnn_onnx};

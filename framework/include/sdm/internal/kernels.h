@@ -85,6 +85,9 @@ int sdm_panel_i8_limit(size_t outputs, size_t k, const int16_t *w);
    ranges of wide and narrow weights. */
 void sdm_panel_pack_i8(size_t outputs, size_t n_wide, size_t k, const int16_t *w, int8_t *panels);
 
+/* w[k] = row `row` of the matrix in the panels. */
+void sdm_panel_row_i8(size_t n_wide, size_t k, const int8_t *panels, size_t row, float *w);
+
 /* Quantises rows: with v = y[r][i] * factor[i] (factor[n]; NULL: 1) and m = the largest abs(v) of
    row r, x[r][i] = v * limit / m rounded to nearest, and scale[r] = m / limit, so that
    v = x[r][i] * scale[r] up to rounding. y[rows][ldy], x[rows][ldx], 1 <= limit <= 32767. A row of

@@ -1,0 +1,67 @@
+#!/usr/bin/env bash
+# sdmgen export: networks as ONNX. onnx_tool.py reads the files without the package onnx and evaluates pod with numpy; the package onnx
+# (python3-onnx) checks them and onnxruntime-web (npm, in SDM_NODE_MODULES, the folder that holds node_modules) evaluates all kinds, where
+# they are installed. The maps are those of sdmgen generate.
+# Tests: cmd_export.c model_onnx.c onnx_file.c onnx_graph.c pod_onnx.c point_onnx.c protobuf.c sdmnn_onnx.c
+. "$(dirname "$0")/common.sh"
+tool=$source_folder/tests/cli/onnx_tool.py
+python=
+for p in python3 /usr/bin/python3; do $p -c 'import numpy' 2>/dev/null && python=$p && break; done
+[ -n "$python" ] || { echo "python3 with numpy is missing"; exit 77; }
+run_web() { node "$source_folder/tests/cli/onnx_run.mjs" "$1" "$2" "$3"; }
+web= checker=
+[ -n "${SDM_NODE_MODULES:-}" ] && [ -d "$SDM_NODE_MODULES/node_modules/onnxruntime-web" ] && web=yes
+$python -c 'import onnx' 2>/dev/null && checker=yes
+
+# compare NAME BATCH LIMIT: the maps of NAME.onnx at BATCH parameter vectors against those of generate; LIMIT in mm
+compare() {
+    local name=$1 limit=$3
+    rm -f m*.npy
+    expect 0 - "$python" "$tool" params "$name.onnx" "$2" p.csv
+    expect 0 - sdmgen generate "$name/model.sdm" --params p.csv -o m%04d.npy
+    if [[ $name = pod* ]]; then
+        expect 0 - "$python" "$tool" run "$name.onnx" p.csv a.f32
+        expect 0 - "$python" "$tool" compare a.f32 "$limit" m*.npy
+    fi
+    [ -z "$web" ] || { expect 0 - run_web "$name.onnx" p.csv b.f32 && expect 0 - "$python" "$tool" compare b.f32 "$limit" m*.npy; }
+}
+
+# pod: with bytes, halves and floats, one or several levels, blocks that the grid cuts, with and without MLP; the others on a grid whose
+# sizes are odd on lower levels
+train() { expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" --json --quiet --out "$@"; }
+train pod network.levels=3
+train pod_half network.weights=f16 network.activation=tanh
+train pod_float network.weights=f32 network.depth=0 network.levels=1 network.block=5
+small="network.depth=2 network.width=16"
+# shellcheck disable=SC2086 # several words
+{
+    train sdmnn network.kind=sdmnn $small network.channels=3
+    train sdmnn_one network.kind=sdmnn $small network.channels=1 network.block=3 network.activation=tanh
+    train deepsdf network.kind=deepsdf $small
+    train imnet network.kind=imnet $small network.weights=f32
+}
+for name in pod pod_half pod_float sdmnn sdmnn_one deepsdf imnet; do
+    expect 0 - sdmgen export $name/model.sdm -o $name.onnx
+    present $name.onnx
+    if [ -n "$checker" ]; then
+        expect 0 - "$python" -c '
+import onnx, sys
+m = onnx.load(sys.argv[1])
+onnx.checker.check_model(m, full_check=True)
+onnx.shape_inference.infer_shapes(m, strict_mode=True)
+dims = [[d.dim_param or d.dim_value for d in v.type.tensor_type.shape.dim] for v in (m.graph.input[0], m.graph.output[0])]
+assert dims == [["N", 4], ["N", 12, 14, 16]], dims' $name.onnx
+    fi
+    case $name in pod) limit=3e-4 ;; *) limit=1e-5 ;; esac
+    [[ $name != pod* ]] || compare $name 1 $limit
+    compare $name 5 $limit
+done
+
+# the same bytes each time; nothing is left of a file that cannot be written
+expect 0 - sdmgen export pod/model.sdm -o again.onnx
+cmp -s pod.onnx again.onnx || bad "a second export gives other bytes"
+expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=ellipsoid grid.spacing=1 network.kind=template train.steps=20 --json --quiet --out template
+expect 1 "a network of kind 'template' cannot be written as ONNX" sdmgen export template/model.sdm -o x.onnx
+absent x.onnx
+echo "checked by: numpy${checker:+, onnx}${web:+, onnxruntime-web}"
+finish

@@ -2,6 +2,9 @@
 #define _XOPEN_SOURCE 700 // for realpath()
 #include <dirent.h>
 #include <dlfcn.h>
+#ifdef __ELF__
+#include <elf.h>
+#endif
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
@@ -62,9 +65,40 @@ static bool is_loaded(const sdm_registry *r, const char *path)
     return false;
 }
 
+/* Refuses a file that is shorter than the segments that its ELF header announces: dlopen() maps
+ * them, and their first use would end the program. Other files are left to dlopen(). */
+static sdm_status check_complete(const char *path, sdm_error *err)
+{
+    uint8_t *bytes = NULL;
+    size_t size;
+    const sdm_status s = sdm_file_read(path, FILE_BYTES_MAX, &bytes, &size, err);
+    if (s) return s;
+    uint64_t end = 0;
+#if defined(__ELF__) && UINTPTR_MAX == UINT64_MAX
+    Elf64_Ehdr head;
+    if (size >= sizeof head && !memcmp(bytes, ELFMAG, SELFMAG) && bytes[EI_CLASS] == ELFCLASS64) {
+        memcpy(&head, bytes, sizeof head);
+        end = head.e_phoff + (uint64_t)head.e_phnum * sizeof(Elf64_Phdr);
+        for (size_t i = 0; end <= size && i < head.e_phnum; i++) {
+            Elf64_Phdr segment;
+            memcpy(&segment, bytes + head.e_phoff + i * sizeof segment, sizeof segment);
+            if (segment.p_offset + segment.p_filesz > end)
+                end = segment.p_offset + segment.p_filesz;
+        }
+    }
+#endif
+    sdm_free(bytes);
+    return end <= size ? SDM_OK
+                       : sdm_fail(err, SDM_E_PLUGIN,
+                                  "plug-in %s is not complete: %zu of %llu bytes", path, size,
+                                  (unsigned long long)end);
+}
+
 /* Loads the file at an absolute path and adds its shapes. */
 static sdm_status object_load(sdm_registry *r, const char *path, sdm_error *err)
 {
+    const sdm_status complete = check_complete(path, err);
+    if (complete) return complete;
     void *object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!object) {
         const char *why = dlerror();

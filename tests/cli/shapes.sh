@@ -65,6 +65,9 @@ expect 3 'missing\.so' sdmgen shapes --plugin ./missing.so
 
 # Folders of plug-ins: a file given twice is one; one that cannot be loaded is skipped unless its shape is asked for.
 good=$(realpath ../../plugins/good)
+# a plug-in that is cut
+head -c 9000 "$good/octahedron.so" >cut.so
+expect 3 'plug-in .*/cut\.so is not complete: 9000 of [0-9]+ bytes' sdmgen shapes --plugin ./cut.so
 mkdir path && cp "$good/octahedron.so" path/copy.so && cp false.so path/broken.so
 export SDMGEN_PLUGIN_PATH=$good:$PWD/path
 expect 0 'skipped a file in SDMGEN_PLUGIN_PATH: plug-in .*/broken\.so cannot be loaded: ' sdmgen shapes octahedron --plugin path/copy.so

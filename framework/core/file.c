@@ -114,6 +114,18 @@ static int temp_open(const char *path, char **temp)
     }
 }
 
+/* Gives the open file the permissions of the one that it replaces; its owner may always write it.
+ * false: it cannot, see errno. WASI has no permissions. */
+static bool keep_permissions(int fd, mode_t mode)
+{
+#ifdef __wasi__
+    (void)fd, (void)mode;
+    return true;
+#else
+    return !fchmod(fd, (mode & 0777) | S_IWUSR);
+#endif
+}
+
 sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
 {
     *out = NULL;
@@ -140,8 +152,7 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", path, strerror(code));
     }
-    // a file that is replaced keeps its permissions; the owner of a new one may always write it
-    if (replaces && fchmod(f->fd, (st.st_mode & 0777) | S_IWUSR)) {
+    if (replaces && !keep_permissions(f->fd, st.st_mode)) {
         const int code = errno;
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_IO, "%s: cannot set its permissions: %s", path, strerror(code));

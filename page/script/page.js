@@ -11,7 +11,7 @@ function worldOf(index) {
 
 const middle = grid.size.map(n => (n - 1) / 2);
 const centre = box.triangles ? box.min.map((low, a) => (low + box.max[a]) / 2) : worldOf(middle);
-const radius = box.triangles ? 0.56 * Math.hypot(...box.min.map((low, a) => box.max[a] - low)) : Math.hypot(...grid.size.map((n, a) => n * grid.spacing[a])) / 2;
+const radius = box.triangles ? 0.5 * Math.hypot(...box.min.map((low, a) => box.max[a] - low)) : Math.hypot(...grid.size.map((n, a) => n * grid.spacing[a])) / 2;
 // distances of the last colours: half of the shortest edge of the grid
 const reach = Math.min(...grid.size.map((n, a) => n * grid.spacing[a])) / 3;
 
@@ -19,8 +19,8 @@ const state = {
   values: parameters.map(p => p.default),
   position: [...box.slices],
   ranges: parameters.map(p => [p.min, p.max]),
-  knowsShape: false, map: null, compared: null,
-  busy: true, wanted: false, changed: 0, pictureTimes: [], waiting: []
+  map: null, compared: null, watched: null,
+  busy: true, wanted: false, drawn: 0, waiting: []
 };
 
 function notice(text) {
@@ -37,10 +37,14 @@ if (!surfaceView) {
 }
 
 const still = figures.live ? null : readStill();
-const sliceViews = AXES.map((_, axis) => createSliceView(axis, grid, figures.live ? {
-  moved: (a, index) => moveSlices(AXES.map((__, b) => (b === a ? index : null))),
-  pointed: moveSlices
-} : {}));
+const sliceViews = AXES.map((_, axis) => createSliceView(axis, grid, {
+  moved: figures.live && ((a, index) => moveSlices(AXES.map((__, b) => (b === a ? index : null)))),
+  pointed: moveSlices,
+  watched: a => {
+    state.watched = a;
+    showFrame();
+  }
+}));
 $('slices').append(...sliceViews.map(view => view.figure));
 
 function moveSlices(position) {
@@ -51,14 +55,19 @@ function moveSlices(position) {
 function drawSlices() {
   if (still) still.slices.forEach((slice, axis) => sliceViews[axis].show(slice, box.slices, reach));
   else if (state.map) sliceViews.forEach((view, axis) => view.show(sliceOf(state.map.values, grid.size, axis, state.position[axis]), state.position, reach));
+  showFrame();
+}
+
+// Shows in the view of the surface where the slice lies that the reader looks at.
+function showFrame() {
   if (!surfaceView) return;
-  const frames = AXES.flatMap((_, axis) => [[0, 0], [1, 0], [1, 1], [0, 1]].map(([a, b]) => {
+  const axis = state.watched;
+  surfaceView.showFrames(axis === null ? [] : [[0, 0], [1, 0], [1, 1], [0, 1]].map(([a, b]) => {
     const index = [...state.position], [right, up] = [[1, 2], [0, 2], [0, 1]][axis];
     index[right] = a * (grid.size[right] - 1);
     index[up] = b * (grid.size[up] - 1);
     return worldOf(index);
   }));
-  surfaceView.showFrames(frames);
 }
 
 // The pictures of a page without a model (see cli/page/page.h).
@@ -118,15 +127,15 @@ const sliders = parameters.map((p, i) => {
   const row = element('div', { class: 'slider', title: p.help || '' },
     element('label', { for: 'slider' + i }, p.name, element('small', {}, p.help || '')),
     element('span', { class: 'value' }, number, element('small', {}, p.unit)), range, note);
-  range.addEventListener('input', event => setParameter(i, rounded(range.valueAsNumber, stepOf(p)), event.timeStamp));
+  range.addEventListener('input', () => setParameter(i, rounded(range.valueAsNumber, stepOf(p))));
   // keys move by a step, not by the tiny one of step="any"
   range.addEventListener('keydown', event => {
     const steps = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -10, PageUp: 10 }[event.key];
     if (!steps) return;
     event.preventDefault();
-    setParameter(i, rounded(state.values[i] + steps * stepOf(p), stepOf(p)), event.timeStamp);
+    setParameter(i, rounded(state.values[i] + steps * stepOf(p), stepOf(p)));
   });
-  number.addEventListener('change', event => { if (Number.isFinite(number.valueAsNumber)) setParameter(i, number.valueAsNumber, event.timeStamp); });
+  number.addEventListener('change', () => { if (Number.isFinite(number.valueAsNumber)) setParameter(i, number.valueAsNumber); });
   range.addEventListener('dblclick', () => moveTo(state.values.map((v, k) => (k === i ? p.default : v))));
   $('sliders').append(row);
   return { range, number, note, row };
@@ -148,10 +157,10 @@ function showSliders() {
 
 let animation = 0;
 
-function setParameter(i, value, when = performance.now()) {
+function setParameter(i, value) {
   cancelAnimationFrame(animation);
   state.values[i] = clamped(value, state.ranges[i]);
-  request(when);
+  request();
 }
 
 // Moves all parameters to `target`, smoothly unless the reader prefers no motion.
@@ -161,7 +170,7 @@ function moveTo(target, duration = 700) {
   function step(now) {
     const t = calm.matches ? 1 : Math.min((now - start) / duration, 1), share = t * t * (3 - 2 * t);
     state.values = t < 1 ? from.map((v, i) => v + share * (target[i] - v)) : [...target];
-    request(now);
+    request();
     if (t < 1) animation = requestAnimationFrame(step);
   }
   animation = requestAnimationFrame(step);
@@ -180,20 +189,20 @@ document.querySelector('.buttons').append(...buttons);
 
 // maps
 
+// The first maps are slow: the browser improves the code of the runtime while it runs.
+const WARM = 4;
 let worker = null;
 
-// Asks for the map at the values of the sliders; `when`: the time of the event behind it. Only the latest values count.
-function request(when) {
+// Asks for the map at the values of the sliders. While a map is computed, only the latest values wait.
+function request() {
   showSliders();
   state.wanted = true;
-  state.changed = when;
   if (!state.busy) send();
 }
 
 function send() {
   state.busy = true;
   state.wanted = false;
-  state.sent = state.changed;
   worker.postMessage({ map: [...state.values] });
 }
 
@@ -201,25 +210,23 @@ function showMap(map) {
   state.map = map;
   if (surfaceView) surfaceView.show(map.vertices, map.triangles);
   drawSlices();
-  if (surfaceView) surfaceView.draw();
   showReadings(map);
   const extra = map.exact ? 'exact engine: beyond the trained range' : 'network';
   if (surfaceView) $('source').textContent = `${extra} · map ${numberText(map.mapTime, 2)} ms · surface ${numberText(map.surfaceTime, 2)} ms`;
   document.body.classList.toggle('exact', map.exact);
-  state.pictureTimes.push(performance.now() - state.sent);
+  state.drawn++;
   state.busy = false;
-  if (state.wanted) send();
-  else for (const done of state.waiting.splice(0)) done(map);
+  if (state.wanted || state.drawn < WARM) send();
+  else for (const done of state.waiting.splice(0)) done();
 }
 
 function onReady({ ranges, knowsShape }) {
   state.ranges = parameters.map((_, i) => [ranges[2 * i], ranges[2 * i + 1]]);
-  state.knowsShape = knowsShape;
   $('compare').hidden = !knowsShape;
   $('legend').hidden = !parameters.some((p, i) => state.ranges[i][0] < p.min || state.ranges[i][1] > p.max);
   document.body.classList.add('ready');
   state.busy = false;
-  request(performance.now());
+  request();
 }
 
 function startWorker() {
@@ -247,7 +254,8 @@ function startWorker() {
 function showTexts() {
   const { network, accuracy } = figures, size = grid.size.join(' × ');
   const spacing = new Set(grid.spacing).size === 1 ? numberText(grid.spacing[0]) : grid.spacing.map(v => numberText(v)).join(' × ');
-  $('about').textContent = (figures.summary ? figures.summary + '. ' : '') + `Its signed distance on ${size} voxels of ${spacing} mm, by a network of ${parameters.length} parameter${parameters.length > 1 ? 's' : ''}.`;
+  $('about').textContent = figures.summary || '';
+  $('sizes').textContent = `${parameters.length} parameter${parameters.length > 1 ? 's' : ''} · ${size} voxels of ${spacing} mm · network ${network.kind}`;
   $('program').textContent = figures.program;
   const mm = x => withUnit(x, 'mm');
   fillTable($('accuracy'), [
@@ -263,18 +271,17 @@ function showTexts() {
   if (figures.history) showHistory(figures.history);
 }
 
-// For scripts: set(values by name) gives a promise of the map, map() the last one as Float32Array [nz][ny][nx].
+// For scripts: set() takes values by name; drawn() is a promise of the picture of the latest values; map() is the last map, a Float32Array
+// [nz][ny][nx] in mm.
 window.sdmgen = {
   figures,
   set(values) {
     parameters.forEach((p, i) => { if (p.name in values) state.values[i] = clamped(values[p.name], state.ranges[i]); });
-    return new Promise(done => {
-      state.waiting.push(done);
-      request(performance.now());
-    });
+    request();
+    return this.drawn();
   },
-  map: () => state.map && state.map.values,
-  pictureTimes: () => state.pictureTimes
+  drawn: () => new Promise(done => (state.busy ? state.waiting.push(done) : done())),
+  map: () => state.map && state.map.values
 };
 
 showTexts();

@@ -24,7 +24,7 @@ function linearTicks(high, count) {
 // A plot with a logarithmic y axis. curves: [{title, style, points: [[x, y], ...]}], a single point is a dot.
 function plot(holder, { curves, xTitle, yTitle }) {
   const all = curves.flatMap(curve => curve.points);
-  const highX = Math.max(...all.map(p => p[0])), ys = all.map(p => p[1]);
+  const highX = Math.max(...all.map(p => p[0])) || 1, ys = all.map(p => p[1]);
   const lowY = Math.min(...ys) / 1.25, highY = Math.max(...ys) * 1.25;
   function draw() {
     const width = Math.max(holder.clientWidth, 240), height = Math.min(Math.max(width * 0.42, 190), 300);
@@ -56,15 +56,19 @@ function plot(holder, { curves, xTitle, yTitle }) {
   }).observe(holder);
 }
 
+// Plots the errors of a training over its time, or over its steps where the run has no times.
 function showHistory(history) {
-  const root = key => history.filter(point => point.phase !== 'evaluate' && point[key] > 0).map(point => [point.seconds, Math.sqrt(point[key])]);
-  const end = history.filter(point => point.phase === 'evaluate' && point.heldout_mse_mm2 > 0).map(point => [point.seconds, Math.sqrt(point.heldout_mse_mm2)]);
+  const across = history.every(point => point.seconds !== null) ? 'seconds' : 'step';
+  const curve = (title, style, key, finished) => ({
+    title, style,
+    points: history.filter(point => (point.phase === 'evaluate') === finished && point[key] > 0 && point[across] !== null)
+      .map(point => [point[across], Math.sqrt(point[key])])
+  });
   const curves = [
-    { title: 'training, one batch', style: 'loss', points: root('loss_mm2') },
-    { title: 'held-out shapes', style: 'heldout', points: root('heldout_mse_mm2') },
-    { title: 'finished network', style: 'end', points: end }
-  ].filter(curve => curve.points.length > 0);
+    curve('training, one batch', 'loss', 'loss_mm2', false), curve('held-out shapes', 'heldout', 'heldout_mse_mm2', false),
+    curve('finished network', 'end', 'heldout_mse_mm2', true)
+  ].filter(({ points }) => points.length > 0);
   if (!curves.length) return;
   $('training').hidden = false;
-  plot($('history'), { curves, xTitle: 'seconds', yTitle: 'Root mean square error, mm' });
+  plot($('history'), { curves, xTitle: across === 'step' ? 'optimiser steps' : 'seconds', yTitle: 'Root mean square error, mm' });
 }

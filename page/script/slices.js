@@ -45,22 +45,48 @@ function traceContour(context, { data, width, height }, level, place) {
   }
 }
 
-// The colours of distances: stops from far inside to far outside.
-function paint(slice, reach) {
+const COLOURS = 512;
+
+// The colours of distances from -reach to reach (mm), as words of an image.
+function colourTable() {
   const deep = colour('--deep'), inside = colour('--inside'), near = colour('--near'), far = colour('--far');
-  const image = new ImageData(slice.width, slice.height);
-  for (let i = 0; i < slice.data.length; i++) {
-    const d = slice.data[i], share = Math.min(Math.abs(d) / reach, 1) ** 0.8;
-    const [from, to] = d < 0 ? [inside, deep] : [near, far];
-    for (let c = 0; c < 3; c++) image.data[4 * i + c] = 255 * (from[c] + (to[c] - from[c]) * share);
-    image.data[4 * i + 3] = 255;
+  const bytes = new Uint8Array(4 * COLOURS);
+  for (let i = 0; i < COLOURS; i++) {
+    const d = (i + 0.5) / COLOURS * 2 - 1, share = Math.abs(d) ** 0.8, [from, to] = d < 0 ? [inside, deep] : [near, far];
+    for (let c = 0; c < 3; c++) bytes[4 * i + c] = Math.round(255 * (from[c] + (to[c] - from[c]) * share));
+    bytes[4 * i + 3] = 255;
+  }
+  return new Uint32Array(bytes.buffer);
+}
+
+// An image of the slice with `scale` pixels a voxel, linear between the voxels.
+function paint({ data, width, height }, reach, scale, flipped) {
+  const image = new ImageData(Math.round(width * scale), Math.round(height * scale));
+  const words = new Uint32Array(image.data.buffer), table = colourTable(), factor = COLOURS / (2 * reach);
+  const left = new Int32Array(image.width), share = new Float32Array(image.width);
+  for (let x = 0; x < image.width; x++) {
+    const at = Math.min(Math.max((x + 0.5) / scale - 0.5, 0), width - 1);
+    left[x] = Math.min(Math.floor(at), Math.max(width - 2, 0));
+    share[x] = at - left[x];
+  }
+  const step = width > 1 ? 1 : 0;
+  for (let y = 0; y < image.height; y++) {
+    const shown = Math.min(Math.max((y + 0.5) / scale - 0.5, 0), height - 1), at = flipped ? height - 1 - shown : shown;
+    const row = Math.min(Math.floor(at), Math.max(height - 2, 0)), part = at - row;
+    const low = row * width, high = height > 1 ? low + width : low;
+    for (let x = 0; x < image.width; x++) {
+      const a = left[x], b = a + step, t = share[x];
+      const upper = data[low + a] + t * (data[low + b] - data[low + a]), lower = data[high + a] + t * (data[high + b] - data[high + a]);
+      const index = (upper + part * (lower - upper) + reach) * factor;
+      words[y * image.width + x] = table[index < 0 ? 0 : index >= COLOURS ? COLOURS - 1 : index | 0];
+    }
   }
   return image;
 }
 
 // The view of the slice across `axis`. moved(axis, index) is called when another slice is asked for, pointed(position) for a point: indices of
-// the other two axes, null for this one.
-function createSliceView(axis, grid, { moved, pointed }) {
+// the other two axes, null for this one; watched(axis) when the reader turns to this slice, watched(null) when not any more.
+function createSliceView(axis, grid, { moved, pointed, watched }) {
   const [right, up] = [[1, 2], [0, 2], [0, 1]][axis];
   const flipped = up === 2; // z upwards; y (to the back) downwards, as radiologists look
   const canvas = element('canvas', { role: 'img' });
@@ -79,16 +105,10 @@ function createSliceView(axis, grid, { moved, pointed }) {
     const { slice, position, reach } = last;
     const ratio = fitCanvas(canvas), context = canvas.getContext('2d');
     const place = (column, row) => [(column + 0.5) / slice.width * canvas.width, (toRow(row) + 0.5) / slice.height * canvas.height];
-    Object.assign(buffer, { width: slice.width, height: slice.height });
-    buffer.getContext('2d').putImageData(paint(slice, reach), 0, 0);
-    context.save();
-    context.imageSmoothingQuality = 'high';
-    if (flipped) {
-      context.translate(0, canvas.height);
-      context.scale(1, -1);
-    }
+    const image = paint(slice, reach, Math.min(canvas.width / slice.width, 8), flipped);
+    Object.assign(buffer, { width: image.width, height: image.height });
+    buffer.getContext('2d').putImageData(image, 0, 0);
     context.drawImage(buffer, 0, 0, canvas.width, canvas.height);
-    context.restore();
     const contour = (levels, style, width) => {
       context.beginPath();
       for (const level of levels) traceContour(context, slice, level, place);
@@ -137,6 +157,8 @@ function createSliceView(axis, grid, { moved, pointed }) {
   } else {
     range.hidden = true;
   }
+  for (const name of ['pointerenter', 'focusin']) figure.addEventListener(name, () => watched(axis));
+  for (const name of ['pointerleave', 'focusout']) figure.addEventListener(name, () => watched(null));
   onChange(canvas, draw);
   return { figure, show };
 }

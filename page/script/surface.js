@@ -20,7 +20,7 @@ in vec3 n;
 in vec3 view;
 out vec4 result;
 void main() {
-  if (shaded < 0.5) { result = vec4(front * 0.4, 0.4); return; }
+  if (shaded < 0.5) { result = vec4(front, 1.0); return; }
   vec3 m = normalize(n), eye = normalize(-view);
   vec3 base = front;
   if (!gl_FrontFacing) { m = -m; base = back; }
@@ -28,7 +28,7 @@ void main() {
   float key = max(dot(m, light), 0.0), fill = 0.5 + 0.5 * m.y;
   float shine = pow(max(dot(m, normalize(light + eye)), 0.0), 42.0);
   float rim = pow(1.0 - max(dot(m, eye), 0.0), 3.0);
-  vec3 lit = base * (0.26 + 0.72 * key + 0.24 * fill) + 0.16 * shine + rim * sky * 0.28;
+  vec3 lit = base * (0.34 + 0.62 * key + 0.24 * fill) + 0.16 * shine + rim * sky * 0.28;
   result = vec4(lit, 1.0);
 }`;
 
@@ -119,7 +119,7 @@ function createSurfaceView(canvas, centre, radius) {
     gl.bindVertexArray(buffers.surface);
     gl.drawElements(gl.TRIANGLES, n, gl.UNSIGNED_INT, 0);
     gl.uniform1f(place('shaded'), 0);
-    gl.uniform3fv(place('front'), colour('--faint'));
+    gl.uniform3fv(place('front'), colour('--accent'));
     gl.bindVertexArray(buffers.frames);
     for (let i = 0; i < lines; i += 4) gl.drawArrays(gl.LINE_LOOP, i, 4);
     gl.bindVertexArray(null);
@@ -141,6 +141,7 @@ function createSurfaceView(canvas, centre, radius) {
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.lines);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(corners.flat()), gl.DYNAMIC_DRAW);
     lines = corners.length;
+    draw();
   }
 
   function turnBy(yaw, pitch) {
@@ -196,5 +197,5 @@ function createSurfaceView(canvas, centre, radius) {
   canvas.addEventListener('webglcontextlost', event => event.preventDefault());
   prepare();
   onChange(canvas, draw);
-  return { show, showFrames, draw, finish: () => gl.finish() };
+  return { show, showFrames };
 }

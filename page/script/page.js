@@ -208,12 +208,12 @@ function send() {
 
 function showMap(map) {
   state.map = map;
+  document.documentElement.classList.toggle('exact', map.exact);
   if (surfaceView) surfaceView.show(map.vertices, map.triangles);
   drawSlices();
   showReadings(map);
   const extra = map.exact ? 'exact engine: beyond the trained range' : 'network';
   if (surfaceView) $('source').textContent = `${extra} · map ${numberText(map.mapTime, 2)} ms · surface ${numberText(map.surfaceTime, 2)} ms`;
-  document.body.classList.toggle('exact', map.exact);
   state.drawn++;
   state.busy = false;
   if (state.wanted || state.drawn < WARM) send();

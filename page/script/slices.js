@@ -118,7 +118,7 @@ function createSliceView(axis, grid, { moved, pointed, watched }) {
     const step = contourStep(reach), levels = [];
     for (let k = 1; k * step <= reach * 1.5; k++) levels.push(k * step, -k * step);
     contour(levels, cssColour(colour('--faint'), 0.35), 0.75);
-    contour([0], cssColour(colour('--accent')), 2);
+    contour([0], cssColour(colour('--contour')), 2);
     // where the other two slices are
     const [x, y] = place(position[right], position[up]);
     context.beginPath();

@@ -9,6 +9,7 @@ sdm_status cmd_generate(const cli_args *args, sdm_error *err);
 sdm_status cmd_exact(const cli_args *args, sdm_error *err);
 sdm_status cmd_mesh(const cli_args *args, sdm_error *err);
 sdm_status cmd_eval(const cli_args *args, sdm_error *err);
+sdm_status cmd_report(const cli_args *args, sdm_error *err);
 sdm_status cmd_shapes(const cli_args *args, sdm_error *err);
 sdm_status cmd_info(const cli_args *args, sdm_error *err);
 sdm_status cmd_verify(const cli_args *args, sdm_error *err);

@@ -22,6 +22,7 @@ static sdm_status (*const functions[CLI_N_COMMANDS])(const cli_args *args, sdm_e
     [CLI_EXACT] = cmd_exact,
     [CLI_MESH] = cmd_mesh,
     [CLI_EVAL] = cmd_eval,
+    [CLI_REPORT] = cmd_report,
     [CLI_SHAPES] = cmd_shapes,
     [CLI_INFO] = cmd_info,
     [CLI_VERIFY] = cmd_verify,

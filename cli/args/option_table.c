@@ -9,7 +9,7 @@
 #define WITH_SHAPES                                                                                \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) |              \
      ON(CLI_SHAPES) | ON(CLI_VERIFY) | ON(CLI_CONFIG) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |       \
-     ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_EXPORT))
+     ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_REPORT) | ON(CLI_EXPORT))
 #define REPORTS                                                                                    \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) |              \
      ON(CLI_SHAPES) | ON(CLI_INFO) | ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |         \
@@ -56,6 +56,13 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "exact engine: errors of the distance, overlap of the volumes inside (Dice), distances\n"
      "between the zero surfaces, and the time per map on one core.",
      "sdmgen eval runs/cochlea/model.sdm --samples 100 --json", 1, 1},
+    {"report", "MODEL | RUN -o FILE.html", "make a page with the model, for a browser",
+     "Writes one HTML file that needs no network and no other file. It holds the model and\n"
+     "the runtime as WebAssembly: a slider for each parameter, the surface, three slices,\n"
+     "volume and area, which follow at once; the errors of the network; and, of the folder of\n"
+     "a run, plots of its training. Beyond the trained range the exact engine computes the\n"
+     "map, if the shape is a built-in one without data files.",
+     "sdmgen report runs/cochlea -o cochlea.html", 1, 1},
     {"shapes", "[NAME] | new NAME | check NAME|CONFIG",
      "list the shapes, describe one, begin a new one, or check one",
      "Without NAME: lists the shapes. NAME: prints the parameters and options of one.\n"
@@ -240,6 +247,9 @@ const cli_option cli_options[] = {
      "output: .onnx (MODEL) or .glb (--shape); may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_SHAPES), AT(outputs),
      "check: a picture of nine shapes: .png .svg .pdf; may be repeated"},
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_REPORT), AT(outputs), "the page: .html"},
+    {"no-model", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_REPORT), AT(no_model),
+     "leave out the model and the runtime: pictures at the default parameters alone"},
     {"closest", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(closest),
      "also write the nearest surface point of every voxel: float32 [z][y][x][3], mm"},
     {"normal", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(normal),

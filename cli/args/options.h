@@ -54,6 +54,7 @@ enum {
     CLI_EXACT,
     CLI_MESH,
     CLI_EVAL,
+    CLI_REPORT,
     CLI_SHAPES,
     CLI_INFO,
     CLI_VERIFY,
@@ -125,6 +126,7 @@ struct cli_args {
     const char *points, *columns;    /* generate, exact: file of points, columns */
     double narrow;                   /* exact: voxels; 0: option missing */
     double tolerance;                /* exact: mm; 0: option missing */
+    bool no_model;                   /* report */
     bool dump;                       /* config */
     bool keys;                       /* config, experiment */
     bool markdown;                   /* config, experiment, help */

@@ -18,6 +18,7 @@ enum { PATH_SIZE = PATH_MAX };
 /* The files of the example; their names and contents have EXAMPLE where the new name comes. */
 static const struct {
     const char *name, *content;
+    size_t size;
 } files[] = {
 #include <scaffold_files.inc> // made by cli/CMakeLists.txt
 };

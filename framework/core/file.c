@@ -114,6 +114,20 @@ static int temp_open(const char *path, char **temp)
     }
 }
 
+/* Gives the open file the permissions of the one that it replaces; its owner may always write it.
+ * false: it cannot, see errno. WASI has no permissions. */
+static bool keep_permissions(int fd, mode_t mode)
+{
+#ifdef __wasi__
+    (void)fd, (void)mode;
+    return true;
+#else
+    // some file systems have no permissions
+    return !fchmod(fd, (mode & 0777) | S_IWUSR) || errno == EPERM || errno == ENOSYS ||
+           errno == ENOTSUP;
+#endif
+}
+
 sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
 {
     *out = NULL;
@@ -140,10 +154,7 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", path, strerror(code));
     }
-    // a file that is replaced hands its permissions on, and its owner may write it; some file
-    // systems have no permissions
-    if (replaces && fchmod(f->fd, (st.st_mode & 0777) | S_IWUSR) && errno != EPERM &&
-        errno != ENOSYS && errno != ENOTSUP) {
+    if (replaces && !keep_permissions(f->fd, st.st_mode)) {
         const int code = errno;
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_IO, "%s: cannot set its permissions: %s", path, strerror(code));

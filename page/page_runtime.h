@@ -1,0 +1,57 @@
+/* The runtime inside of a page, as a WebAssembly module: opens one model and computes its maps and
+ * surfaces. script/worker.js calls these functions. There is one model and one thread. Memory that
+ * a function returns is valid until the same thing is computed again. A function that computes
+ * returns 0, or 1 with a text from page_message(). */
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define PAGE_EXPORT(name) __attribute__((export_name(#name)))
+
+/* What went wrong last. */
+PAGE_EXPORT(page_message) const char *page_message(void);
+
+/* Memory for the bytes of a model; NULL: too little. */
+PAGE_EXPORT(page_alloc) void *page_alloc(size_t size);
+
+/* Opens the model in bytes[size] from page_alloc(), and frees them. Call it once. */
+PAGE_EXPORT(page_open) int page_open(uint8_t *bytes, size_t size);
+
+/* params[page_n_params()]: the parameters of the next map, to be written by the caller. */
+PAGE_EXPORT(page_params) double *page_params(void);
+PAGE_EXPORT(page_n_params) size_t page_n_params(void);
+
+/* Whether the exact engine can compute maps: the shape of the model is a built-in one without data
+ * files. */
+PAGE_EXPORT(page_knows_shape) int page_knows_shape(void);
+
+/* ranges[n_params][2]: the least and the largest values that page_map() accepts: those of the
+ * shape, or else of the training. */
+PAGE_EXPORT(page_ranges) const double *page_ranges(void);
+
+/* Computes the map at the parameters: by the network within the trained range, beyond it by the
+ * exact engine. */
+PAGE_EXPORT(page_map) int page_map(void);
+PAGE_EXPORT(page_was_exact) int page_was_exact(void); /* the exact engine computed it */
+
+/* Computes the map by the exact engine; only if page_knows_shape(). */
+PAGE_EXPORT(page_exact) int page_exact(void);
+
+/* The last map, values[nz][ny][nx], mm. */
+PAGE_EXPORT(page_values) const float *page_values(void);
+PAGE_EXPORT(page_n_values) size_t page_n_values(void);
+
+/* Computes the zero surface of the last map, with normals and measures. */
+PAGE_EXPORT(page_surface) int page_surface(void);
+
+/* vertices[n_vertices][6], position (mm) and normal; triangles[n_triangles][3]. */
+PAGE_EXPORT(page_vertices) const float *page_vertices(void);
+PAGE_EXPORT(page_n_vertices) size_t page_n_vertices(void);
+PAGE_EXPORT(page_triangles) const uint32_t *page_triangles(void);
+PAGE_EXPORT(page_n_triangles) size_t page_n_triangles(void);
+
+/* measures[8]: volume (mm^3) and area (mm^2) of the surface, least and largest x, y, z (mm). */
+PAGE_EXPORT(page_measures) const double *page_measures(void);
+/* The surface leaves the grid: its volume is not that of the shape. */
+PAGE_EXPORT(page_is_cut) int page_is_cut(void);

@@ -1,0 +1,201 @@
+// The surface, drawn by WebGL2: turned by dragging or by the arrow keys, about the z axis of the shape and the horizontal.
+const VERTEX_SHADER = `#version 300 es
+uniform mat4 camera;
+uniform mat3 turn;
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+out vec3 n;
+out vec3 view;
+void main() {
+  n = turn * normal;
+  gl_Position = camera * vec4(position, 1.0);
+  view = vec3(gl_Position.xy / gl_Position.w * 0.25, -1.0);
+}`;
+
+const FRAGMENT_SHADER = `#version 300 es
+precision highp float;
+uniform vec3 front, back, sky;
+uniform float shaded;
+in vec3 n;
+in vec3 view;
+out vec4 result;
+void main() {
+  if (shaded < 0.5) { result = vec4(front, 1.0); return; }
+  vec3 m = normalize(n), eye = normalize(-view);
+  vec3 base = front;
+  if (!gl_FrontFacing) { m = -m; base = back; }
+  vec3 light = normalize(vec3(-0.45, 0.65, 0.75));
+  float key = max(dot(m, light), 0.0), fill = 0.5 + 0.5 * m.y;
+  float shine = pow(max(dot(m, normalize(light + eye)), 0.0), 42.0);
+  float rim = pow(1.0 - max(dot(m, eye), 0.0), 3.0);
+  vec3 lit = base * (0.34 + 0.62 * key + 0.24 * fill) + 0.16 * shine + rim * sky * 0.28;
+  result = vec4(lit, 1.0);
+}`;
+
+function surfaceProgram(gl) {
+  const program = gl.createProgram();
+  for (const [type, text] of [[gl.VERTEX_SHADER, VERTEX_SHADER], [gl.FRAGMENT_SHADER, FRAGMENT_SHADER]]) {
+    const shader = gl.createShader(type);
+    gl.shaderSource(shader, text);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+  return program;
+}
+
+// The camera: matrices in the order of columns. yaw, pitch: rad; zoom 1 shows a ball of this radius around the centre.
+function cameraMatrices(yaw, pitch, zoom, centre, radius, aspect) {
+  const cy = Math.cos(yaw), sy = Math.sin(yaw), cp = Math.cos(pitch), sp = Math.sin(pitch);
+  // rows: to the right, up, towards the eye
+  const right = [cy, sy, 0], up = [-sp * sy, sp * cy, cp], eye = [cp * sy, -cp * cy, sp];
+  const turn = [0, 1, 2].flatMap(i => [right[i], up[i], eye[i]]);
+  const slope = 0.25, distance = radius / slope / zoom / Math.min(1, aspect) * 1.02;
+  const near = Math.max(distance - 2 * radius, distance * 0.02), far = distance + 2 * radius;
+  const dot = row => row[0] * centre[0] + row[1] * centre[1] + row[2] * centre[2];
+  const fx = 1 / (slope * aspect), fy = 1 / slope, a = (far + near) / (far - near), b = 2 * far * near / (far - near);
+  const camera = [];
+  for (let i = 0; i < 3; i++) camera.push(fx * right[i], fy * up[i], -a * eye[i], -eye[i]);
+  camera.push(-fx * dot(right), -fy * dot(up), a * (dot(eye) + distance) - b, dot(eye) + distance);
+  return { camera, turn };
+}
+
+// Area-weighted normals for vertices without them: [n][3] -> [n][6].
+function withNormals(positions, triangles) {
+  const n = positions.length / 3, out = new Float32Array(6 * n);
+  for (let t = 0; t < triangles.length; t += 3) {
+    const [p, q, r] = [0, 1, 2].map(i => 3 * triangles[t + i]);
+    const u = [0, 1, 2].map(i => positions[q + i] - positions[p + i]), v = [0, 1, 2].map(i => positions[r + i] - positions[p + i]);
+    const normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    for (const at of [p, q, r]) for (let i = 0; i < 3; i++) out[2 * at + 3 + i] += normal[i];
+  }
+  for (let i = 0; i < n; i++) for (let a = 0; a < 3; a++) out[6 * i + a] = positions[3 * i + a];
+  return out;
+}
+
+// The view of the surface on a canvas; null without WebGL2. centre (mm) stands in the middle, a ball of `radius` is seen.
+function createSurfaceView(canvas, centre, radius) {
+  const gl = canvas.getContext('webgl2', { antialias: true, premultipliedAlpha: true, preserveDrawingBuffer: true });
+  if (!gl) return null;
+  const home = { yaw: 0.55, pitch: 0.62, zoom: 1 };
+  const at = { ...home };
+  let n = 0, program, lines = 0, buffers;
+
+  function prepare() {
+    program = surfaceProgram(gl);
+    buffers = { surface: gl.createVertexArray(), frames: gl.createVertexArray(), vertices: gl.createBuffer(), triangles: gl.createBuffer(), lines: gl.createBuffer() };
+    gl.bindVertexArray(buffers.surface);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.vertices);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 24, 0);
+    gl.enableVertexAttribArray(1);
+    gl.vertexAttribPointer(1, 3, gl.FLOAT, false, 24, 12);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
+    gl.bindVertexArray(buffers.frames);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.lines);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 12, 0);
+    gl.bindVertexArray(null);
+  }
+
+  function draw() {
+    fitCanvas(canvas);
+    const { camera, turn } = cameraMatrices(at.yaw, at.pitch, at.zoom, centre, radius, canvas.width / canvas.height);
+    const place = name => gl.getUniformLocation(program, name);
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.useProgram(program);
+    gl.uniformMatrix4fv(place('camera'), false, camera);
+    gl.uniformMatrix3fv(place('turn'), false, turn);
+    gl.uniform3fv(place('front'), colour('--surface'));
+    gl.uniform3fv(place('back'), colour('--surface-back'));
+    gl.uniform3fv(place('sky'), colour('--surface-rim'));
+    gl.uniform1f(place('shaded'), 1);
+    gl.bindVertexArray(buffers.surface);
+    gl.drawElements(gl.TRIANGLES, n, gl.UNSIGNED_INT, 0);
+    gl.uniform1f(place('shaded'), 0);
+    gl.uniform3fv(place('front'), colour('--accent'));
+    gl.bindVertexArray(buffers.frames);
+    for (let i = 0; i < lines; i += 4) gl.drawArrays(gl.LINE_LOOP, i, 4);
+    gl.bindVertexArray(null);
+  }
+
+  // vertices[n][6]: position and normal
+  function show(vertices, triangles) {
+    gl.bindVertexArray(buffers.surface);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.vertices);
+    gl.bufferData(gl.ARRAY_BUFFER, vertices, gl.DYNAMIC_DRAW);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.DYNAMIC_DRAW);
+    gl.bindVertexArray(null);
+    n = triangles.length;
+    draw();
+  }
+
+  // The frames of the slices: corners[4 * number of frames][3].
+  function showFrames(corners) {
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.lines);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(corners.flat()), gl.DYNAMIC_DRAW);
+    lines = corners.length;
+    draw();
+  }
+
+  function turnBy(yaw, pitch) {
+    at.yaw -= yaw;
+    at.pitch = Math.min(Math.max(at.pitch + pitch, -Math.PI / 2), Math.PI / 2);
+    draw();
+  }
+
+  function zoomBy(factor) {
+    at.zoom = Math.min(Math.max(at.zoom * factor, 0.4), 8);
+    draw();
+  }
+
+  function reset() {
+    Object.assign(at, home);
+    draw();
+  }
+
+  const pointers = new Map();
+  canvas.addEventListener('pointerdown', event => {
+    pointers.set(event.pointerId, event);
+    canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener('pointermove', event => {
+    const before = pointers.get(event.pointerId);
+    if (!before) return;
+    pointers.set(event.pointerId, event);
+    if (pointers.size === 1) {
+      turnBy((event.clientX - before.clientX) / 160, (event.clientY - before.clientY) / 160);
+    } else {
+      const other = [...pointers.values()].find(p => p.pointerId !== event.pointerId);
+      const span = p => Math.hypot(p.clientX - other.clientX, p.clientY - other.clientY) + 1;
+      zoomBy(span(event) / span(before));
+    }
+  });
+  for (const name of ['pointerup', 'pointercancel']) canvas.addEventListener(name, event => pointers.delete(event.pointerId));
+  canvas.addEventListener('dblclick', reset);
+  // the wheel scrolls the page unless the view has the focus
+  canvas.addEventListener('wheel', event => {
+    if (!event.ctrlKey && document.activeElement !== canvas) return;
+    event.preventDefault();
+    zoomBy(Math.exp(-event.deltaY / 500));
+  }, { passive: false });
+  canvas.addEventListener('keydown', event => {
+    const actions = {
+      ArrowLeft: () => turnBy(-0.1, 0), ArrowRight: () => turnBy(0.1, 0), ArrowUp: () => turnBy(0, -0.1), ArrowDown: () => turnBy(0, 0.1),
+      '+': () => zoomBy(1.1), '=': () => zoomBy(1.1), '-': () => zoomBy(1 / 1.1), Home: reset
+    };
+    if (!actions[event.key] || event.ctrlKey || event.metaKey) return;
+    event.preventDefault();
+    actions[event.key]();
+  });
+  canvas.addEventListener('webglcontextlost', event => event.preventDefault());
+  prepare();
+  onChange(canvas, draw);
+  return { show, showFrames };
+}

@@ -1,0 +1,146 @@
+// The pages of page.sh in chromium: node page.mjs CHROMIUM, in the folder of live.html, still.html, native.npy and beyond.npy.
+import { readFileSync, writeFileSync } from 'node:fs';
+import { argv, exit } from 'node:process';
+import { startBrowser } from './browser.mjs';
+
+let failures = 0;
+function check(fine, text) {
+  if (fine) return;
+  failures++;
+  console.error('FAILED: ' + text);
+}
+
+const floatsOf = file => {
+  const bytes = readFileSync(file);
+  return new Float32Array(bytes.buffer.slice(bytes.byteOffset + 128, bytes.byteOffset + bytes.length));
+};
+
+// Sets a slider as a reader does, by an event of its input element; gives the map, base64.
+const MOVE = `async (name, value) => {
+  const { parameters } = sdmgen.figures, i = parameters.findIndex(p => p.name === name);
+  const number = document.querySelectorAll('#sliders input[type=number]')[i];
+  number.value = value;
+  number.dispatchEvent(new Event('change'));
+  await sdmgen.drawn();
+  const bytes = new Uint8Array(sdmgen.map().slice().buffer);
+  let text = '';
+  for (let at = 0; at < bytes.length; at += 8192) text += String.fromCharCode(...bytes.subarray(at, at + 8192));
+  return btoa(text);
+}`;
+const move = async (page, name, value) => {
+  const bytes = Buffer.from(await page.evaluate(`(${MOVE})('${name}', ${value})`), 'base64');
+  return new Float32Array(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
+};
+
+// The number of pixels of the surface that are not empty, and a sum that tells pictures apart.
+const LOOK = `(() => {
+  const canvas = document.getElementById('surface'), copy = document.createElement('canvas');
+  Object.assign(copy, { width: canvas.width, height: canvas.height });
+  const context = copy.getContext('2d');
+  context.drawImage(canvas, 0, 0);
+  const { data } = context.getImageData(0, 0, copy.width, copy.height);
+  let filled = 0, sum = 0;
+  for (let i = 0; i < data.length; i += 4) if (data[i + 3]) { filled++; sum = (sum * 31 + data[i] + data[i + 1] * i) % 2147483647; }
+  return { filled, sum, all: data.length / 4 };
+})()`;
+
+async function waitFor(page, condition) {
+  for (let i = 0; i < 600; i++) {
+    if (await page.evaluate(`!!(${condition})`)) return true;
+    await new Promise(done => setTimeout(done, 50));
+  }
+  check(false, 'never true: ' + condition);
+  return false;
+}
+
+const sameBits = (a, b) => a.length === b.length && Buffer.from(a.buffer).equals(Buffer.from(b.buffer));
+const farthest = (a, b) => a.reduce((most, v, i) => Math.max(most, Math.abs(v - b[i])), 0);
+const clean = (page, name) => {
+  check(page.complaints.length === 0, `${name}: the console has: ${page.complaints.join(' | ')}`);
+  check(page.requests.length === 0, `${name}: requests: ${page.requests.join(' ')}`);
+};
+
+async function checkLive(browser) {
+  const page = await browser.open('live.html');
+  if (!(await waitFor(page, 'window.sdmgen && sdmgen.map() && document.body.classList.contains("ready")'))) return;
+  const first = await page.evaluate(LOOK);
+  check(first.filled > first.all / 50 && first.filled < first.all, `the surface fills ${first.filled} of ${first.all} pixels`);
+  // the map after moving sliders
+  await move(page, 'rx', 2.6);
+  const map = await move(page, 'rz', 3.1), native = floatsOf('native.npy');
+  check(sameBits(map, native), `another map than by the program, ${farthest(map, native)} mm away`);
+  const second = await page.evaluate(LOOK);
+  check(second.sum !== first.sum, 'the second picture is that of the first map');
+  // beyond the trained range
+  await page.evaluate(`document.querySelector('.buttons button').click()`);
+  await waitFor(page, `document.querySelectorAll('#sliders input[type=number]')[0].value == sdmgen.figures.parameters[0].default`);
+  await page.evaluate('new Promise(done => setTimeout(done, 1000))');
+  const beyond = await move(page, 'rx', 4.6);
+  check(farthest(beyond, floatsOf('beyond.npy')) < 1e-5, `beyond the range ${farthest(beyond, floatsOf('beyond.npy'))} mm away from the exact map`);
+  check(await page.evaluate(`document.documentElement.classList.contains('exact') && document.querySelector('.slider').classList.contains('beyond')`), 'no sign of the exact engine');
+  // values are kept within the range of the shape
+  await move(page, 'rx', 99);
+  check(await page.evaluate(`document.querySelector('#sliders input[type=number]').value`) === '5', 'a value beyond the range of the shape');
+  // a real key on a slider
+  await page.evaluate(`document.querySelector('#sliders input[type=range]').focus()`);
+  await page.command('Input.dispatchKeyEvent', { type: 'keyDown', key: 'ArrowLeft', code: 'ArrowLeft', windowsVirtualKeyCode: 37 });
+  check(await page.evaluate(`Number(document.querySelector('#sliders input[type=number]').value) < 5`), 'the arrow key does not move the slider');
+  // times from the event of a slider until the page has drawn, and until the pixels can be read
+  const times = await page.evaluate(`(async () => {
+    const slider = document.querySelector('#sliders input[type=range]'), drawn = [], pixels = [];
+    const gl = document.getElementById('surface').getContext('webgl2');
+    for (let i = 0; i < 25; i++) {
+      const start = performance.now();
+      slider.value = 2.5 + i / 20;
+      slider.dispatchEvent(new Event('input'));
+      await sdmgen.drawn();
+      drawn.push(performance.now() - start);
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+      pixels.push(performance.now() - start);
+      await new Promise(requestAnimationFrame);
+    }
+    return [drawn, pixels].map(times => times.sort((a, b) => a - b)[times.length >> 1]);
+  })()`);
+  console.log(`slider to picture: median of 25: drawn after ${times[0].toFixed(1)} ms, pixels of WebGL in software after ${times[1].toFixed(1)} ms`);
+  // compared with the exact map
+  await page.evaluate(`document.getElementById('compare').click()`);
+  await waitFor(page, `/exact engine/.test(document.getElementById('readings').textContent)`);
+  clean(page, 'live.html');
+}
+
+// The layout keeps to the width of the window, in light and in dark, and differs between them.
+async function checkLayout(browser, file, name) {
+  const pictures = new Set();
+  for (const width of [390, 1280]) {
+    for (const value of ['light', 'dark']) {
+      const page = await browser.open(file, { width, height: 844, features: [{ name: 'prefers-color-scheme', value }, { name: 'prefers-reduced-motion', value: 'reduce' }] });
+      await waitFor(page, 'window.sdmgen && (!sdmgen.figures.live || sdmgen.map())');
+      const wide = await page.evaluate('document.documentElement.scrollWidth');
+      check(wide <= width, `${name} is ${wide} pixels wide in a window of ${width}`);
+      const picture = await page.picture();
+      writeFileSync(`${name}-${width}-${value}.png`, picture);
+      pictures.add(picture.toString('base64'));
+      clean(page, `${name} ${width} ${value}`);
+    }
+  }
+  check(pictures.size === 4, `${name}: ${pictures.size} different pictures instead of 4`);
+}
+
+async function checkWithoutWebgl(program) {
+  const browser = startBrowser(program, ['--disable-3d-apis']);
+  const page = await browser.open('live.html');
+  await waitFor(page, 'window.sdmgen && sdmgen.map()');
+  const drawn = await page.evaluate(`[...document.querySelectorAll('#slices canvas')].map(c => c.getContext('2d').getImageData(c.width >> 1, c.height >> 1, 1, 1).data[3])`);
+  check(drawn.length === 3 && drawn.every(alpha => alpha === 255), 'without WebGL the slices are empty');
+  check(/no WebGL2/.test(await page.evaluate('document.body.textContent')), 'without WebGL the page says nothing');
+  check(page.requests.length === 0, 'requests without WebGL');
+  await browser.close();
+}
+
+const browser = startBrowser(argv[2]);
+await checkLive(browser);
+await checkLayout(browser, 'live.html', 'live');
+await checkLayout(browser, 'still.html', 'still');
+await browser.close();
+await checkWithoutWebgl(argv[2]);
+exit(failures ? 1 : 0);

@@ -54,8 +54,8 @@ static sdm_status settle(run *r, trainer *t, sdm_error *err)
     return s || found ? s : trainer_race(t, r->settled, &r->turns, r->gain, err);
 }
 
-/* Trains the kind of the present turn. */
-static sdm_status train_turn(run *r, const trainer *common, sdm_train_report *report,
+/* Trains the kind of the present turn. *unfit: as trainer_training() tells. */
+static sdm_status train_turn(run *r, const trainer *common, bool *unfit, sdm_train_report *report,
                              sdm_error *err)
 {
     trial_gain *gain = &r->gain[r->turns.at];
@@ -64,13 +64,14 @@ static sdm_status train_turn(run *r, const trainer *common, sdm_train_report *re
     t.config = r->settled;
     t.design = gain->design, t.tried = gain->maps;
     *gain = (trial_gain){0};
-    const sdm_status s = trainer_training(&t, r->resume, report, err);
+    const sdm_status s = trainer_training(&t, r->resume, unfit, report, err);
     r->resume = false;
     return s;
 }
 
-/* Tells and records that the second kind is trained now. false: there is no budget left for it. */
-static bool begin_second(run *r, const trainer *t)
+/* Tells and records that the second kind is trained now: it is its turn then. It is not if hardly
+ * any of the budget is left. */
+static sdm_status begin_second(run *r, const trainer *t, sdm_error *err)
 {
     const sdm_accuracy *a = &r->turns.first.accuracy;
     const double left = trainer_turns_left(&r->turns, r->asked);
@@ -79,14 +80,18 @@ static bool begin_second(run *r, const trainer *t)
     if (left < ENOUGH_LEFT) {
         trainer_message(t, "auto: %s is kept: hardly any of the budget is left for %s", first,
                         second);
-        return false;
+        return SDM_OK;
     }
+    const turn_figures figures = {r->turns.kind[0], a};
+    const sdm_status s =
+        trainer_turns_record(&r->metrics, r->turns.kind[1], NULL, &figures, 1, err);
+    if (s) return s;
     trainer_message(t,
                     "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere; %s is trained "
                     "with %.0f %% of the budget",
                     first, a->rmse_near_mm, a->rmse_mm, second, 100 * left);
-    const turn_figures figures = {r->turns.kind[0], a};
-    return !trainer_turns_record(&r->metrics, r->turns.kind[1], NULL, &figures, 1, NULL);
+    r->turns.at = 1;
+    return SDM_OK;
 }
 
 /* Compares the two kinds, tells and records which is kept; *report becomes that of the run. */
@@ -112,25 +117,26 @@ static sdm_status keep_better(run *r, trainer *t, sdm_train_report *report, sdm_
     return s ? s : trainer_metrics_write(t, err);
 }
 
-/* Trains the second kind in the budget that the first has left. If it fails, the first is kept. */
+/* Trains the second kind in the budget that the first has left. If it cannot be trained, the first
+ * is kept; after any other error the checkpoint stays, to go on from. */
 static sdm_status train_second(run *r, trainer *t, sdm_train_report *report, sdm_error *err)
 {
     sdm_error reason = {0};
     sdm_train_report second = {0};
+    bool unfit;
     t->started = sdm_clock();
-    const sdm_status s = train_turn(r, t, &second, &reason);
-    if (s == SDM_E_CANCELLED) {
-        if (err) *err = reason;
-        return s;
-    }
+    const sdm_status s = train_turn(r, t, &unfit, &second, &reason);
     if (!s) {
         const sdm_status kept = keep_better(r, t, &second, err);
         *report = second;
         return kept;
     }
-    trainer_message(t, "auto: %s is kept, because %s failed: %s",
-                    trainer_turn_name(r->turns.kind[0]), trainer_turn_name(r->turns.kind[1]),
-                    reason.text);
+    if (!unfit) {
+        if (err) *err = reason;
+        return s;
+    }
+    trainer_warn(t, "auto: %s is kept, because %s failed: %s", trainer_turn_name(r->turns.kind[0]),
+                 trainer_turn_name(r->turns.kind[1]), reason.text);
     *report = r->turns.first;
     return trainer_checkpoint_remove(t, err);
 }
@@ -138,16 +144,15 @@ static sdm_status train_second(run *r, trainer *t, sdm_train_report *report, sdm
 /* All trainings of the run. */
 static sdm_status train_all(run *r, trainer *t, sdm_train_report *report, sdm_error *err)
 {
+    bool unfit;
     sdm_status s = settle(r, t, err);
-    if (s) return s;
-    if (r->turns.at == 0) {
-        s = train_turn(r, t, report, err);
+    if (!s && r->turns.at == 0) {
+        s = train_turn(r, t, &unfit, report, err);
         if (s || r->turns.n == 1) return s;
         r->turns.first = *report;
-        if (!begin_second(r, t)) return SDM_OK;
-        r->turns.at = 1;
+        s = begin_second(r, t, err);
     }
-    return train_second(r, t, report, err);
+    return s || r->turns.at == 0 ? s : train_second(r, t, report, err);
 }
 
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder,

@@ -79,35 +79,39 @@ static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_er
     return s;
 }
 
-/* Runs all steps from set-up to trained weights. config: the open temporary file of config.yaml. It
-   is committed, and the files of an older run are removed, only after all checks of the
-   configuration: until then the folder stays as it was. The second training of a run leaves the
-   files of the first alone. */
-static sdm_status train_run(trainer *t, bool resume, sdm_outfile **config, sdm_error *err)
+/* Does all that precedes the first step: set-up, checkpoint, maps. *found: the run goes on from a
+ * checkpoint. The folder stays as it was. */
+static sdm_status train_begin(trainer *t, bool resume, bool *found, sdm_error *err)
 {
-    bool found = false;
     sdm_status s = trainer_set_up(t, err);
     if (!s && resume) {
-        s = trainer_checkpoint_read(t, &found, err);
-        if (!s && !found)
+        s = trainer_checkpoint_read(t, found, err);
+        if (!s && !*found)
             trainer_message(t, "no checkpoint in %s: training starts from the beginning",
                             t->folder);
     }
     if (s) return s;
     const sdm_phase from = t->phase;
     const double resumed_seconds = trainer_seconds(t);
-    s = train_prepare(t, found, t->data.n_taken, err);
-    if (!s && !resume && !is_second(t)) s = trainer_checkpoint_clear_folder(t, err);
+    s = train_prepare(t, *found, t->data.n_taken, err);
+    if (!*found) return s;
+    // the time in which the maps were made again does not count
+    t->started += trainer_seconds(t) - resumed_seconds;
+    t->phase = from;
+    return s;
+}
+
+/* Trains the weights. config: the open temporary file of config.yaml. It is committed, and the
+   files of an older run are removed, only now, after all checks of the configuration. The second
+   training of a run leaves the files of the first alone. found: as train_begin() tells. */
+static sdm_status train_run(trainer *t, bool resume, bool found, sdm_outfile **config,
+                            sdm_error *err)
+{
+    sdm_status s = SDM_OK;
+    if (!resume && !is_second(t)) s = trainer_checkpoint_clear_folder(t, err);
     if (!s && !is_second(t)) s = sdm_outfile_commit(config, err);
     if (s) return s;
-
-    if (found) {
-        // the time in which the maps were made again does not count
-        t->started += trainer_seconds(t) - resumed_seconds;
-        t->phase = from;
-    } else {
-        trainer_enter(t, SDM_PHASE_MODE_FIT);
-    }
+    if (!found) trainer_enter(t, SDM_PHASE_MODE_FIT);
     t->last_checkpoint = t->prepared_seconds = trainer_seconds(t);
     return t->kind->run(t, found, err);
 }
@@ -154,15 +158,23 @@ static sdm_status train_finish(trainer *t, sdm_outfile **config, sdm_train_repor
     return s;
 }
 
-sdm_status trainer_training(trainer *t, bool resume, sdm_train_report *report, sdm_error *err)
+sdm_status trainer_training(trainer *t, bool resume, bool *unfit, sdm_train_report *report,
+                            sdm_error *err)
 {
     sdm_outfile *config = NULL;
+    bool found = false;
+    *unfit = false;
     t->kind = trainer_kind_find(t->config->network.kind);
     sdm_status s = trainer_export_config(t, &config, err);
-    if (!s) s = train_run(t, resume, &config, err);
+    if (!s) {
+        s = train_begin(t, resume, &found, err);
+        *unfit = s && s != SDM_E_CANCELLED && !resume;
+    }
+    if (!s) s = train_run(t, resume, found, &config, err);
     trainer_producer_stop(t->producer);
     t->producer = NULL;
     if (!s) s = train_finish(t, &config, report, err);
+    if (s == SDM_E_QUALITY) *unfit = true;
     sdm_outfile_discard(&config);
     t->kind->dispose(t);
     trainer_dataset_dispose(&t->data);

@@ -1,4 +1,5 @@
-/* Shows the progress of a training (step, loss, error, time left, speed) and prints its notices. */
+/* Shows the progress of a training (step, loss, error, time left, speed) and prints its notices and
+   warnings. */
 #include "train_progress.h"
 
 #include <math.h>
@@ -94,10 +95,17 @@ static void on_message(void *user, const char *line)
     cli_notice("%s", line);
 }
 
+static void on_warning(void *user, const char *line)
+{
+    cli_progress_clear(user);
+    cli_warn("%s", line);
+}
+
 sdm_train_hooks cli_train_hooks(cli_progress *progress)
 {
     return (sdm_train_hooks){.progress = on_progress,
                              .cancelled = cli_interrupted,
                              .message = on_message,
+                             .warning = on_warning,
                              .user = progress};
 }

@@ -111,12 +111,12 @@ sdm_status cli_time_maps(const sdm_model *m, const sdm_instance *shape, uint64_t
                          size_t n_naive, cli_timing *out, sdm_error *err);
 
 /* Measures ms_network and ms_exact only, as medians, within a few seconds; the other members of
- * *out are 0 or NaN. */
+ * *out are 0 or NaN. After an error, NaN for the times that were not measured. */
 sdm_status cli_time_two(const sdm_model *m, const sdm_instance *shape, cli_timing *out,
                         sdm_error *err);
 
 /* Prints the two times of cli_time_two() and their ratio in one line that begins with `begin`; says
- * so where the exact engine is about as fast as the network. */
+ * so where the exact engine is about as fast as the network. NaN: not measured. */
 void cli_print_two(const char *begin, const cli_timing *t);
 
 /* *ms = median time of the naive method on one core over the first n random shapes of the maker.

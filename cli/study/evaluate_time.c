@@ -173,7 +173,8 @@ sdm_status cli_time_naive(const cli_map_maker *m, uint64_t seed, size_t n, doubl
 sdm_status cli_time_two(const sdm_model *m, const sdm_instance *shape, cli_timing *out,
                         sdm_error *err)
 {
-    *out = (cli_timing){.ms_batch = NAN, .ms_naive = NAN, .naive_share = NAN};
+    *out = (cli_timing){
+        .ms_network = NAN, .ms_batch = NAN, .ms_exact = NAN, .ms_naive = NAN, .naive_share = NAN};
     float *values = NULL;
     sdm_status s =
         SDM_ALLOC(&values, sdm_grid_count(&sdm_model_get_info(m)->grid), "map to time", err);
@@ -183,11 +184,20 @@ sdm_status cli_time_two(const sdm_model *m, const sdm_instance *shape, cli_timin
     return s;
 }
 
+/* "12.3 ms", or "not measured" for NaN; returns buf. */
+static const char *format_ms(double ms, char buf[32])
+{
+    snprintf(buf, 32, isnan(ms) ? "not measured" : "%.3g ms", ms);
+    return buf;
+}
+
 void cli_print_two(const char *begin, const cli_timing *t)
 {
+    char network[32], exact[32];
     const double ratio = t->ms_exact / t->ms_network;
-    printf("%sone map on one core: network %.3g ms, exact engine %.3g ms, %.*f times as long",
-           begin, t->ms_network, t->ms_exact, ratio < 10 ? 2 : 0, ratio);
+    printf("%sone map on one core: network %s, exact engine %s", begin,
+           format_ms(t->ms_network, network), format_ms(t->ms_exact, exact));
+    if (!isnan(ratio)) printf(", %.*f times as long", ratio < 10 ? 2 : 0, ratio);
     if (ratio < ABOUT_AS_FAST)
         printf(": exact maps (sdmgen exact, fit --exact) need no network here");
     printf("\n");

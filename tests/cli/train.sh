@@ -59,6 +59,25 @@ sdmgen train "$tiny" --out unpictured >out 2>err || bad "without pictures: $(cat
 present unpictured/model.sdm
 absent unpictured/checkpoint.sdmc
 
+# A model whose times cannot be measured is finished all the same: the summary has the figures that there are.
+faulty=("shape={name: faulty, options: {fault: trained}}" 'grid={size: [16, 14, 14], spacing: 0.8, centre: [1, 0, 0]}' --plugin ../../plugins/faulty/faulty.so)
+expect 0 'warning: the time of a map was not measured: .*a model is there' sdmgen train "$tiny" "${faulty[@]}" --out trained --quiet --json
+[ "$(json ms_exact)" = null ] || bad "a time of the exact engine: $(json ms_exact)"
+awk -v t="$(json ms_network)" 'BEGIN { exit !(t > 0) }' || bad "no time of the network: $(json ms_network)"
+rm -r trained
+expect 0 'not measured' sdmgen train "$tiny" "${faulty[@]}" --out trained --quiet
+has '^  time        one map on one core: network [0-9.]+ ms, exact engine not measured$'
+
+# The second kind of auto does not fit into memory: --quiet does not hide which one is kept.
+cat >link.yaml <<'YAML'
+shape: {name: linkage, options: {links: 1, motion: planar, limit: 0.5, edge: 0.5}}
+grid: {size: [21, 19, 22], spacing: 0.34, origin: [-2.13, -3.07, -4.98]}
+network: {width: 16, modes: 24, rank: 6, degree: 3}
+data: {static: 0, static_share: 0, start: 100000, online: 20, holdout: 12, memory_gb: 0.05}
+train: {steps: 60, batch: 16, refine_batch: 8}
+YAML
+expect 0 'warning: auto: template is kept, because pod failed: ' sdmgen train link.yaml --out link --quiet
+
 # A grid that is fitted to the shapes: an interrupted run goes on with the same one, and the model has its numbers.
 interrupted fitted "$tiny" grid.voxels=16
 grep -q '^sdmgen: grid: size: \[16, ' err || bad "no word of the fitted grid: $(cat err)"

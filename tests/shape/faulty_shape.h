@@ -1,5 +1,6 @@
 /* A shape for tests: a body and a handle, two boxes that overlap; the option `fault` selects what
- * is wrong with them. Some faults begin where size exceeds 2. */
+ * is wrong with them. Some faults begin where size exceeds 2; `trained` begins when the file
+ * trained/model.sdm is there. */
 #ifndef SDM_TEST_FAULTY_SHAPE_H
 #define SDM_TEST_FAULTY_SHAPE_H
 
@@ -7,6 +8,7 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "sdm/shape.h"
 
@@ -15,7 +17,7 @@ static const sdm_param FAULTY_PARAMS[] = {{"size", "mm", 1, 3, 2.5, "edge of the
 static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
-     "exit",
+     "exit|trained",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -42,6 +44,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     const int is_large = p[0] > 2;
     // in parentheses: cmocka defines a macro fail()
     if (!strcmp(fault, "fail") && is_large) return (host->fail)(host, "too large");
+    if (!strcmp(fault, "trained") && !access("trained/model.sdm", F_OK))
+        return (host->fail)(host, "a model is there");
     if (!strcmp(fault, "crash") && is_large) raise(SIGSEGV);
     if (!strcmp(fault, "abort") && is_large) abort();
     if (!strcmp(fault, "exit") && is_large) exit(0);

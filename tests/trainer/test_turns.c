@@ -7,6 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include <cmocka.h>
 
@@ -43,6 +44,14 @@ static void listen(void *user, const char *text)
     strcat(said, "\n");
 }
 
+static char warned[1024];
+
+static void note_warning(void *user, const char *text)
+{
+    (void)user;
+    snprintf(warned, sizeof warned, "%s", text);
+}
+
 static sdm_config config_of(const char *text, const char *const *overrides, size_t n)
 {
     sdm_config c;
@@ -68,12 +77,12 @@ static sdm_instance *shape_of(const sdm_config *c)
 
 static sdm_train_report train(const sdm_config *c)
 {
-    const sdm_train_hooks hooks = {.message = listen};
+    const sdm_train_hooks hooks = {.message = listen, .warning = note_warning};
     sdm_error e = {0};
     sdm_train_report r;
     sdm_instance *shape = shape_of(c);
     run_files_remove();
-    said[0] = '\0';
+    said[0] = warned[0] = '\0';
     if (sdm_train(c, shape, folder, false, &hooks, &r, &e)) fail_msg("%s", e.text);
     assert_false(exists("checkpoint.sdmc"));
     sdm_instance_free(shape);
@@ -197,6 +206,79 @@ static void resume_is_bit_exact(void **state)
     }
 }
 
+// A resume in the second training is refused with another configuration, or where its maps do not
+// fit into memory: the checkpoint stays, and the right configuration goes on from it.
+static void refused_resume_loses_nothing(void **state)
+{
+    (void)state;
+    static const char *const wrong[] = {"network.width=24", "data.start=100000"};
+    const sdm_config c = config_of(link_text, NULL, 0);
+    train(&c);
+    const uint64_t whole = hash_of("model.sdm");
+    sdm_instance *shape = shape_of(&c);
+    stop_place p = {"pod is trained with", "a decoder of", 4, true, true};
+    sdm_train_hooks hooks = {.cancelled = stop, .message = listen, .user = &p};
+    sdm_error e = {0};
+    run_files_remove();
+    said[0] = '\0';
+    assert_int_equal(sdm_train(&c, shape, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
+    const uint64_t checkpoint = hash_of("checkpoint.sdmc"), model = hash_of("model.sdm");
+    hooks.cancelled = NULL;
+    for (int i = 0; i < 2; i++) {
+        const sdm_config other = config_of(link_text, &wrong[i], 1);
+        said[0] = '\0';
+        assert_int_equal(sdm_train(&other, shape, folder, true, &hooks, NULL, &e), SDM_E_CONFIG);
+        if (!strstr(e.text,
+                    i ? "test.yaml: data.static" : "'width: 16', this configuration 'width: 24'"))
+            fail_msg("%s", e.text);
+        assert_null(strstr(said, "is kept"));
+        assert_true(hash_of("checkpoint.sdmc") == checkpoint && hash_of("model.sdm") == model);
+    }
+    if (sdm_train(&c, shape, folder, true, NULL, NULL, &e)) fail_msg("%s", e.text);
+    assert_true(hash_of("model.sdm") == whole);
+    sdm_instance_free(shape);
+}
+
+/* Listens; when the second training has made its maps, puts a folder in the place of the file
+ * *user. */
+static void block_file(void *user, const char *text)
+{
+    const char *name = in_folder(user);
+    listen(NULL, text);
+    if (!strstr(text, "a decoder of") || !strstr(said, "pod is trained with")) return;
+    assert_int_equal(remove(name), 0);
+    assert_int_equal(mkdir(name, 0700), 0);
+}
+
+// If the model of the second training or its configuration cannot be written, the run fails, and
+// the trained weights are in a checkpoint.
+static void second_model_cannot_be_written(void **state)
+{
+    (void)state;
+    static char blocked[2][16] = {"model.sdm", "config.yaml"};
+    const sdm_config c = config_of(link_text, NULL, 0);
+    train(&c);
+    const uint64_t model = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl"),
+                   config = hash_of("config.yaml");
+    sdm_instance *shape = shape_of(&c);
+    for (int i = 0; i < 2; i++) {
+        const sdm_train_hooks hooks = {.message = block_file, .user = blocked[i]};
+        sdm_error e = {0};
+        run_files_remove();
+        said[0] = '\0';
+        assert_int_equal(sdm_train(&c, shape, folder, false, &hooks, NULL, &e), SDM_E_IO);
+        if (!strstr(e.text, blocked[i])) fail_msg("%s", e.text);
+        assert_non_null(strstr(said, "go on with --resume"));
+        assert_true(exists("checkpoint.sdmc"));
+        assert_int_equal(rmdir(in_folder(blocked[i])), 0);
+        if (sdm_train(&c, shape, folder, true, NULL, NULL, &e)) fail_msg("%s", e.text);
+        assert_true(hash_of("model.sdm") == model && hash_of("metrics.jsonl") == metrics &&
+                    hash_of("config.yaml") == config);
+        assert_false(exists("checkpoint.sdmc"));
+    }
+    sdm_instance_free(shape);
+}
+
 // If pod cannot be trained, or no time is left for it, the template is kept.
 static void template_remains(void **state)
 {
@@ -206,7 +288,7 @@ static void template_remains(void **state)
     const sdm_config large = config_of(link_text, much, 2),
                      brief = config_of(link_text, short_time, 2);
     sdm_train_report r = train(&large);
-    assert_non_null(strstr(said, "template is kept, because pod failed: test.yaml: data.static"));
+    assert_non_null(strstr(warned, "template is kept, because pod failed: test.yaml: data.static"));
     assert_kind("template");
     assert_false(r.compared);
     r = train(&brief);
@@ -305,6 +387,8 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(better_is_kept),
                                        cmocka_unit_test(budget_is_shared),
                                        cmocka_unit_test(resume_is_bit_exact),
+                                       cmocka_unit_test(refused_resume_loses_nothing),
+                                       cmocka_unit_test(second_model_cannot_be_written),
                                        cmocka_unit_test(template_remains),
                                        cmocka_unit_test(overlap_is_named),
                                        cmocka_unit_test(turns_share_the_budget),

@@ -31,15 +31,6 @@ static void triangle_of(const sdm_mesh *m, size_t t, double corner[3][3])
             corner[c][a] = m->vert[3 * (size_t)m->tri[3 * t + (size_t)c] + (size_t)a];
 }
 
-/* normal[3] = a vector twice the area long that points outwards. */
-static void triangle_normal(double corner[3][3], double normal[3])
-{
-    double e[3], f[3];
-    v3_sub(corner[1], corner[0], e);
-    v3_sub(corner[2], corner[0], f);
-    v3_cross(e, f, normal);
-}
-
 /* x[3] = random point of the surface, uniform by area; normal[3] = unit normal there. */
 static void draw_point(const surface_mesh *s, uint64_t seed, uint64_t index, double x[3],
                        double normal[3])
@@ -57,7 +48,7 @@ static void draw_point(const surface_mesh *s, uint64_t seed, uint64_t index, dou
     }
     triangle_of(s->mesh, low, corner);
     const double root = sqrt(u[1]), b = root * (1 - u[2]), c = root * u[2];
-    triangle_normal(corner, normal);
+    v3_triangle_normal(corner[0], corner[1], corner[2], normal);
     const double length = v3_norm(normal);
     for (int a = 0; a < 3; a++) {
         x[a] = (1 - b - c) * corner[0][a] + b * corner[1][a] + c * corner[2][a];
@@ -86,7 +77,7 @@ static sdm_status check_surface(const dataset *d, const sdm_exact *e, size_t sha
     for (size_t t = 0; t < s.mesh->n_tri && !status; t++) {
         double corner[3][3], normal[3];
         triangle_of(s.mesh, t, corner);
-        triangle_normal(corner, normal);
+        v3_triangle_normal(corner[0], corner[1], corner[2], normal);
         s.area[t] = (t ? s.area[t - 1] : 0) + v3_norm(normal) / 2;
     }
     for (size_t i = 0; i < POINTS && !status; i++) {

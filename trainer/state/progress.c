@@ -113,13 +113,25 @@ void trainer_report(trainer *t, double fraction, bool now)
 
 void trainer_message(const trainer *t, const char *fmt, ...)
 {
-    if (!t->hooks.message) return;
     char line[1024];
     va_list args;
     va_start(args, fmt);
     vsnprintf(line, sizeof line, fmt, args);
     va_end(args);
-    t->hooks.message(t->hooks.user, line);
+    if (t->hooks.message) t->hooks.message(t->hooks.user, line);
+}
+
+void trainer_warn(const trainer *t, const char *fmt, ...)
+{
+    char line[1024];
+    va_list args;
+    va_start(args, fmt);
+    vsnprintf(line, sizeof line, fmt, args);
+    va_end(args);
+    if (t->hooks.warning)
+        t->hooks.warning(t->hooks.user, line);
+    else
+        trainer_message(t, "%s", line);
 }
 
 bool trainer_cancelled(const trainer *t)

@@ -41,6 +41,9 @@ void trainer_report(trainer *t, double fraction, bool now);
 /* Sends a notice of one line to the message callback. */
 void trainer_message(const trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
 
+/* Sends a warning of one line to the warning callback, or to the message callback without one. */
+void trainer_warn(const trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
+
 /* true if the caller wants the run to stop. [any thread] */
 bool trainer_cancelled(const trainer *t);
 

@@ -53,6 +53,8 @@ typedef struct sdm_train_hooks {
     bool (*cancelled)(void *user);
     /* Called by the training thread with a notice of one line. */
     void (*message)(void *user, const char *line);
+    /* The same with a warning: the result is probably not what the user wants. NULL: message. */
+    void (*warning)(void *user, const char *line);
     void *user;
 } sdm_train_hooks;
 

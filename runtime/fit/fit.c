@@ -10,6 +10,7 @@
 #include "fit/data/blur.h"
 #include "fit/data/cavity.h"
 #include "fit/data/soft_labels.h"
+#include "fit/data/source_params.h"
 #include "fit/judge/judgement.h"
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"

@@ -1,6 +1,6 @@
 /* The pose of a fit: motions that the data leave open, a pose that is kept but wrong, and one that
  * still moves.
- * Tests: convergence.c kept_pose.c open_motions.c */
+ * Tests: convergence.c kept_pose.c open_motions.c source_params.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

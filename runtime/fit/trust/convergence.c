@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "fit/fit_check.h"
+#include "fit/data/source_params.h"
 #include "fit/solver/newton.h"
 
 // an unknown has converged when it moves by no more than this share of its sd

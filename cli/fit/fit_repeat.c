@@ -42,14 +42,21 @@ void cli_fit_json_repeat(const cli_fit *f, sdm_json *j)
         sdm_text_add(&command, " ");
         add_word(&command, a->argv[i]);
     }
-    sdm_json_text(j, "command", command.data);
+    if (command.failed)
+        j->text.failed = true;
+    else
+        sdm_json_text(j, "command", command.data);
     sdm_text_dispose(&command);
     sdm_json_open(j, "inputs", '[');
     add_file(j, f->model_path);
     add_file(j, f->path);
     add_file(j, a->fit.reference);
     add_file(j, a->fit.start_points);
-    for (size_t i = 0; i < a->plugins.n; i++) add_file(j, a->plugins.items[i]);
+    for (size_t i = 0; i < sdm_registry_count(f->registry); i++) { // plug-ins
+        const char *origin = sdm_registry_origin(f->registry, i);
+        const bool again = i > 0 && !strcmp(origin, sdm_registry_origin(f->registry, i - 1));
+        if (!again) add_file(j, origin);
+    }
     for (size_t i = 0; i < a->options.n; i++) { // options of shapes may name files
         const char *value = strchr(a->options.items[i], '=');
         if (value) add_file(j, value + 1);

@@ -10,6 +10,7 @@
 #include "fit/data/blur.h"
 #include "fit/data/cavity.h"
 #include "fit/data/soft_labels.h"
+#include "fit/data/source_params.h"
 #include "fit/judge/judgement.h"
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"
@@ -19,6 +20,7 @@
 #include "fit/solver/tissue_field.h"
 #include "fit/solver/tissues.h"
 #include "fit/start/start_search.h"
+#include "fit/trust/convergence.h"
 #include "fit/trust/evidence.h"
 #include "fit/trust/kept_pose.h"
 #include "fit/trust/posterior.h"
@@ -26,7 +28,6 @@
 #include "sdm/internal/clock.h"
 #include "sdm/internal/rotation.h"
 #include "sdm/internal/text.h"
-#include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 
 // largest number of rounds in which region, prior weights and state are brought into agreement
@@ -44,12 +45,6 @@
 // plain steps up to this size are followed by steps with the averaged gradient, in units of
 // sdm_fit_opts.eps
 #define STEP_NEAR 1e-2
-// an unknown has converged when it moves by no more than this share of its sd
-#define UNREST_MAX 0.1
-// a kept pose is refused if a free one gains more than this (the true one exceeds it once in a
-// million times), and moves the surface by more than this part of a voxel of the map
-#define KEPT_POSE_GAIN 20.0
-#define KEPT_POSE_VOXELS 0.5
 // number of flat steps (of negligible predicted gain) in a row that ends the iterations with a
 // network's maps
 #define FLAT_MAX 6
@@ -61,11 +56,6 @@
 // the image could reinforce itself: a worse fit has more correlated residuals, which strengthen the
 // prior.
 #define WEIGHINGS_MAX 4
-
-static double longest_edge(const sdm_grid *g)
-{
-    return fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
-}
 
 sdm_fit_opts sdm_fit_defaults(void)
 {
@@ -210,7 +200,7 @@ static sdm_status problem_start(fit_problem *p, sdm_fit_result *out, sdm_error *
     if (!s) s = sdm_fit_extent(&p->maps, &p->extent, err);
     memcpy(p->maps_params, p->state.params, sizeof p->maps_params);
     p->maps_blur = NAN;
-    const double voxel = longest_edge(&p->target->grid);
+    const double voxel = fit_longest_edge(&p->target->grid);
     if (!s && p->target->kind != SDM_FIT_POINTS && voxel > p->extent.reach)
         return sdm_fail(err, SDM_E_ARG,
                         "voxels of %.4g mm are larger than the shape, which reaches %.3g mm from "
@@ -417,90 +407,26 @@ static void report(fit_problem *p, sdm_fit_result *out)
     out->point_sd = p->target->kind == SDM_FIT_POINTS ? s->point_sd : 0;
     out->outliers = p->target->kind == SDM_FIT_POINTS ? s->outliers : 0;
     sdm_fit_open_motions_describe(p, out->open_motions, sizeof out->open_motions);
+}
+
+// writes what the fit has cost, the checks included
+static void report_work(const fit_problem *p, double from, sdm_fit_result *out)
+{
     out->n_network = p->maps.n_network;
     out->n_exact = p->maps.n_exact;
     out->seconds_network = p->maps.seconds_network;
     out->seconds_exact = p->maps.seconds_exact;
+    out->seconds = sdm_clock() - from;
 }
 
-// the unknown that moves most in the last iterations, in its standard deviations (*most)
-static size_t most_restless(const fit_problem *p, const sdm_fit_result *r, double *most)
+// the verdict; with a kept pose it leaves *p at the state of a free one
+static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
 {
-    size_t worst = 0;
-    *most = 0;
-    for (size_t i = 0; i < p->n_params + 6; i++) {
-        const bool kept = i < p->n_params ? p->opts->keep_params : p->opts->keep_pose;
-        if (kept) continue;
-        const double unrest = sdm_fit_unrest(p, i) / r->sd[i];
-        if (!(unrest <= *most)) *most = unrest, worst = i;
-    }
-    return worst;
-}
-
-/* A fit whose last steps are small beside the standard deviations counts as converged, though they
- * are larger than eps: kinks of exact distances may keep them so. */
-static void accept_small_steps(const fit_problem *p, sdm_fit_result *out)
-{
-    double most;
-    if (out->converged) return;
-    (void)most_restless(p, out, &most);
-    if (!(most <= UNREST_MAX)) return;
-    out->converged = true;
-    snprintf(out->reason, sizeof out->reason,
-             "the last steps move every unknown by at most %.2g of its standard deviation", most);
-}
-
-static sdm_status not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
-{
-    static const char *const pose[6] = {"rotation about x",    "rotation about y",
-                                        "rotation about z",    "translation along x",
-                                        "translation along y", "translation along z"};
-    double most, low, high;
-    const char *name;
-    const size_t worst = most_restless(p, r, &most);
-    if (worst < p->n_params)
-        sdm_fit_bounds(p->source, worst, &low, &high, &name);
-    else
-        name = pose[worst - p->n_params];
-    char moves[200] = "";
-    if (isfinite(most))
-        snprintf(moves, sizeof moves,
-                 "; %.100s still moves by %.2g of its standard deviation, need %.2g", name, most,
-                 UNREST_MAX);
-    return sdm_fail(err, SDM_E_QUALITY,
-                    "not converged after %zu iterations (%s%s): allow more iterations "
-                    "(max_iterations), give a nearer start, or a prior of what the data hardly "
-                    "determine",
-                    r->n_iterations, r->reason, moves);
-}
-
-// the verdict, with the unknown that keeps the fit from converging, and the pose that was kept
-static sdm_status judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err)
-{
-    sdm_error unrest = {0};
-    sdm_status s = sdm_fit_judge(p, r, err);
-    for (size_t i = 0; i < r->verdict.n_findings && !r->converged; i++) {
-        sdm_fit_finding *f = &r->verdict.findings[i];
-        if (f->kind != SDM_FIT_CHECK_CONVERGED) continue;
-        (void)not_converged(p, r, &unrest);
-        if (err && s == SDM_E_QUALITY && !strcmp(err->text, f->text)) *err = unrest;
-        snprintf(f->text, sizeof f->text, "%.239s", unrest.text);
-    }
-    const double voxel = longest_edge(&p->maps.grid);
-    if (!(r->kept_pose_gain > KEPT_POSE_GAIN && r->kept_pose_motion > KEPT_POSE_VOXELS * voxel))
-        return s;
-    sdm_fit_finding f = {.kind = SDM_FIT_CHECK_KEPT_POSE,
-                         .grade = SDM_FIT_FAILED,
-                         .figure = r->kept_pose_gain,
-                         .limit = KEPT_POSE_GAIN};
-    snprintf(
-        f.text, sizeof f.text,
-        "the kept pose does not match the data: free, it moves the surface by %.2g mm and "
-        "explains the data better by %.3g (log-likelihood of independent samples); correct the "
-        "pose, or do not keep it",
-        r->kept_pose_motion, r->kept_pose_gain);
-    sdm_fit_verdict_add(&r->verdict, &f);
-    return s == SDM_OK || s == SDM_E_QUALITY ? sdm_fail(err, SDM_E_QUALITY, "%s", f.text) : s;
+    const sdm_status s = sdm_fit_judge(p, r, err);
+    if (s && s != SDM_E_QUALITY) return s;
+    sdm_fit_name_restless(p, r, s ? err : NULL);
+    const sdm_status kept = p->opts->keep_pose ? sdm_fit_judge_kept_pose(p, r, err) : SDM_OK;
+    return kept ? kept : s;
 }
 
 // computes the covariance, the share of the shape in the image, and the evidence
@@ -521,32 +447,7 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         out->evidence = (p->information.log_likelihood - out->log_likelihood_without) / factor -
                         0.5 * unknowns * log(n);
     }
-    if (!s && p->opts->keep_pose)
-        s = sdm_fit_kept_pose_test(p, &out->kept_pose_gain, &out->kept_pose_motion, err);
     return s;
-}
-
-/* Presents a label map as an image with the value 1 inside and 0 outside, with fixed tissues, seen
- * through a point spread as wide as the maps can represent. *values: memory of the image. */
-static sdm_status labels_as_image(const sdm_fit_source *source, sdm_fit_target *target,
-                                  sdm_fit_opts *opts, float **values, sdm_error *err)
-{
-    const sdm_grid *map = source->model ? &sdm_model_get_info(source->model)->grid : &source->grid;
-    const double soft = 0.5 * fmax(longest_edge(map), longest_edge(&target->grid));
-    sdm_status s = SDM_ALLOC(values, sdm_grid_count(&target->grid), "labels", err);
-    if (!s)
-        s = sdm_fit_soften_labels(&target->grid, target->values, soft, sdm_threads(opts->n_threads),
-                                  *values, err);
-    if (s) return s;
-    target->values = *values;
-    target->kind = SDM_FIT_IMAGE;
-    opts->blur = sqrt(opts->blur * opts->blur + soft * soft);
-    opts->appearance = (sdm_fit_appearance){.n_inside = 1,
-                                            .n_outside = 1,
-                                            .inside = {{.weight = 1, .mean = 1, .sd = 0.25}},
-                                            .outside = {{.weight = 1, .mean = 0, .sd = 0.25}}};
-    opts->keep_appearance = true;
-    return SDM_OK;
 }
 
 sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
@@ -568,7 +469,7 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     float *values = NULL;
     if (!s && target->kind == SDM_FIT_LABEL && opts->image_model == SDM_FIT_PARTIAL_VOLUME) {
         as_image = *target, with_labels = *opts;
-        s = labels_as_image(source, &as_image, &with_labels, &values, err);
+        s = sdm_fit_labels_as_image(source, &as_image, &with_labels, &values, err);
         p.target = &as_image, p.opts = &with_labels, p.given_labels = true;
     }
     if (!s && target->kind == SDM_FIT_IMAGE && opts->cavity > 0) {
@@ -584,16 +485,16 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     if (!s) s = maximise(&p, out, err);
 
     // 6. covariance and evidence; 7. report the result, also of a fit that failed with
-    // SDM_E_QUALITY
+    // SDM_E_QUALITY; 8. judge it
     if (!s) s = assess(&p, out, err);
-    if (!s) accept_small_steps(&p, out);
+    if (!s) sdm_fit_accept_small_steps(&p, out);
     if (out->n_params && (!s || s == SDM_E_QUALITY)) report(&p, out);
     if (!s) s = judge(&p, out, err);
     if (s) out->verdict.grade = SDM_FIT_FAILED;
     if (s && err && !*out->reason) snprintf(out->reason, sizeof out->reason, "%.255s", err->text);
+    report_work(&p, from, out);
     problem_dispose(&p);
     sdm_free(values);
-    out->seconds = sdm_clock() - from;
     if (s && s != SDM_E_QUALITY) sdm_fit_dispose(out);
     return s;
 }

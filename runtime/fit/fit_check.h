@@ -7,15 +7,6 @@
  * SDM_E_UNSUPPORTED: n_params < 1 or n_params > FIT_PARAMS_MAX. */
 sdm_status sdm_fit_check_source(const sdm_fit_source *source, size_t *n_params, sdm_error *err);
 
-/* Bounds of parameter k of a checked source under its policy, in the unit of the parameter, and its
- * name, which the source owns. */
-void sdm_fit_bounds(const sdm_fit_source *source, size_t k, double *low, double *high,
-                    const char **name);
-
-/* Distribution of parameter k of a checked source: that of the model or, without a model, of the
- * shape. */
-sdm_distribution sdm_fit_distribution(const sdm_fit_source *source, size_t k);
-
 /* Checks target and options. SDM_E_ARG: one of them is invalid; SDM_E_FORMAT: values that an image,
  * label map or point list must not have; SDM_E_QUALITY: the image is constant. */
 sdm_status sdm_fit_check(const sdm_fit_target *target, const sdm_fit_opts *opts, sdm_error *err);

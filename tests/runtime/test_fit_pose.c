@@ -1,5 +1,6 @@
-/* The pose of a fit: motions that the data leave open, and a pose that is kept but wrong.
- * Tests: kept_pose.c open_motions.c */
+/* The pose of a fit: motions that the data leave open, a pose that is kept but wrong, and one that
+ * still moves.
+ * Tests: convergence.c kept_pose.c open_motions.c source_params.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -11,6 +12,7 @@
 #include <cmocka.h>
 
 #include "fit/solver/open_motions.h"
+#include "fit/trust/convergence.h"
 #include "oracle/fit_tools.h"
 
 // Eigenvectors of a matrix that is made from known ones.
@@ -145,9 +147,71 @@ static void test_kept_pose(void **state)
         // a translation by d moves a sphere's surface by d / sqrt(3) along its normal, rms
         if (off) assert_true(r.kept_pose_motion > 0.2 && r.kept_pose_motion < 0.5);
         assert_true(off ? r.kept_pose_gain > 20 : r.kept_pose_gain < 10);
+        // the likelihood is that of the kept pose, as the evidence (Schwarz 1978) is
+        const double factor = fmax(r.noise_factor, 1);
+        const double evidence = (r.log_likelihood - r.log_likelihood_without) / factor -
+                                0.5 * (double)r.n_params * log((double)r.n_used / factor);
+        assert_true(fabs(evidence - r.evidence) < 1e-9 * fabs(r.log_likelihood));
         sdm_fit_dispose(&r);
     }
     free(v);
+}
+
+// The steps of the test of the pose say nothing about the convergence of the fit.
+static void test_kept_pose_not_converged(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 4);
+    const sdm_fit_target t = image_of(v);
+    const sdm_fit_source source = exact_source();
+    sdm_fit_opts o = near_start();
+    o.start_pose = POSE;
+    o.keep_pose = true;
+    o.max_iterations = 1;
+    sdm_fit_result r;
+    sdm_error err = {0};
+    assert_int_equal(sdm_fit(&source, &t, &o, &r, &err), SDM_E_QUALITY);
+    assert_false(r.converged);
+    assert_non_null(strstr(err.text, "not converged"));
+    assert_true(r.kept_pose_gain < 10);
+    sdm_fit_dispose(&r);
+    free(v);
+}
+
+// The translation along x still moves by five times its sd; a fit with an unknown that has no sd
+// never passes.
+static void test_restless_unknown(void **state)
+{
+    (void)state;
+    enum { N = 6, MOVES = 3 };
+    static fit_problem p;
+    const sdm_fit_opts o = sdm_fit_defaults();
+    double sd[N] = {1, 1, 1, 1, 1, 1};
+    sdm_fit_result r = {.sd = sd, .n_iterations = 60};
+    sdm_error err = {0};
+    p.opts = &o;
+    p.n_recent = FIT_RECENT;
+    for (size_t k = 0; k < FIT_RECENT; k++)
+        for (size_t i = 0; i < N; i++) p.recent_step[k][i] = i == MOVES ? 5 : 0.01;
+    sdm_fit_accept_small_steps(&p, &r);
+    assert_false(r.converged);
+    sdm_fit_verdict_add(&r.verdict, &(sdm_fit_finding){.kind = SDM_FIT_CHECK_CONVERGED,
+                                                       .grade = SDM_FIT_FAILED,
+                                                       .text = "not converged"});
+    sdm_fail(&err, SDM_E_QUALITY, "%s", r.verdict.findings[0].text);
+    sdm_fit_name_restless(&p, &r, &err);
+    assert_non_null(strstr(err.text, "translation along x still moves by 5 of its"));
+    assert_non_null(strstr(r.verdict.findings[0].text, "translation along x"));
+    sd[MOVES] = 1e3;
+    sd[MOVES + 1] = NAN;
+    sdm_fit_accept_small_steps(&p, &r);
+    assert_false(r.converged);
+    sd[MOVES] = 1, sd[N - 1] = 1e3;
+    sdm_fit_accept_small_steps(&p, &r);
+    assert_false(r.converged);
+    sd[MOVES] = 1e3, sd[MOVES + 1] = 1;
+    sdm_fit_accept_small_steps(&p, &r);
+    assert_true(r.converged);
 }
 
 int main(void)
@@ -155,7 +219,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_eigenvectors),        cmocka_unit_test(test_axis_of_symmetry),
         cmocka_unit_test(test_sphere_has_any_axis), cmocka_unit_test(test_determined_pose),
-        cmocka_unit_test(test_kept_pose),
+        cmocka_unit_test(test_kept_pose),           cmocka_unit_test(test_kept_pose_not_converged),
+        cmocka_unit_test(test_restless_unknown),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

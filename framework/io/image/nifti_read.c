@@ -4,6 +4,7 @@
 
 #include "image_readers.h"
 #include "image_writers.h"
+#include "sdm/internal/mat3.h"
 
 /* Bytes of a header of version 1 and of version 2. */
 #define SIZE_1 348
@@ -163,18 +164,12 @@ static sdm_status use_qform(const nifti *f, sdm_image_header *h, sdm_error *err)
     return SDM_OK;
 }
 
-static double determinant(const double s[9])
-{
-    return s[0] * (s[4] * s[8] - s[5] * s[7]) - s[1] * (s[3] * s[8] - s[5] * s[6]) +
-           s[2] * (s[3] * s[7] - s[4] * s[6]);
-}
-
 /* Compares sform with qform at the corners of the image. Differences of a hundredth of a voxel are
  * rounding: both are single precision. A damaged qform, which is not in use, is ignored. */
 static void compare_frames(const nifti *f, const sdm_image_header *h, double mm, sdm_volume *v)
 {
     sdm_image_header s = *h, q = *h;
-    double most = 0, voxel = 0;
+    double most = 0, voxel = 0, adjugate[9];
     use_sform(f, &s);
     if (use_qform(f, &q, NULL)) return;
     for (int corner = 0; corner < 8; corner++) {
@@ -190,7 +185,7 @@ static void compare_frames(const nifti *f, const sdm_image_header *h, double mm,
     }
     for (size_t i = 0; i < 9; i++) voxel = fmax(voxel, fabs(s.step[i]));
     if (most > 0.01 * voxel) v->frames_differ_mm = most * mm;
-    v->frames_mirrored = determinant(s.step) * determinant(q.step) < 0;
+    v->frames_mirrored = m3_adjugate(s.step, adjugate) * m3_adjugate(q.step, adjugate) < 0;
 }
 
 /* Reads the frame from sform, else qform, else the voxel sizes alone (methods 3, 2 and 1 of

@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "sdm/internal/mat3.h"
+
 #define NIFTI_START 352      /* offset of the first voxel */
 #define NIFTI_SIZE_MAX 32767 /* sizes are int16 */
 #define NIFTI_UNIT_MM 2
@@ -28,18 +30,12 @@ static void quaternion(const double r[9], double q[4])
     for (int i = 0; i < 4; i++) q[i] = of[best][0] < 0 ? -of[best][i] : of[best][i];
 }
 
-static double determinant(const double r[9])
-{
-    return r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) +
-           r[2] * (r[3] * r[7] - r[4] * r[6]);
-}
-
 /* Stores both transforms from voxels to the world: qform as a quaternion, sform as a matrix. A
  * reflection is in sform as it is, and in qform as qfac = -1, a reversed third axis. */
 static void put_transform(uint8_t *h, const sdm_grid *g)
 {
     const double flip[3] = {-1, -1, 1}; // LPS to RAS
-    double r[9], q[4];
+    double r[9], adjugate[9], q[4];
     for (int i = 0; i < 9; i++) r[i] = flip[i / 3] * g->dir[i];
     for (int row = 0; row < 3; row++) {
         for (int axis = 0; axis < 3; axis++)
@@ -49,7 +45,7 @@ static void put_transform(uint8_t *h, const sdm_grid *g)
                     (float)(flip[row] * g->origin[row])); /* srow_x, srow_y, srow_z */
         sdm_put_f32(h + 268 + 4 * row, (float)(flip[row] * g->origin[row])); /* qoffset_x, _y, _z */
     }
-    const bool mirrored = determinant(r) < 0;
+    const bool mirrored = m3_adjugate(r, adjugate) < 0;
     for (int row = 0; row < 3 && mirrored; row++) r[3 * row + 2] = -r[3 * row + 2];
     quaternion(r, q);
     for (int i = 0; i < 3; i++)

@@ -45,7 +45,7 @@ sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const s
         (void)sdm_instance_params(source->shape, &m->n_params);
     }
     m->n_voxels = sdm_grid_count(&m->grid);
-    m->min_blur = 0.5 * fmax(m->grid.spacing[0], fmax(m->grid.spacing[1], m->grid.spacing[2]));
+    m->min_blur = 0.5 * fit_longest_edge(&m->grid);
     // memory for map, derivatives and fields
     size_t jacobian, fields;
     sdm_status s = sdm_mul(m->n_voxels, m->n_params, &jacobian, err);

@@ -2,6 +2,8 @@
  * share, with their derivatives. */
 #pragma once
 
+#include <math.h>
+
 #include "interpolate.h"
 #include "unknowns.h"
 
@@ -35,6 +37,12 @@ typedef struct fit_maps {
     /* wall-clock time spent on these maps, s */
     double seconds_network, seconds_exact;
 } fit_maps;
+
+/* Longest edge of a voxel, mm. */
+static inline double fit_longest_edge(const sdm_grid *g)
+{
+    return fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
+}
 
 /* Allocates memory for maps on the grid of the source; on error *out is empty. */
 sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const sdm_fit_opts *opts,

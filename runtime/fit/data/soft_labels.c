@@ -8,7 +8,9 @@
 #include <string.h>
 
 #include "blur.h"
+#include "map_fields.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/threads.h"
 
 // the Gaussian is negligible beyond so many sd
 #define REACH 6.0
@@ -71,4 +73,25 @@ sdm_status sdm_fit_soften_labels(const sdm_grid *g, const float *values, double 
     sdm_free(packed);
     sdm_free(spare);
     return s;
+}
+
+sdm_status sdm_fit_labels_as_image(const sdm_fit_source *source, sdm_fit_target *target,
+                                   sdm_fit_opts *opts, float **values, sdm_error *err)
+{
+    const sdm_grid *map = source->model ? &sdm_model_get_info(source->model)->grid : &source->grid;
+    const double soft = 0.5 * fmax(fit_longest_edge(map), fit_longest_edge(&target->grid));
+    sdm_status s = SDM_ALLOC(values, sdm_grid_count(&target->grid), "labels", err);
+    if (!s)
+        s = sdm_fit_soften_labels(&target->grid, target->values, soft, sdm_threads(opts->n_threads),
+                                  *values, err);
+    if (s) return s;
+    target->values = *values;
+    target->kind = SDM_FIT_IMAGE;
+    opts->blur = sqrt(opts->blur * opts->blur + soft * soft);
+    opts->appearance = (sdm_fit_appearance){.n_inside = 1,
+                                            .n_outside = 1,
+                                            .inside = {{.weight = 1, .mean = 1, .sd = 0.25}},
+                                            .outside = {{.weight = 1, .mean = 0, .sd = 0.25}}};
+    opts->keep_appearance = true;
+    return SDM_OK;
 }

@@ -14,11 +14,9 @@ static double triangle_area(const sdm_mesh *m, size_t t)
     const double *a = m->vert + 3 * (size_t)m->tri[3 * t],
                  *b = m->vert + 3 * (size_t)m->tri[3 * t + 1],
                  *c = m->vert + 3 * (size_t)m->tri[3 * t + 2];
-    double u[3], v[3], n[3];
-    v3_sub(b, a, u);
-    v3_sub(c, a, v);
-    v3_cross(u, v, n);
-    return 0.5 * sqrt(v3_dot(n, n));
+    double normal[3];
+    v3_triangle_normal(a, b, c, normal);
+    return 0.5 * v3_norm(normal);
 }
 
 // x = the point of triangle t that (u, v) in the unit square stand for; evenly distributed pairs

@@ -105,8 +105,7 @@ static sdm_status points_scatter(fit_residuals *r, const member *m, size_t n, sd
 // volume that a displacement of the whole surface by this radius stands for
 static double points_volume_factor(const fit_problem *p)
 {
-    const sdm_grid *g = &p->maps.grid;
-    const double h = fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
+    const double h = fit_longest_edge(&p->maps.grid);
     size_t inside = 0, near = 0;
     for (size_t v = 0; v < p->maps.n_voxels; v++) {
         inside += p->maps.distance[v] < 0;

@@ -89,16 +89,11 @@ static double sandwich(size_t n, const double *influence, const double *scatter,
 // the map
 #define POINT_MAP_ERROR 0.01
 
-static double longest_edge(const sdm_grid *g)
-{
-    return fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
-}
-
 // edge (mm) of the larger of the voxels of map and labels
 static double coarsest_voxel(const fit_problem *p)
 {
-    const double map = longest_edge(&p->maps.grid);
-    return p->given_labels ? fmax(map, longest_edge(&p->target->grid)) : map;
+    const double map = fit_longest_edge(&p->maps.grid);
+    return p->given_labels ? fmax(map, fit_longest_edge(&p->target->grid)) : map;
 }
 
 // error (mm) near the surface: of the network's maps, measured on its held-out data (0 for exact
@@ -108,9 +103,9 @@ static double model_error(const fit_problem *p)
     const bool points = p->target->kind == SDM_FIT_POINTS;
     double square = 0;
     if (p->given_labels || points) {
-        const double labels = points ? 0 : LABEL_ERROR * longest_edge(&p->target->grid),
-                     map =
-                         (points ? POINT_MAP_ERROR : LABEL_MAP_ERROR) * longest_edge(&p->maps.grid);
+        const double labels = points ? 0 : LABEL_ERROR * fit_longest_edge(&p->target->grid),
+                     map = (points ? POINT_MAP_ERROR : LABEL_MAP_ERROR) *
+                           fit_longest_edge(&p->maps.grid);
         square = labels * labels + map * map;
     }
     if (!p->maps.exact) {

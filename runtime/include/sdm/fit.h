@@ -421,7 +421,7 @@ typedef struct sdm_fit_result {
     char open_motions[512];
     /* keep_pose: what a fit from here with a free pose does: rms motion of the surface along its
        normal, mm, and gain in log posterior density, as of independent samples (about 3 for the
-       true pose). 0 where the pose is estimated */
+       true pose); NaN: this fit failed. 0 where the pose is estimated */
     double kept_pose_motion, kept_pose_gain;
     /* with sdm_fit_opts.cavity: radius (mm) of the widest ball in a space of the image that looks
        like the inside; else 0. A smaller cavity leaves out such spaces */

@@ -1,0 +1,75 @@
+/* Convergence of a fit: the movement of each unknown in the last iterations, as a share of its
+ * standard deviation. */
+#include "convergence.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "fit/data/source_params.h"
+#include "fit/solver/newton.h"
+
+// an unknown has converged when it moves by no more than this share of its sd
+#define UNREST_MAX 0.1
+
+// the unknown that moves most in the last iterations, and by how many of its standard deviations
+// (*most); infinite where this cannot be told
+static size_t most_restless(const fit_problem *p, const sdm_fit_result *r, double *most)
+{
+    size_t worst = 0;
+    *most = 0;
+    for (size_t i = 0; i < p->n_params + 6; i++) {
+        const bool kept = i < p->n_params ? p->opts->keep_params : p->opts->keep_pose;
+        if (kept) continue;
+        double unrest = sdm_fit_unrest(p, i) / r->sd[i];
+        if (isnan(unrest)) unrest = INFINITY; // an unknown without a sd
+        if (unrest > *most) *most = unrest, worst = i;
+    }
+    return worst;
+}
+
+void sdm_fit_accept_small_steps(const fit_problem *p, sdm_fit_result *r)
+{
+    double most;
+    if (r->converged) return;
+    (void)most_restless(p, r, &most);
+    if (!(most <= UNREST_MAX)) return;
+    r->converged = true;
+    snprintf(r->reason, sizeof r->reason,
+             "the last steps move every unknown by at most %.2g of its standard deviation", most);
+}
+
+static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
+{
+    static const char *const pose[6] = {"rotation about x",    "rotation about y",
+                                        "rotation about z",    "translation along x",
+                                        "translation along y", "translation along z"};
+    double most, low, high;
+    const char *name;
+    const size_t worst = most_restless(p, r, &most);
+    if (worst < p->n_params)
+        sdm_fit_bounds(p->source, worst, &low, &high, &name);
+    else
+        name = pose[worst - p->n_params];
+    char moves[200] = "";
+    if (isfinite(most))
+        snprintf(moves, sizeof moves,
+                 "; %.100s still moves by %.2g of its standard deviation, need %.2g", name, most,
+                 UNREST_MAX);
+    sdm_fail(err, SDM_E_QUALITY,
+             "not converged after %zu iterations (%s%s): allow more iterations (max_iterations), "
+             "give a nearer start, or a prior of what the data hardly determine",
+             r->n_iterations, r->reason, moves);
+}
+
+void sdm_fit_name_restless(const fit_problem *p, sdm_fit_result *r, sdm_error *err)
+{
+    for (size_t i = 0; i < r->verdict.n_findings && !r->converged; i++) {
+        sdm_fit_finding *f = &r->verdict.findings[i];
+        if (f->kind != SDM_FIT_CHECK_CONVERGED) continue;
+        sdm_error named = {0};
+        not_converged(p, r, &named);
+        if (err && !strcmp(err->text, f->text)) *err = named;
+        snprintf(f->text, sizeof f->text, "%.239s", named.text);
+    }
+}

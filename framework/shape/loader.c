@@ -88,10 +88,10 @@ static sdm_status check_complete(const char *path, sdm_error *err)
     }
 #endif
     sdm_free(bytes);
-    return end <= size ? SDM_OK
-                       : sdm_fail(err, SDM_E_PLUGIN,
-                                  "plug-in %s is not complete: %zu of %llu bytes", path, size,
-                                  (unsigned long long)end);
+    return end <= size
+               ? SDM_OK
+               : sdm_fail(err, SDM_E_PLUGIN, "plug-in %s is not complete: %zu of %llu bytes", path,
+                          size, (unsigned long long)end);
 }
 
 /* Loads the file at an absolute path and adds its shapes. */

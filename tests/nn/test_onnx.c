@@ -56,9 +56,9 @@ static void test_limit(void **state)
     sdm_error err = {0};
     assert_int_equal(sdm_onnx_create(1, &g, &x, &err), SDM_OK);
     const sdm_onnx_value w = sdm_onnx_weights(g, "large", 2, dims, fill_nothing, NULL);
-    assert_int_equal(sdm_onnx_write(g, "test_onnx.onnx", sdm_onnx_node2(g, "MatMul", x, w), map,
-                                    &err),
-                     SDM_E_UNSUPPORTED);
+    assert_int_equal(
+        sdm_onnx_write(g, "test_onnx.onnx", sdm_onnx_node2(g, "MatMul", x, w), map, &err),
+        SDM_E_UNSUPPORTED);
     assert_non_null(strstr(err.text, "2 GB"));
     assert_int_not_equal(access("test_onnx.onnx", F_OK), 0);
     sdm_onnx_free(g);

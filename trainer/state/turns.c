@@ -22,7 +22,8 @@ static double budget_of(const sdm_config *c)
 void trainer_turn_config(const training_turns *r, const sdm_config *asked, sdm_config *out)
 {
     *out = *asked;
-    sdm_config_choose_kind(out, r->kind[r->at]);
+    // a kind that the configuration names has its keys already
+    if (asked->network.kind == SDM_NETWORK_AUTO) sdm_config_choose_kind(out, r->kind[r->at]);
     const double all = budget_of(asked), mine = r->at      ? all - used_of(r, asked)
                                                 : r->n > 1 ? all * r->share
                                                            : all;

@@ -123,7 +123,9 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
 // blurred images, so that its residuals are not noise alone
 static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
 {
-    const bool exact = is_image(p) && p->maps.share && !(p->opts->tolerance > 0);
+    // the residuals take the tissues of the whole image: a tissue field remains in them
+    const bool exact = is_image(p) && p->maps.share && !(p->opts->tolerance > 0) &&
+                       !(p->opts->tissue_mm > 0);
     add(v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1],
         exact ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, m->chi_square[1], m->limit[1],
         "the residuals inside the shape are not noise: neighbourhoods deviate by %.2g times what "
@@ -141,6 +143,7 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_v
 // the volumes that the data contradict
 static void check_volumes(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
 {
+    if (p->opts->tissue_mm > 0) return;
     const bool points = p->target->kind == SDM_FIT_POINTS;
     const char *what = points ? "points" : is_image(p) ? "image" : "labels";
     const bool biased = is_image(p) && !p->maps.share;

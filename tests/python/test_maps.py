@@ -204,10 +204,10 @@ def test_eight_threads(model):
 
 def test_ctrl_c_stops_an_exact_map():
     mesh, finished = sdmgen.Shape("cochlea").mesh(), False
-    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    timer = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT))
     with pytest.raises(KeyboardInterrupt):
         timer.start()
-        sdmgen.exact(mesh, size=(320, 320, 320), threads=1)
+        sdmgen.exact(mesh, size=(480, 480, 480), threads=1)
         finished = True
         time.sleep(60)
     assert not finished

@@ -124,8 +124,8 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
 static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
 {
     // the residuals take the tissues of the whole image: a tissue field remains in them
-    const bool exact = is_image(p) && p->maps.share && !(p->opts->tolerance > 0) &&
-                       !(p->opts->tissue_mm > 0);
+    const bool exact =
+        is_image(p) && p->maps.share && !(p->opts->tolerance > 0) && !(p->opts->tissue_mm > 0);
     add(v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1],
         exact ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, m->chi_square[1], m->limit[1],
         "the residuals inside the shape are not noise: neighbourhoods deviate by %.2g times what "

@@ -66,8 +66,13 @@ static sdm_status take_other_side(cli_fit *f, sdm_error *err)
 
 static void add_finding(cli_fit *f)
 {
+    // an open side contradicts nothing that the user or the model says
+    const sdm_fit_grade grade = f->better > SDM_FIT_PREFERRED ? SDM_FIT_PASSED
+                                : f->better < -SDM_FIT_PREFERRED || !side_is_given(f)
+                                    ? SDM_FIT_FAILED
+                                    : SDM_FIT_DOUBTFUL;
     sdm_fit_finding x = {.kind = SDM_FIT_CHECK_MIRROR,
-                         .grade = f->better > SDM_FIT_PREFERRED ? SDM_FIT_PASSED : SDM_FIT_FAILED,
+                         .grade = grade,
                          .figure = f->better,
                          .limit = SDM_FIT_PREFERRED};
     if (f->better < -SDM_FIT_PREFERRED)
@@ -81,7 +86,8 @@ static void add_finding(cli_fit *f)
                  "(log-likelihood): the side is open",
                  f->mirror, fabs(f->better));
     sdm_fit_verdict_add(&f->result.verdict, &x);
-    if (x.grade && !f->doubt.status) (void)sdm_fail(&f->doubt, SDM_E_QUALITY, "%s", x.text);
+    if (x.grade == SDM_FIT_FAILED && !f->doubt.status)
+        (void)sdm_fail(&f->doubt, SDM_E_QUALITY, "%s", x.text);
 }
 
 sdm_status cli_fit_mirror(cli_fit *f, sdm_error *err)

@@ -117,7 +117,6 @@ static sdm_fit_result fit_points(const sdm_instance *shape, const double *x, siz
     o.start_pose = POSE;
     o.start_pose.translation[0] += 0.4, o.start_pose.rotation[1] += 0.15;
     o.n_threads = 2;
-    o.tolerance = 0.4; // outliers are wanted here
     sdm_fit_result r;
     sdm_error err = {0};
     if (sdm_fit(&s, &t, &o, &r, &err)) fail_msg("%s", err.text);

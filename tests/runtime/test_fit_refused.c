@@ -94,7 +94,7 @@ static void test_bad_arguments_and_cancellation(void **state)
     fit_refused(SDM_E_RANGE, "start: parameter 'rz' = 9", &t, &o);
     o = near_start();
     o.max_iterations = 1;
-    fit_refused(SDM_E_QUALITY, "not converged after ", &t, &o);
+    fit_refused(SDM_E_QUALITY, "not converged after 2 iterations", &t, &o);
     o = near_start();
     o.l_ref = NAN;
     fit_refused(SDM_E_ARG, "l_ref", &t, &o);

@@ -216,6 +216,45 @@ static void test_points_of_another_shape_are_refused(void **state)
     sdm_instance_free(round);
 }
 
+// Points of the ellipsoid TRUTH; every step-th lies far away, where its place fits into no integer.
+static double *points_with_strays(size_t step, size_t *n)
+{
+    sdm_instance *round = shape_of("ellipsoid");
+    sdm_mesh m = {0};
+    assert_int_equal(sdm_instance_mesh(round, TRUTH, &m, NULL), SDM_OK);
+    for (size_t i = 0; i < m.n_vert; i++) {
+        double x[3];
+        sdm_pose_apply(&POSE, m.vert + 3 * i, x);
+        for (size_t a = 0; a < 3; a++)
+            m.vert[3 * i + a] = i % step ? x[a] : (i & 1 ? 1e12 : -1e12) * (double)(a + 1);
+    }
+    double *x = malloc(3 * m.n_vert * sizeof *x);
+    if (!x) abort();
+    memcpy(x, m.vert, 3 * m.n_vert * sizeof *x);
+    *n = m.n_vert;
+    sdm_mesh_dispose(&m);
+    sdm_instance_free(round);
+    return x;
+}
+
+static void test_strays_are_refused_if_many(void **state)
+{
+    (void)state;
+    sdm_instance *round = shape_of("ellipsoid");
+    for (size_t step = 2; step <= 7; step += 5) {
+        size_t n;
+        double *x = points_with_strays(step, &n);
+        const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = x, .n_points = n};
+        sdm_fit_result r;
+        sdm_error err = {0};
+        const sdm_status s = fit_of(round, &t, 0, &r, &err);
+        if (s != (step == 2 ? SDM_E_QUALITY : SDM_OK)) fail_msg("1 of %zu: %s", step, err.text);
+        sdm_fit_dispose(&r);
+        free(x);
+    }
+    sdm_instance_free(round);
+}
+
 // An ellipsoid is its own mirror image: both fits reach the same evidence and parameters.
 static void test_mirror_of_an_ellipsoid(void **state)
 {
@@ -246,6 +285,7 @@ int main(void)
         cmocka_unit_test(test_right_fits_pass),
         cmocka_unit_test(test_wrong_shapes_are_refused),
         cmocka_unit_test(test_points_of_another_shape_are_refused),
+        cmocka_unit_test(test_strays_are_refused_if_many),
         cmocka_unit_test(test_mirror_of_an_ellipsoid),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -20,7 +20,9 @@
 #define VOLUME_MIN 0.05
 // the same for images with the older observation model, which is biased where they are blurred
 #define VOLUME_MIN_BIASED 0.2
-// a shape whose blob has this Dice coefficient is a blob itself
+// largest share of points that may belong to another surface
+#define STRAY_MAX 0.35
+// A shape that has this Dice coefficient with its blob cannot be told from one: no comparison.
 #define BLOB_ALIKE 0.9
 
 const char *sdm_fit_check_name(sdm_fit_check_kind kind)
@@ -123,15 +125,20 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
 // blurred images, so that its residuals are not noise alone
 static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
 {
-    // the residuals take the tissues of the whole image: a tissue field remains in them
-    const bool exact =
-        is_image(p) && p->maps.share && !(p->opts->tolerance > 0) && !(p->opts->tissue_mm > 0);
+    const bool exact = is_image(p) && p->maps.share && !(p->opts->tolerance > 0);
+    const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps);
+    char cause[200] = "another shape lies there, or the organ differs from the model (then say by "
+                      "how much it may: tolerance)";
+    if (voxel > radius)
+        snprintf(cause, sizeof cause,
+                 "the voxels of the maps, %.2g mm, are larger than the largest radius of the "
+                 "shape, %.2g mm: finer ones are needed, or a tolerance",
+                 voxel, radius);
     add(v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1],
         exact ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, m->chi_square[1], m->limit[1],
         "the residuals inside the shape are not noise: neighbourhoods deviate by %.2g times what "
-        "noise explains; another shape lies there, or the organ differs from the model (then say "
-        "by how much it may: tolerance)",
-        sqrt(m->chi_square[1]));
+        "noise explains; %s",
+        sqrt(m->chi_square[1]), cause);
     if (p->target->kind == SDM_FIT_POINTS) return;
     add(v, SDM_FIT_CHECK_BESIDE, m->chi_square[0] <= m->limit[0], SDM_FIT_DOUBTFUL,
         m->chi_square[0], m->limit[0],
@@ -141,9 +148,9 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_v
 }
 
 // the volumes that the data contradict
-static void check_volumes(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
+static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_fit_result *r,
+                          sdm_fit_verdict *v)
 {
-    if (p->opts->tissue_mm > 0) return;
     const bool points = p->target->kind == SDM_FIT_POINTS;
     const char *what = points ? "points" : is_image(p) ? "image" : "labels";
     const bool biased = is_image(p) && !p->maps.share;
@@ -152,11 +159,17 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, sdm_fit_ver
     add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
         "%.0f %% of the volume of the shape is empty in the %s, allowed %.0f %% (tolerance)",
         100 * m->empty, what, 100 * most);
-    add(v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED, m->missing, beside,
-        "beside the shape the %s hold%s as much of its material as %.0f %% of its volume, allowed "
-        "%.0f %% (%s)",
-        what, is_image(p) ? "s" : "", 100 * m->missing, 100 * beside,
-        is_image(p) ? "beside" : "tolerance");
+    const double stray = fmax(p->opts->tolerance, STRAY_MAX);
+    if (points && r->outliers > stray)
+        add(v, SDM_FIT_CHECK_MISSING, false, SDM_FIT_FAILED, r->outliers, stray,
+            "%.0f %% of the points lie on no surface of the shape, allowed %.0f %% (tolerance)",
+            100 * r->outliers, 100 * stray);
+    else
+        add(v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED, m->missing, beside,
+            "beside the shape the %s hold%s as much of its material as %.0f %% of its volume, "
+            "allowed %.0f %% (%s)",
+            what, is_image(p) ? "s" : "", 100 * m->missing, 100 * beside,
+            is_image(p) ? "beside" : "tolerance");
 }
 
 // the tissues against the robust statistics, and against the values at the start
@@ -207,11 +220,9 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     if (!s) {
         check_residuals(p, &misfit, v);
-        check_volumes(p, &misfit, v);
+        check_volumes(p, &misfit, r, v);
         v->n_units = misfit.n_units[0] + misfit.n_units[1];
-        for (int side = 0; side < 2; side++)
-            v->chi_square += misfit.chi_square[side] * (double)misfit.n_units[side] /
-                             fmax((double)v->n_units, 1);
+        v->chi_square = misfit.noise_chi_square;
     }
     if (!s && is_image(p)) check_tissues(p, &residuals, r, v);
     sdm_fit_residuals_dispose(&residuals);
@@ -226,7 +237,9 @@ double sdm_fit_compare(const sdm_fit_result *fit, const sdm_fit_result *rival)
 {
     const bool one = fit->verdict.n_units > 0, other = rival->verdict.n_units > 0;
     if (!one || !other) return one ? INFINITY : other ? -INFINITY : NAN;
-    if (!isnan(fit->evidence) && !isnan(rival->evidence)) return fit->evidence - rival->evidence;
+    const double overdispersion = fmax(fmin(fit->verdict.chi_square, rival->verdict.chi_square), 1);
+    if (!isnan(fit->evidence) && !isnan(rival->evidence))
+        return (fit->evidence - rival->evidence) / overdispersion;
     const double n = 0.5 * (double)(fit->verdict.n_units + rival->verdict.n_units);
     return 0.5 * n *
            log(fmax(rival->verdict.chi_square, 1e-3) / fmax(fit->verdict.chi_square, 1e-3));

@@ -65,20 +65,31 @@ static double mean_correlation(const fit_residuals *r, const member *m, size_t n
     return pairs > 0 ? sum / pairs : 0;
 }
 
-/* Mean residual of a unit, and its variance. */
+/* Mean of the residuals of a unit; its variance by noise, and by noise and errors of the maps; mean
+ * of the expected shares. */
 typedef struct unit_mean {
-    double mean, variance;
+    double mean, noise, variance, expected;
 } unit_mean;
 
 static unit_mean unit_measure(const fit_residuals *r, const member *m, size_t n, double least)
 {
-    double sum = 0, variance = 0;
+    double sum = 0, variance = 0, expected = 0, maps = 0;
     for (size_t k = 0; k < n; k++) {
         sum += r->residual[m[k].sample];
+        expected += r->expected[m[k].sample];
+        maps += r->map_error[m[k].sample];
         variance += r->sd[m[k].sample] * r->sd[m[k].sample];
     }
     const double one = 1 / (double)n, shared = (1 - one) * mean_correlation(r, m, n);
-    return (unit_mean){sum * one, variance * one * (one + shared) + least * least};
+    const double noise = variance * one * (one + shared) + least * least;
+    return (unit_mean){sum * one, noise, noise + maps * one * maps * one, expected * one};
+}
+
+// The share of a unit that the data contradict. At most the expected share can be empty: a value
+// beyond that of the outside is another tissue there.
+static double contradicted(const unit_mean *u)
+{
+    return u->mean < 0 ? fmin(-u->mean, u->expected) : u->mean;
 }
 
 /* Points: the sd of every distance is the robust scatter within the units, which a displacement of
@@ -159,10 +170,12 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
         const int side = m[from].unit & 1;
         out->n_units[side]++;
         out->chi_square[side] += z2;
+        out->noise_chi_square += u.mean * u.mean / u.noise;
         if (z2 > BEYOND * BEYOND)
             *(u.mean < 0 ? &out->empty : &out->missing) +=
-                factor * fabs(u.mean) * (double)(to - from) / volume;
+                factor * contradicted(&u) * (double)(to - from) / volume;
     }
+    out->noise_chi_square /= fmax((double)(out->n_units[0] + out->n_units[1]), 1);
     for (int side = 0; side < 2; side++) {
         const double units = fmax((double)out->n_units[side], 1);
         out->chi_square[side] /= units;

@@ -4,7 +4,8 @@
    neighbourhood have one sign. The samples are therefore grouped into units: the samples in a cube
    whose edge is half of the largest radius of the shape, separately on both sides of the surface.
    The mean residual of a unit is compared with its standard deviation, which follows from the size
-   and the correlation of the noise. */
+   and the correlation of the noise, and from the error of the maps, which is the same for a whole
+   unit. */
 #pragma once
 
 #include "residuals.h"
@@ -13,8 +14,11 @@ typedef struct fit_misfit {
     /* outside of the surface [0] and inside [1]; points count as inside */
     /* number of units */
     size_t n_units[2];
-    /* mean over the units of (mean residual)^2 / variance. 1: the residuals are noise */
+    /* mean over the units of (mean residual)^2 / variance, where errors of the maps add to the
+       variance. 1: the residuals are noise and these errors */
     double chi_square[2];
+    /* the same on both sides together, with the variance of the noise alone */
+    double noise_chi_square;
     /* largest chi_square that noise alone exceeds once in a thousand fits, with the uncertainty of
        the noise itself; the units count as correlated with their neighbours as the noise is */
     double limit[2];

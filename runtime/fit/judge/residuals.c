@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "fit/trust/posterior.h"
 #include "noise.h"
 #include "sdm/internal/heap.h"
 
@@ -19,6 +20,8 @@
 #define SD_MIN 0.02
 // the spread inside is at most this factor above what the differences of neighbours say
 #define WIDER 1.5
+// largest place along an axis; points farther away, in units of the radius, share a place
+#define PLACE_MAX 1e5
 // correlations below this count as none
 #define CORRELATION_MIN 0.05
 
@@ -37,19 +40,33 @@ static double predicted_share(const fit_problem *p, double field)
     return 0.5 * erfc(field / p->opts->blur * 0.70710678118654752);
 }
 
-// by how much the mean of all outside tissues at sample i differs from that of the main one
-static double outside_shift(const fit_problem *p, size_t i)
+/* The outside tissues at a sample: mean, and variance (that of the tissues and between them) over
+ * the variance of the tissue that r->middle[0] and r->spread[0] describe. */
+typedef struct outside_values {
+    double mean, variance_ratio;
+} outside_values;
+
+static outside_values outside_at(const fit_problem *p, const fit_residuals *r, size_t i)
 {
     const fit_observation *o = &p->observation;
     const float *local = fit_sample_weights(&p->samples, i);
-    double sum = 0;
     size_t main = o->n_in;
     for (size_t k = o->n_in; k < o->n_tissues; k++)
-        if (o->tissue[k].weight > o->tissue[main].weight) main = k;
-    for (size_t k = o->n_in; k < o->n_tissues; k++)
-        sum += (o->tissue[k].mean - o->tissue[main].mean) *
-               (local ? exp((double)local[k - o->n_in]) : o->tissue[k].weight);
-    return sum;
+        if (local
+                ? fabs(o->tissue[k].mean - r->middle[0]) < fabs(o->tissue[main].mean - r->middle[0])
+                : o->tissue[k].weight > o->tissue[main].weight)
+            main = k;
+    const sdm_fit_law *reference = &o->tissue[main];
+    double shift = 0, variance = 0;
+    for (size_t k = o->n_in; k < o->n_tissues; k++) {
+        const sdm_fit_law *t = &o->tissue[k];
+        const double w = local ? exp((double)local[k - o->n_in]) : t->weight,
+                     d = t->mean - reference->mean;
+        shift += w * d;
+        variance += w * (t->sd * t->sd + d * d);
+    }
+    variance -= shift * shift;
+    return (outside_values){r->middle[0] + shift, variance / (reference->sd * reference->sd)};
 }
 
 // whether sample i lies inside (side 1) or outside (side 0), at most `limit` from pure
@@ -77,7 +94,7 @@ static void side_measure(const fit_problem *p, fit_residuals *r, int side, doubl
     if (is_labels(p)) r->middle[side] = side;
 }
 
-// places, predicted shares, and observed ones less these
+// Sets place, expected and residual (observed share less expected share) of every voxel.
 static void shares_fill(const fit_problem *p, fit_residuals *r, double *list)
 {
     const fit_samples *s = &p->samples;
@@ -94,24 +111,28 @@ static void shares_fill(const fit_problem *p, fit_residuals *r, double *list)
     for (size_t i = 0; i < r->n; i++) {
         r->residual[i] = ((double)s->value[i] - r->middle[0]) / contrast - r->expected[i];
         r->sd[i] = 1;
-        // inside the surface, what remains of the outside is that of all its tissues
-        if (r->expected[i] > 0.5)
-            r->residual[i] -= (1 - r->expected[i]) * outside_shift(p, i) / contrast;
+        // Without a tissue field a voxel outside may hold any of the tissues; inside the surface,
+        // the outside part of a voxel holds all of them.
+        if (s->n_outside || r->expected[i] > 0.5)
+            r->residual[i] -=
+                (1 - r->expected[i]) * (outside_at(p, r, i).mean - r->middle[0]) / contrast;
     }
 }
 
-// sd of the noise of every voxel; leaves out a third material, and limits what is beyond the
-// outside
-static void noise_fill(fit_residuals *r)
+// Sets the sd of the noise of every voxel. Leaves out voxels of a third material, and limits values
+// that lie beyond the outside.
+static void noise_fill(const fit_problem *p, fit_residuals *r)
 {
     const double contrast = fabs(r->middle[1] - r->middle[0]);
     double sd[2];
     for (int side = 0; side < 2; side++) sd[side] = fmax(r->spread[side] / contrast, SD_MIN);
     for (size_t i = 0; i < r->n; i++) {
-        const double a = r->expected[i], share = r->residual[i] + a;
+        const double a = r->expected[i], share = r->residual[i] + a,
+                     wider = p->samples.n_outside ? outside_at(p, r, i).variance_ratio : 1,
+                     outside = sd[0] * sqrt(wider);
         r->used[i] = share < 1 + BEYOND * sd[1];
-        r->sd[i] = sqrt(a * sd[1] * sd[1] + (1 - a) * sd[0] * sd[0]);
-        r->residual[i] = fmax(share, -BEYOND * sd[0]) - a;
+        r->sd[i] = sqrt(a * sd[1] * sd[1] + (1 - a) * outside * outside);
+        r->residual[i] = fmax(share, -BEYOND * outside) - a;
     }
 }
 
@@ -205,7 +226,7 @@ static sdm_status voxels_fill(const fit_problem *p, fit_residuals *r, double rad
     const sdm_status s = lookup_create(r, &l, err);
     if (!s) {
         spread_limit(r, &l, list);
-        noise_fill(r);
+        noise_fill(p, r);
         correlations_measure(r, &l, list);
     }
     for (int a = 0; a < 3; a++)
@@ -215,15 +236,38 @@ static sdm_status voxels_fill(const fit_problem *p, fit_residuals *r, double rad
     return s;
 }
 
+/* Error (mm) of the maps near the surface: of the network, and of trilinear interpolation of the
+ * distance from a sphere between voxels of edge h: its mean is h^2 / (12 radius) along each of the
+ * two directions across the radius. */
+static double maps_error(const fit_problem *p, double radius)
+{
+    const double h = fit_longest_edge(&p->maps.grid);
+    return hypot(sdm_fit_network_error(p), radius > 0 ? h * h / (6 * radius) : 0);
+}
+
+// Voxels: the share changes with the distance by that of a plane seen with a Gaussian point spread.
+// The density at the quantile of the share a, exp(-z^2 / 2) / sqrt(2 pi), is close to 1.6 a (1 -
+// a).
+static void map_errors_fill(const fit_problem *p, fit_residuals *r, double radius)
+{
+    const double error = maps_error(p, radius), h = is_voxels(p) ? p->target->grid.spacing[0] : 0,
+                 width = hypot(p->state.blur, h / sqrt(12));
+    for (size_t i = 0; i < r->n; i++)
+        r->map_error[i] = is_voxels(p) ? error * 1.6 * r->expected[i] * (1 - r->expected[i]) / width
+                                       : error / radius;
+}
+
 // points: distances over the largest radius; their noise is the scatter of the distances
 static void points_fill(const fit_problem *p, fit_residuals *r, double radius)
 {
     for (size_t i = 0; i < r->n; i++) {
         r->expected[i] = 1;
-        r->used[i] = true;
+        r->used[i] = sdm_fit_point_belongs(&p->observation, p->samples.field[i]) >= 0.5;
         r->residual[i] = p->samples.field[i] / radius;
-        for (size_t a = 0; a < 3; a++)
-            r->place[3 * i + a] = (int32_t)floor(2 * p->samples.world[3 * i + a] / radius);
+        for (size_t a = 0; a < 3; a++) {
+            const double place = floor(2 * p->samples.world[3 * i + a] / radius);
+            r->place[3 * i + a] = (int32_t)fmax(fmin(place, PLACE_MAX), -PLACE_MAX);
+        }
     }
 }
 
@@ -236,6 +280,7 @@ sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sd
     sdm_status s = SDM_ALLOC(&r->expected, r->n, "residuals of the fit", err);
     if (!s) s = SDM_ALLOC(&r->residual, r->n, "residuals of the fit", err);
     if (!s) s = SDM_ALLOC(&r->sd, r->n, "residuals of the fit", err);
+    if (!s) s = SDM_ALLOC(&r->map_error, r->n, "residuals of the fit", err);
     if (!s) s = SDM_ALLOC(&r->used, r->n, "residuals of the fit", err);
     if (!s) s = SDM_ALLOC(&r->place, 3 * r->n, "residuals of the fit", err);
     if (!s) s = SDM_ALLOC(&list, r->n, "residuals of the fit", err);
@@ -244,6 +289,7 @@ sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sd
         s = voxels_fill(p, r, radius, list, err);
     else if (!s)
         points_fill(p, r, radius);
+    if (!s) map_errors_fill(p, r, radius);
     sdm_free(list);
     return s;
 }
@@ -253,6 +299,7 @@ void sdm_fit_residuals_dispose(fit_residuals *r)
     sdm_free(r->expected);
     sdm_free(r->residual);
     sdm_free(r->sd);
+    sdm_free(r->map_error);
     sdm_free(r->used);
     sdm_free(r->place);
     *r = (fit_residuals){0};

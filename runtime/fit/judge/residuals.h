@@ -18,6 +18,10 @@ typedef struct fit_residuals {
     size_t n;
     /* [n] predicted share, 0 .. 1 (points: 1); observed less predicted; sd of the noise */
     double *expected, *residual, *sd;
+    /* [n] change of the expected share where the maps are wrong by their error: that of the
+       network, and of the interpolation between voxels of a surface as curved as the largest ball
+       inside */
+    double *map_error;
     /* [n] false: the sample holds a third material, and its residual says nothing */
     bool *used;
     /* [n][3] place of the sample, in steps of the image (points: in halves of the largest radius)

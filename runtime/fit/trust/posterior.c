@@ -96,25 +96,24 @@ static double coarsest_voxel(const fit_problem *p)
     return p->given_labels ? fmax(map, fit_longest_edge(&p->target->grid)) : map;
 }
 
-// error (mm) near the surface: of the network's maps, measured on its held-out data (0 for exact
-// maps); and of labels, whose surface is known to a part of a voxel
+double sdm_fit_network_error(const fit_problem *p)
+{
+    if (p->maps.exact) return 0;
+    const sdm_accuracy *a = &sdm_model_get_info(p->source->model)->accuracy;
+    return a->rmse_near_mm > 0 ? a->rmse_near_mm : a->rmse_mm;
+}
+
+// error (mm) near the surface: of the network's maps; and of labels, whose surface is known to a
+// part of a voxel
 static double model_error(const fit_problem *p)
 {
     const bool points = p->target->kind == SDM_FIT_POINTS;
-    double square = 0;
-    if (p->given_labels || points) {
-        const double labels = points ? 0 : LABEL_ERROR * fit_longest_edge(&p->target->grid),
-                     map = (points ? POINT_MAP_ERROR : LABEL_MAP_ERROR) *
-                           fit_longest_edge(&p->maps.grid);
-        square = labels * labels + map * map;
-    }
-    if (!p->maps.exact) {
-        const sdm_accuracy *a = &sdm_model_get_info(p->source->model)->accuracy;
-        const double network = a->rmse_near_mm > 0 ? a->rmse_near_mm : a->rmse_mm;
-        if (!p->given_labels && !points) return network;
-        square += network * network;
-    }
-    return sqrt(square);
+    const double network = sdm_fit_network_error(p);
+    if (!p->given_labels && !points) return network;
+    const double labels = points ? 0 : LABEL_ERROR * fit_longest_edge(&p->target->grid),
+                 map =
+                     (points ? POINT_MAP_ERROR : LABEL_MAP_ERROR) * fit_longest_edge(&p->maps.grid);
+    return sqrt(labels * labels + map * map + network * network);
 }
 
 // covariance, sd and correlation from the sandwich; spread[n][n]: scratch memory

@@ -7,6 +7,10 @@
    allocated. SDM_E_QUALITY: the information is singular; the matrices then keep their values. */
 sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_error *err);
 
+/* Error (mm, rms) near the surface of the maps of the fit: of the network, measured on its held-out
+   data; 0 for exact maps. */
+double sdm_fit_network_error(const fit_problem *p);
+
 /* weight[n_params + 6]: factor of each log prior. The log-likelihood counts correlated samples as
    independent, so it is too sharp relative to a prior. To restore the balance, the log prior of
    each unknown is multiplied by the ratio of the sandwich variance to the variance for independent

@@ -316,8 +316,8 @@ typedef struct sdm_fit_verdict {
     sdm_fit_grade grade;
     size_t n_findings;
     sdm_fit_finding findings[SDM_FIT_N_CHECKS];
-    /* number of neighbourhoods, and their mean (mean residual)^2 / variance, on both sides of the
-       surface together; 0: the fit ended before they were measured */
+    /* number of neighbourhoods, and their mean (mean residual)^2 / variance of the noise, on both
+       sides of the surface together; 0: the fit ended before they were measured */
     size_t n_units;
     double chi_square;
 } sdm_fit_verdict;
@@ -461,7 +461,9 @@ SDM_API sdm_status sdm_fit_mirrored(const sdm_fit_source *source, const sdm_fit_
 /* Compares a fit with a rival fit of the same target, for example of the mirror image of the shape.
    Returns by how much the fit is better, in units of log-likelihood of independent samples; below
    0: the rival is better; infinite: only one of the two holds an estimate; NaN: neither does.
-   Images: the difference of the evidences. Other targets: the log-likelihood ratio of the mean
+   Images: the difference of the evidences over max(1, the smaller chi-square of the two): where
+   neither shape explains the image, the difference is less certain by this factor (Wedderburn
+   1974). Other targets: the log-likelihood ratio of the mean
    residuals of neighbourhoods, n / 2 log(chi-square of the rival / chi-square of the fit), whose
    common variance is estimated. [any thread] */
 SDM_API double sdm_fit_compare(const sdm_fit_result *fit, const sdm_fit_result *rival);

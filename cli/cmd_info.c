@@ -9,6 +9,7 @@
 #include "report/json_values.h"
 #include "report/report_audit.h"
 #include "report/report_image.h"
+#include "report/report_quality.h"
 #include "report/terminal.h"
 #include "sdm/internal/distribution.h"
 #include "sdm/memory.h"
@@ -42,6 +43,7 @@ static void print_model(const char *path, const sdm_model_info *m)
         "             RMSE of single maps: 50 %% below %.5f mm, 90 %% below %.5f mm, 99 %% below "
         "%.5f mm\n",
         a->q50_mm, a->q90_mm, a->q99_mm);
+    cli_print_quality(&m->quality);
     printf("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
            (long long)m->train_samples, (unsigned long long)m->seed, m->version);
     if (m->fine_width) printf("fine level   %zu units a layer (docs/grids.md)\n", m->fine_width);
@@ -62,6 +64,15 @@ static void json_accuracy(sdm_json *j, const sdm_accuracy *a)
     sdm_json_real(j, "q50_mm", a->q50_mm);
     sdm_json_real(j, "q90_mm", a->q90_mm);
     sdm_json_real(j, "q99_mm", a->q99_mm);
+    sdm_json_close(j, '}');
+}
+
+static void json_quality(sdm_json *j, const sdm_model_quality *q)
+{
+    sdm_json_open(j, "quality", '{');
+    sdm_json_text(j, "grade", q->grade);
+    sdm_json_real(j, "cut", q->cut);
+    sdm_json_real(j, "between_mm", q->between_mm);
     sdm_json_close(j, '}');
 }
 
@@ -96,6 +107,7 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     sdm_json_close(&j, '}');
     // accuracy, training and file
     json_accuracy(&j, &m->accuracy);
+    json_quality(&j, &m->quality);
     sdm_json_uint(&j, "seed", m->seed);
     sdm_json_real(&j, "train_seconds", m->train_seconds);
     sdm_json_int(&j, "train_samples", m->train_samples);

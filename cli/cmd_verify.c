@@ -7,6 +7,7 @@
 #include "inputs/setup.h"
 #include "inputs/vdb_child.h"
 #include "report/files.h"
+#include "report/report_quality.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
 #include "sdm/volume.h"
@@ -116,6 +117,7 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
     sdm_status s = cli_open_registry(args, &registry, err);
     if (!s) s = cli_open_model(path, &model, err); // verifies every checksum
     const sdm_model_info *info = s ? NULL : sdm_model_get_info(model);
+    if (!s) cli_warn_quality(path, info);
     const bool known = !s && sdm_registry_find(registry, info->shape, NULL);
     if (!s && known) s = sdm_runtime_instance(model, registry, &shape, err);
     if (!s && known)
@@ -137,6 +139,12 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
 sdm_status cmd_verify(const cli_args *args, sdm_error *err)
 {
     const char *path = args->files.items[0];
-    if (cli_ends_with(path, ".vdb")) return verify_vdb(args, path, err);
-    return sdm_volume_knows(path) ? verify_image(args, path, err) : verify_model(args, path, err);
+    const bool vdb = cli_ends_with(path, ".vdb"), image = sdm_volume_knows(path);
+    if ((vdb || image) && (args->samples >= 0 || args->seed >= 0))
+        return sdm_fail(err, SDM_E_ARG,
+                        "verify: --%s does nothing for %s: it is for the random shapes of a model",
+                        args->samples >= 0 ? "samples" : "seed", path);
+    return vdb     ? verify_vdb(args, path, err)
+           : image ? verify_image(args, path, err)
+                   : verify_model(args, path, err);
 }

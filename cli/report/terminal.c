@@ -9,6 +9,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "args/options.h"
+
 static bool quiet_wanted;
 static cli_form form;
 static volatile sig_atomic_t interrupts;
@@ -90,7 +92,10 @@ static bool has_place(const char *line, size_t length)
 int cli_report(const sdm_error *err)
 {
     const bool colour = wants_colour();
-    const char *text = err->text[0] ? err->text : sdm_status_name(err->status);
+    char named[SDM_ERROR_TEXT_MAX];
+    snprintf(named, sizeof named, "%s", err->text[0] ? err->text : sdm_status_name(err->status));
+    cli_name_options(named);
+    const char *text = named;
     if (form == CLI_FORM_JSON) {
         cli_json_line("error", text);
         return exit_code_of(err->status);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/grid_cut.h"
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "report/exact_layers.h"
@@ -12,7 +13,6 @@
 #include "report/points_table.h"
 #include "report/progress_bar.h"
 #include "report/report_audit.h"
-#include "report/report_cut.h"
 #include "report/terminal.h"
 #include "sdm/exact.h"
 #include "sdm/internal/block_border.h"

@@ -4,6 +4,8 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/grid_cut.h"
+#include "inputs/model_grade.h"
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "report/generate_files.h"
@@ -11,8 +13,6 @@
 #include "report/output.h"
 #include "report/points_table.h"
 #include "report/progress_bar.h"
-#include "report/report_cut.h"
-#include "report/report_quality.h"
 #include "report/terminal.h"
 #include "sdm/field.h"
 #include "sdm/image.h"
@@ -196,29 +196,6 @@ static sdm_status check_options(const cli_args *args, sdm_error *err)
     return cli_check_vdb_options(args, err);
 }
 
-/* Longest edge of a voxel of the model's own grid, mm. */
-static double own_voxel(const job *j)
-{
-    const double *h = j->info->grid.spacing;
-    return fmax(h[0], fmax(h[1], h[2]));
-}
-
-/* On another grid: what the stated error leaves out. */
-static void notice_between(const job *j)
-{
-    const double between = j->info->quality.between_mm, rmse = j->info->accuracy.rmse_mm;
-    if (isnan(between))
-        cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
-                   "interpolation between them adds to it, at creases up to sqrt(3)/2 of their "
-                   "edge, %.2g mm; --check measures this map",
-                   rmse, 0.866 * own_voxel(j));
-    else
-        cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
-                   "between them linear interpolation of exact maps misses the surface by %.2g mm "
-                   "RMS; --check measures this map",
-                   rmse, between);
-}
-
 /* Opens the model and checks everything before the first map is made. */
 static sdm_status prepare_job(job *j, sdm_error *err)
 {
@@ -233,7 +210,6 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
     if (!s) s = check_rows(j, err);
-    if (!s && !j->own) notice_between(j);
     // with --params: check the names of the files of the last row, which are the longest
     if (!s && args->rows) s = cli_row_files_check(args, j->n_rows, err);
     return s ? s : allocate_maps(j, err);
@@ -296,11 +272,11 @@ static void add_check(job *j, const sdm_check *c)
     all->outside += c->outside;
 }
 
-/* where = "line 3, row 2: ", or "" without a table. */
+/* where = "row 2 (line 3): ", or "" without a table. */
 static void name_row(const job *j, size_t row, char where[48])
 {
     where[0] = 0;
-    if (j->lines) snprintf(where, 48, "line %d, row %zu: ", j->lines[row], row + 1);
+    if (j->lines) snprintf(where, 48, "row %zu (line %d): ", row + 1, j->lines[row]);
 }
 
 /* Moves the parameters of the row into the trained range, with a notice. */
@@ -523,6 +499,30 @@ static sdm_status run_points(job *j, sdm_error *err)
     return s;
 }
 
+/* Longest edge of a voxel of the model's own grid, mm. */
+static double own_voxel(const job *j)
+{
+    const double *h = j->info->grid.spacing;
+    return fmax(h[0], fmax(h[1], h[2]));
+}
+
+/* On another grid, unless the errors there are measured: what the stated error leaves out. */
+static void notice_between(const job *j)
+{
+    if (j->own || j->args->check || j->args->max_error > 0 || j->n_exact == j->n_rows) return;
+    const double between = j->info->quality.between_mm, rmse = j->info->accuracy.rmse_mm;
+    if (isnan(between))
+        cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
+                   "interpolation between them adds to it, at creases up to sqrt(3)/2 of their "
+                   "edge, %.2g mm; --check measures this map",
+                   rmse, 0.866 * own_voxel(j));
+    else
+        cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
+                   "between them linear interpolation of exact maps misses the surface by %.2g mm "
+                   "RMS; --check measures this map",
+                   rmse, between);
+}
+
 static sdm_status run_maps(job *j, sdm_error *err)
 {
     cli_progress progress;
@@ -534,6 +534,7 @@ static sdm_status run_maps(job *j, sdm_error *err)
         cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j->n_rows, NULL);
     }
     cli_progress_end(&progress, !s);
+    if (!s && !j->args->json) notice_between(j);
     return !s && j->args->json ? print_json(j, err) : s;
 }
 

@@ -3,13 +3,13 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/model_grade.h"
 #include "inputs/setup.h"
 #include "inputs/vdb_child.h"
 #include "report/files.h"
 #include "report/json_values.h"
 #include "report/report_audit.h"
 #include "report/report_image.h"
-#include "report/report_quality.h"
 #include "report/terminal.h"
 #include "sdm/internal/distribution.h"
 #include "sdm/memory.h"

@@ -4,10 +4,10 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/model_grade.h"
 #include "inputs/setup.h"
 #include "inputs/vdb_child.h"
 #include "report/files.h"
-#include "report/report_quality.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
 #include "sdm/volume.h"

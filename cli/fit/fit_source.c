@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "fit_command.h"
+#include "inputs/model_grade.h"
 #include "inputs/setup.h"
 #include "report/report_audit.h"
-#include "report/report_quality.h"
 #include "sdm/memory.h"
 
 static sdm_status open_model(cli_fit *f, sdm_error *err)

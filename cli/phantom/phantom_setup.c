@@ -2,9 +2,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "inputs/grid_cut.h"
 #include "phantom_command.h"
 #include "report/report_audit.h"
-#include "report/report_cut.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
 

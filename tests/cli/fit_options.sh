@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: which options apply to which kind of target, against the table in docs/fitting.md.
-# Tests: fit_applies.c
+# Tests: fit_applies.c fit_size.c option_names.c
 . "$(dirname "$0")/common.sh"
 shape='--shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2'
 expect 0 - sdmgen phantom $shape --spacing 0.8 -o image.nii --label labels.nii --quiet
@@ -46,5 +46,6 @@ grep -q 'are they in um?' err || bad "micrometres: $(cat err)"
 sdmgen fit $shape points.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
 grep -q 'lengths are mm' err && bad "millimetres: $(cat err)"
 # options have the names of the command line
+grep -q -- '(--max-iterations)' err || bad "no option in: $(cat err)"
 grep -q 'sdm_fit_opts' out err && bad "names of C: $(cat out err)"
 finish

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen generate, info, eval and verify on a trained model: outputs, parameters, tables of parameters, damaged files.
-# Tests: cmd_eval.c cmd_generate.c cmd_info.c cmd_verify.c evaluate.c evaluate_time.c param_rows.c
+# Tests: cmd_eval.c cmd_generate.c cmd_info.c cmd_verify.c evaluate.c evaluate_time.c model_grade.c param_rows.c
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm
 present $model
@@ -8,7 +8,9 @@ present $model
 expect 0 - sdmgen info $model
 has "of shape 'cochlea'"
 has '^parameters +a +2 \.\. 5 mm, default [0-9.]+, uniform$'
+has '^verdict +(good|usable|poor); the grid cuts [0-9.]+ % of the held-out shapes$'
 expect 0 - sdmgen info $model --json
+has '"quality": *\{"grade": *"(good|usable|poor)", "cut": [0-9.]+, "between_mm": [0-9.e-]+\}'
 for key in checksum train_seconds rmse_mm q99_mm weight_bytes; do [ -n "$(json $key)" ] || bad "info: no $key"; done
 
 has '"name": "a", .*"distribution": "uniform"\}'

@@ -78,9 +78,8 @@ sdm_status sdm_fine_open(sdm_model *m, const sdm_section *sections, size_t n, sd
 /* Appends the content of the section "quality" to *t; nothing without a grade. */
 void sdm_quality_describe(const sdm_model_quality *q, sdm_text *t);
 
-/* *q = the section "quality" of a model, or no quality if there is none. SDM_E_FORMAT. */
-sdm_status sdm_quality_read(const sdm_section *sections, size_t n, sdm_model_quality *q,
-                            sdm_error *err);
+/* *q = the content of the section "quality"; NULL: no quality. SDM_E_FORMAT. */
+sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sdm_error *err);
 
 /* The section `name` among sections[n], or NULL. */
 const sdm_section *sdm_section_find(const sdm_section *sections, size_t n, const char *name);

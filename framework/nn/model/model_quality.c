@@ -13,11 +13,9 @@ void sdm_quality_describe(const sdm_model_quality *q, sdm_text *t)
     if (!isnan(q->between_mm)) sdm_text_add_real(t, "between_mm", q->between_mm);
 }
 
-sdm_status sdm_quality_read(const sdm_section *sections, size_t n, sdm_model_quality *q,
-                            sdm_error *err)
+sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sdm_error *err)
 {
     static const char *const grades[] = {"good", "usable", "poor"};
-    const sdm_section *section = sdm_section_find(sections, n, "quality");
     *q = (sdm_model_quality){"", NAN, NAN};
     if (!section) return SDM_OK;
     sdm_lines r = {.at = section->data};

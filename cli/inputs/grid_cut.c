@@ -1,12 +1,12 @@
 /* Warns of a grid that cuts a shape, by the vertices of its mesh or by its map. */
-#include "report_cut.h"
+#include "grid_cut.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "report/terminal.h"
 #include "sdm/internal/shape_box.h"
-#include "terminal.h"
 
 /* beyond[axis][side]: how far the shape reaches beyond the first and the last voxel, mm; least:
  * these are lower bounds. */

@@ -1,12 +1,12 @@
 /* Prints the verdict of the training on a model, and warns of models that are poor or cut shapes.
  */
-#include "report_quality.h"
+#include "model_grade.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "terminal.h"
+#include "report/terminal.h"
 
 /* Largest fraction of the shapes that the grid of a good model cuts (docs/network.md). */
 #define CUT_MAX 0.05

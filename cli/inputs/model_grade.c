@@ -22,7 +22,8 @@ void cli_warn_quality(const char *path, const sdm_model_info *m)
                  "with grid: auto)",
                  100 * q->cut);
     if (poor || cut)
-        cli_warn("%s: %s%s%s", path, poor ? "the training graded this model poor" : "",
+        cli_warn("%s: %s%s%s", path,
+                 poor ? "the training graded this model poor (sdmgen info)" : "",
                  poor && cut ? "; " : "", shapes);
 }
 

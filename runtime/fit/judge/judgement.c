@@ -282,11 +282,13 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err
     if (!s && is_image(p)) check_tissues(p, &residuals, r, v);
     sdm_fit_residuals_dispose(&residuals);
     if (!s && is_image(p)) s = check_blob(p, r, v, err);
-    // the first one that failed; but a shape that the grid cuts fails for this reason
+    // the first one that failed; but where the image shows a shape, a grid that cuts it is the
+    // reason
     const sdm_fit_finding *why = NULL;
     for (size_t i = 0; i < v->n_findings; i++) {
         const sdm_fit_finding *x = &v->findings[i];
-        if (x->grade == SDM_FIT_FAILED && (!why || x->kind == SDM_FIT_CHECK_GRID)) why = x;
+        const bool cut = x->kind == SDM_FIT_CHECK_GRID && why && why->kind > SDM_FIT_CHECK_CONTRAST;
+        if (x->grade == SDM_FIT_FAILED && (!why || cut)) why = x;
     }
     return s || !why ? s : sdm_fail(err, SDM_E_QUALITY, "%s", why->text);
 }

@@ -34,7 +34,8 @@ typedef enum cli_form {
 void cli_set_form(const char *name);
 cli_form cli_get_form(void);
 
-/* Prints a finished JSON object as one line on stderr and frees it; an incomplete one is dropped. */
+/* Prints a finished JSON object as one line on stderr and frees it; an incomplete one is dropped.
+ */
 void cli_json_line(sdm_json *json);
 
 /* Prints the message of a failure on stderr, "sdmgen: error: text". Lines of a configuration error

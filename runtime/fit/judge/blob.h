@@ -1,6 +1,6 @@
-/* Compares the fitted shape with a blob, the ellipsoid that has its volume, centre of mass and second
-   moments. If the blob explains the image as well as the shape, the image does not show the shape's
-   form. */
+/* Compares the fitted shape with a blob, the ellipsoid that has its volume, centre of mass and
+   second moments. If the blob explains the image as well as the shape, the image does not show the
+   shape's form. */
 #pragma once
 
 #include "fit/solver/problem.h"

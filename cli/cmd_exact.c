@@ -321,7 +321,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
         sdm_json_int(&json, "below_zero", (int64_t)c->below_zero);
     }
     sdm_json_text(&json, "values_crc64", hash);
-    cli_json_grid(&json, "grid", &j->grid, false);
+    sdm_json_grid(&json, "grid", &j->grid, false);
     sdm_json_close(&json, '}');
     return cli_print_json(&json, err);
 }

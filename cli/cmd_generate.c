@@ -383,7 +383,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
     if (j->shape && (j->args->check || j->args->max_error > 0)) add_check_json(j, &json);
     sdm_json_real(&json, "error_rmse_mm", j->info->accuracy.rmse_mm);
     sdm_json_text(&json, "values_crc64", hash);
-    cli_json_grid(&json, "grid", &j->grid, false);
+    sdm_json_grid(&json, "grid", &j->grid, false);
     if (j->n_rows == 1) cli_json_params(&json, "parameters", j->params, j->info->n_params, j->rows);
     sdm_json_close(&json, '}');
     return cli_print_json(&json, err);

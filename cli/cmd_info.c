@@ -49,22 +49,6 @@ static void print_model(const char *path, const sdm_model_info *m)
            m->weight_bytes, (unsigned long long)m->checksum);
 }
 
-static void json_accuracy(sdm_json *j, const sdm_accuracy *a)
-{
-    sdm_json_open(j, "accuracy", '{');
-    sdm_json_int(j, "samples", a->samples);
-    sdm_json_real(j, "mse_mm2", a->mse_mm2);
-    sdm_json_real(j, "rmse_mm", a->rmse_mm);
-    sdm_json_real(j, "mae_mm", a->mae_mm);
-    sdm_json_real(j, "max_abs_mm", a->max_abs_mm);
-    sdm_json_real(j, "rmse_near_mm", a->rmse_near_mm);
-    sdm_json_real(j, "near_mm", a->near_mm);
-    sdm_json_real(j, "q50_mm", a->q50_mm);
-    sdm_json_real(j, "q90_mm", a->q90_mm);
-    sdm_json_real(j, "q99_mm", a->q99_mm);
-    sdm_json_close(j, '}');
-}
-
 static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_error *err)
 {
     char checksum[32];
@@ -76,26 +60,14 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     sdm_json_text(&j, "kind", m->kind);
     sdm_json_text(&j, "shape", m->shape);
     sdm_json_text(&j, "version", m->version);
-    cli_json_grid(&j, "grid", &m->grid, false);
-    // parameters and options
-    sdm_json_open(&j, "parameters", '[');
-    for (size_t i = 0; i < m->n_params; i++) {
-        sdm_json_open(&j, NULL, '{');
-        sdm_json_text(&j, "name", m->params[i].name);
-        sdm_json_text(&j, "unit", m->params[i].unit);
-        sdm_json_real(&j, "min", m->params[i].min);
-        sdm_json_real(&j, "max", m->params[i].max);
-        sdm_json_real(&j, "default", m->params[i].def);
-        cli_json_distribution(&j, &m->params[i].distribution);
-        sdm_json_close(&j, '}');
-    }
-    sdm_json_close(&j, ']');
-    sdm_json_open(&j, "options", '{');
-    for (size_t i = 0; i < m->n_options; i++)
-        sdm_json_text(&j, m->option_names[i], m->option_values[i]);
-    sdm_json_close(&j, '}');
+    sdm_json_grid(&j, "grid", &m->grid, false);
+    cli_json_model_params(&j, m, NULL);
     // accuracy, training and file
-    json_accuracy(&j, &m->accuracy);
+    sdm_json_open(&j, "accuracy", '{');
+    sdm_json_int(&j, "samples", m->accuracy.samples);
+    sdm_json_real(&j, "mse_mm2", m->accuracy.mse_mm2);
+    cli_json_accuracy(&j, &m->accuracy);
+    sdm_json_close(&j, '}');
     sdm_json_uint(&j, "seed", m->seed);
     sdm_json_real(&j, "train_seconds", m->train_seconds);
     sdm_json_int(&j, "train_samples", m->train_samples);

@@ -46,8 +46,8 @@ const char *page_message(void) { return failure.text; }
 
 void *page_alloc(size_t size) { return malloc(size); }
 
-/* The shape of the model for maps by the exact engine: a built-in one without data files, or none.
- */
+/* shape = an instance of the model's shape, from which the exact engine makes maps. NULL if the
+   shape is no built-in one or needs a data file: a page has neither plug-ins nor files. */
 static void open_shape(void)
 {
     sdm_registry *shapes = NULL;

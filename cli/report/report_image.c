@@ -45,8 +45,8 @@ void cli_json_volume(sdm_json *j, const char *path, const sdm_volume *v)
     sdm_json_text(j, "file", path);
     sdm_json_text(j, "type", "image");
     sdm_json_text(j, "voxel_type", sdm_voxel_name(v->stored));
-    cli_json_grid(j, "grid", &v->grid, false);
-    cli_json_reals(j, "direction", v->grid.dir, 9);
+    sdm_json_grid(j, "grid", &v->grid, false);
+    sdm_json_reals(j, "direction", v->grid.dir, 9);
     sdm_json_bool(j, "placed", v->placed);
     sdm_json_int(j, "layers", (int64_t)v->n_layers);
     sdm_json_real(j, "min", (double)v->min);

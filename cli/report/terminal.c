@@ -49,14 +49,20 @@ void cli_set_form(const char *name)
 
 cli_form cli_get_form(void) { return form; }
 
-void cli_json_line(const char *key, const char *text)
+void cli_json_line(sdm_json *json)
+{
+    if (!json->text.failed) fprintf(stderr, "%s\n", json->text.data);
+    sdm_json_dispose(json);
+}
+
+/* Prints an object with one member. */
+static void print_json_message(const char *key, const char *text)
 {
     sdm_json json = {0};
     sdm_json_open(&json, NULL, '{');
     sdm_json_text(&json, key, text);
     sdm_json_close(&json, '}');
-    if (!json.text.failed) fprintf(stderr, "%s\n", json.text.data);
-    sdm_json_dispose(&json);
+    cli_json_line(&json);
 }
 
 bool cli_has_terminal(void)
@@ -92,7 +98,7 @@ int cli_report(const sdm_error *err)
     const bool colour = wants_colour();
     const char *text = err->text[0] ? err->text : sdm_status_name(err->status);
     if (form == CLI_FORM_JSON) {
-        cli_json_line("error", text);
+        print_json_message("error", text);
         return exit_code_of(err->status);
     }
     while (*text) {
@@ -116,7 +122,7 @@ static void print_line(const char *kind, const char *begin, const char *fmt, va_
         va_end(again);
         char *text = length < 0 ? NULL : malloc((size_t)length + 1);
         if (text) vsnprintf(text, (size_t)length + 1, fmt, args);
-        cli_json_line(kind, text ? text : fmt);
+        print_json_message(kind, text ? text : fmt);
         free(text);
         return;
     }

@@ -34,8 +34,9 @@ typedef enum cli_form {
 void cli_set_form(const char *name);
 cli_form cli_get_form(void);
 
-/* Prints {"key":"text"} as a line on stderr. */
-void cli_json_line(const char *key, const char *text);
+/* Prints a finished JSON object as one line on stderr and frees it; an incomplete one is dropped.
+ */
+void cli_json_line(sdm_json *json);
 
 /* Prints the message of a failure on stderr, "sdmgen: error: text". Lines of a configuration error
    that begin with the place of the mistake, "file:line:column:", have no such prefix. Returns the

@@ -219,7 +219,7 @@ static void print_times(const network_times *t, const sdm_model_info *info)
 
 static void add_field_json(const cli_field_times *t, sdm_json *j)
 {
-    cli_json_grid(j, "field_grid", &t->grid, false);
+    sdm_json_grid(j, "field_grid", &t->grid, false);
     sdm_json_real(j, "ms_field_params", t->ms_params);
     sdm_json_real(j, "ms_field_map", t->ms_map);
     sdm_json_real(j, "ms_field_band", t->ms_band);

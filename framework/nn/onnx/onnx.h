@@ -35,6 +35,17 @@ typedef void (*sdm_onnx_fill)(const void *user, size_t item, float *to);
 sdm_onnx_value sdm_onnx_weights(sdm_onnx *g, const char *what, size_t n_dims, const size_t *dims,
                                 sdm_onnx_fill fill, const void *user);
 
+/* A layer of a network: `user` of the function that fills the matrix of sdm_onnx_layer_weights().
+ */
+typedef struct sdm_onnx_layer {
+    const void *network;
+    size_t layer;
+} sdm_onnx_layer;
+
+/* The matrix [rows][columns] of a layer; the network must live as long as the graph. */
+sdm_onnx_value sdm_onnx_layer_weights(sdm_onnx *g, size_t rows, size_t columns, sdm_onnx_fill fill,
+                                      const void *network, size_t layer);
+
 /* Tensors with given elements, which must live as long as the graph: floats, 32-bit integers, and a
    copied list of n 64-bit integers. */
 sdm_onnx_value sdm_onnx_floats(sdm_onnx *g, const char *what, size_t n_dims, const size_t *dims,

@@ -92,6 +92,16 @@ sdm_onnx_value sdm_onnx_weights(sdm_onnx *g, const char *what, size_t n_dims, co
     return add_tensor(g, ONNX_FLOAT, what, n_dims, dims, fill, user, NULL);
 }
 
+sdm_onnx_value sdm_onnx_layer_weights(sdm_onnx *g, size_t rows, size_t columns, sdm_onnx_fill fill,
+                                      const void *network, size_t layer)
+{
+    const size_t dims[] = {rows, columns};
+    sdm_onnx_layer *user = sdm_onnx_memory(g, 1, sizeof *user);
+    if (!user) return 0;
+    *user = (sdm_onnx_layer){network, layer};
+    return sdm_onnx_weights(g, "layer", 2, dims, fill, user);
+}
+
 sdm_onnx_value sdm_onnx_floats(sdm_onnx *g, const char *what, size_t n_dims, const size_t *dims,
                                const float *values)
 {

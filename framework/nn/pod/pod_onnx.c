@@ -44,23 +44,16 @@ static void read_row(sdm_pod_type type, const void *weights, size_t at, size_t n
         sdm_panel_row_i8(n_wide, k, (const int8_t *)weights + at, row, w);
         return;
     }
-    at += row / SDM_PANEL * SDM_PANEL * k + row % SDM_PANEL;
-    for (size_t i = 0; i < k; i++, at += SDM_PANEL)
-        w[i] = type == SDM_POD_F16 ? sdm_half_to_float(((const uint16_t *)weights)[at])
-                                   : ((const float *)weights)[at];
+    for (size_t i = 0; i < k; i++)
+        w[i] = sdm_weight_at(weights, type == SDM_POD_F16, at + sdm_panel_index(k, row, i));
 }
 
 // weights
 
-typedef struct mlp_layer {
-    const pod_network *m;
-    size_t layer;
-} mlp_layer;
-
 static void fill_layer(const void *user, size_t row, float *to)
 {
-    const mlp_layer *l = user;
-    const pod_network *m = l->m;
+    const sdm_onnx_layer *l = user;
+    const pod_network *m = l->network;
     const size_t k = sdm_pod_layer_inputs(&m->arch, l->layer);
     read_row(m->type, m->layer[l->layer], 0, k, k, row, to);
     for (size_t i = 0; i < k && m->type == SDM_POD_I8; i++) to[i] *= m->layer_scale[l->layer][row];
@@ -150,11 +143,9 @@ static sdm_onnx_value mlp(const pod_network *m, sdm_onnx *g, sdm_onnx_value h)
 {
     const sdm_pod_arch *a = &m->arch;
     for (size_t l = 0; l < a->depth; l++) {
-        mlp_layer *user = sdm_onnx_memory(g, 1, sizeof *user);
-        if (!user) return 0;
-        *user = (mlp_layer){m, l};
-        const size_t dims[] = {a->width, sdm_pod_layer_inputs(a, l)};
-        h = sdm_onnx_node2(g, "MatMul", sdm_onnx_weights(g, "layer", 2, dims, fill_layer, user), h);
+        const sdm_onnx_value w =
+            sdm_onnx_layer_weights(g, a->width, sdm_pod_layer_inputs(a, l), fill_layer, m, l);
+        h = sdm_onnx_node2(g, "MatMul", w, h);
         h = sdm_onnx_node2(
             g, "Add", h, sdm_onnx_floats(g, "bias", 2, (const size_t[]){a->width, 1}, m->bias[l]));
         h = sdm_onnx_activate(g, a->activation, h);

@@ -38,8 +38,8 @@ typedef struct template_graph {
     sdm_onnx_value correction; /* [N][its voxels]; 0: none */
     part_graph part[SDM_TEMPLATE_MAX_PARTS];
     layer_graph layer;
-    sdm_onnx_value voxels;  /* [4][V] (i, j, k, 1) of the voxels of the first layer (not of warps) */
-    sdm_onnx_value edges;   /* [4][2 cy cx] of the corners of its blocks (rigid parts only) */
+    sdm_onnx_value voxels; /* [4][V] (i, j, k, 1) of the voxels of the first layer (not of warps) */
+    sdm_onnx_value edges;  /* [4][2 cy cx] of the corners of its blocks (rigid parts only) */
     sdm_onnx_value middles; /* [4][by bx] of their middles (the same) */
 } template_graph;
 

@@ -75,12 +75,6 @@ static sdm_status describe(const sdm_model *m, sdm_onnx *g, sdm_error *err)
 
 sdm_status sdm_model_write_onnx(const sdm_model *m, const char *path, sdm_error *err)
 {
-    if (!m->kind->onnx)
-        return sdm_fail(err, SDM_E_UNSUPPORTED,
-                        "a network of kind '%s' cannot be written as ONNX: it carries its template "
-                        "along by interpolation at displaced points of space, for which opset 13 "
-                        "has no operator; train one of another kind (network.kind: pod)",
-                        m->kind->name);
     const size_t dims[] = {(size_t)m->info.grid.n[2], (size_t)m->info.grid.n[1],
                            (size_t)m->info.grid.n[0]};
     sdm_onnx *g;

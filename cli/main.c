@@ -22,7 +22,7 @@ static sdm_status (*const functions[CLI_N_COMMANDS])(const cli_args *args, sdm_e
     [CLI_SHAPES] = cmd_shapes,   [CLI_INFO] = cmd_info,         [CLI_VERIFY] = cmd_verify,
     [CLI_CONFIG] = cmd_config,   [CLI_BENCH] = cmd_bench,       [CLI_EXPERIMENT] = cmd_experiment,
     [CLI_PHANTOM] = cmd_phantom, [CLI_FIT] = cmd_fit,           [CLI_EXPORT] = cmd_export,
-    [CLI_HELP] = cmd_help};
+    [CLI_IMPORT] = cmd_import,   [CLI_HELP] = cmd_help};
 
 static int print_help(const cli_command *command)
 {

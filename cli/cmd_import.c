@@ -61,16 +61,20 @@ static sdm_status read_source(const cli_args *args, const char *path, sdm_ssm *m
 {
     struct stat info;
     if (stat(path, &info) == 0 && S_ISDIR(info.st_mode)) {
-        if (args->import.model || args->import.surface)
+        if (args->import.model)
+            return sdm_fail(err, SDM_E_ARG, "import: --model does nothing with a folder");
+        if (cli_ssm_has_particles(path)) return cli_ssm_particles(args, path, m, err);
+        if (args->import.surface || args->import.particles)
             return sdm_fail(err, SDM_E_ARG,
-                            "import: --model and --surface do nothing with a folder of meshes");
+                            "import: --surface and --particles do nothing with a folder of meshes");
         return cli_ssm_meshes(args, path, m, err);
     }
-    if (args->import.scale)
-        return sdm_fail(err, SDM_E_ARG, "import: --scale needs a folder of meshes");
+    if (args->import.scale || args->import.particles)
+        return sdm_fail(err, SDM_E_ARG, "import: --scale and --particles need a folder");
     if (!cli_ends_with_any(path, ".h5 .hdf5 .h5.json"))
         return sdm_fail(err, SDM_E_ARG,
-                        "import: source '%s': need a model .h5 or .h5.json, or a folder of meshes",
+                        "import: source '%s': need a model .h5 or .h5.json, or a folder of meshes "
+                        "or particles",
                         path);
     return cli_ssm_statismo(args, path, m, err);
 }

@@ -148,8 +148,9 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "statistical shape is, with a morph target for each of its first eight parameters.",
      "sdmgen export runs/cochlea/model.sdm -o cochlea.onnx", 0, 1},
     {"import", "ssm SOURCE -o FILE.ssm", "turn a statistical shape model into a file of sdmgen",
-     "SOURCE is a model of Scalismo or Statismo (.h5, or .h5.json), or a folder of meshes whose\n"
-     "points correspond: they are aligned, and their principal components become the modes.\n"
+     "SOURCE is a model of Scalismo or Statismo (.h5, or .h5.json), a folder of meshes whose\n"
+     "points correspond, or a folder of the particles of ShapeWorks (.particles) with a mesh\n"
+     "(--surface): they are aligned, and their principal components become the modes.\n"
      "The shape 'statistical' takes the file by its option model. Prints how much of the\n"
      "variance each mode has.",
      "sdmgen import ssm femur.h5 -o femur.ssm --variance 0.98 --frame ras", 2, 2},
@@ -270,12 +271,15 @@ const cli_option cli_options[] = {
     {"unit", 0, CLI_CHOICE, NULL, "mm|cm|m|um", 0, 0, ON(CLI_IMPORT), AT(import.unit),
      "unit of the source (default mm)"},
     {"surface", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_IMPORT), AT(import.surface),
-     "mesh whose vertices are the points of the model and whose triangles are used, for a model "
-     "without triangles"},
+     "mesh whose triangles are used, for a model without triangles: its vertices are the points; "
+     "for particles: the mesh of one shape, which is warped onto the others"},
+    {"particles", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_IMPORT), AT(import.particles),
+     "folder of particles: those on the mesh of --surface (default: NAME_local.particles for "
+     "NAME.vtk; else its vertices are the particles)"},
     {"model", 0, CLI_TEXT, "NAME", NULL, 0, 0, ON(CLI_IMPORT), AT(import.model),
      "which model of a file with several (its catalog)"},
     {"scale", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_IMPORT), AT(import.scale),
-     "folder of meshes: remove differences of size (default: size is a part of shape)"},
+     "folder: remove differences of size (default: size is a part of shape)"},
     {"closest", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(closest),
      "also write the nearest surface point of every voxel: float32 [z][y][x][3], mm"},
     {"normal", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(normal),

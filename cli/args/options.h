@@ -111,7 +111,7 @@ typedef struct cli_import_args {
     int64_t modes;
     double variance;
     bool scale;
-    const char *model, *surface, *frame, *unit;
+    const char *model, *surface, *particles, *frame, *unit;
 } cli_import_args;
 
 /* A parsed command line. Options that are missing keep the default stated in their help text; seed

@@ -13,3 +13,12 @@ sdm_status cli_ssm_statismo(const cli_args *args, const char *path, sdm_ssm *out
 /* Makes a model of the mesh files of a folder, which have the same triangles: sdm_ssm_align(),
  * sdm_ssm_components(). Errors as above. */
 sdm_status cli_ssm_meshes(const cli_args *args, const char *folder, sdm_ssm *out, sdm_error *err);
+
+/* True when the folder has files .particles. */
+bool cli_ssm_has_particles(const char *folder);
+
+/* Makes a model of the particles of ShapeWorks in a folder: the mesh of --surface, warped onto the
+ * particles of all shapes (sdm_ssm_warp()), then as above. --particles names those of the mesh;
+ * without it they are found by the name of the mesh, or are its vertices. Errors as above. */
+sdm_status cli_ssm_particles(const cli_args *args, const char *folder, sdm_ssm *out,
+                             sdm_error *err);

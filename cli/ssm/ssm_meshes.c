@@ -1,24 +1,11 @@
 /* A shape model of the corresponding meshes in a folder. */
-#include <dirent.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "import_ssm.h"
 #include "report/files.h"
-#include "sdm/internal/ssm_build.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
-
-static int is_mesh(const struct dirent *entry)
-{
-    return entry->d_name[0] != '.' && cli_ends_with_any(entry->d_name, CLI_MESH_ENDINGS);
-}
-
-static int by_name(const struct dirent **a, const struct dirent **b)
-{
-    return strcmp((*a)->d_name, (*b)->d_name); // whatever the locale is
-}
+#include "ssm_folder.h"
 
 /* Reads one mesh into vert[n_vert][3]. The first one, *vert NULL, sets the sizes and triangles. */
 static sdm_status read_shape(const char *path, size_t n, size_t index, double **vert, sdm_ssm *out,
@@ -44,40 +31,21 @@ static sdm_status read_shape(const char *path, size_t n, size_t index, double **
     return s;
 }
 
-static sdm_status build(size_t n, double *vert, bool scale, sdm_ssm *out, sdm_error *err)
-{
-    double *mean = NULL;
-    // the components begin with an empty model
-    uint32_t *tri = out->tri;
-    const size_t n_vert = out->n_vert, n_tri = out->n_tri;
-    *out = (sdm_ssm){0};
-    sdm_status s = SDM_ALLOC(&mean, 3 * n_vert, "mean shape", err);
-    if (!s) s = sdm_ssm_align(n, n_vert, scale, vert, mean, err);
-    if (!s) s = sdm_ssm_components(n, n_vert, vert, mean, out, err);
-    out->tri = tri, out->n_tri = n_tri;
-    sdm_free(mean);
-    return s;
-}
-
 sdm_status cli_ssm_meshes(const cli_args *args, const char *folder, sdm_ssm *out, sdm_error *err)
 {
-    struct dirent **files = NULL;
+    cli_list files;
     double *vert = NULL;
-    char path[4096];
-    sdm_status s = SDM_OK;
-    const int n = scandir(folder, &files, is_mesh, by_name);
-    if (n < 0) return sdm_fail(err, SDM_E_IO, "%s: cannot be read as a folder", folder);
-    if (n < 2)
-        s = sdm_fail(err, SDM_E_ARG, "%s: %d mesh files (" CLI_MESH_ENDINGS "), need at least 2",
-                     folder, n);
-    for (int i = 0; i < n && !s; i++) {
-        if (snprintf(path, sizeof path, "%s/%s", folder, files[i]->d_name) >= (int)sizeof path)
-            s = sdm_fail(err, SDM_E_ARG, "%.100s...: the name of a file is too long", path);
-        if (!s) s = read_shape(path, (size_t)n, (size_t)i, &vert, out, err);
-    }
-    if (!s) s = build((size_t)n, vert, args->import.scale, out, err);
-    for (int i = 0; i < n; i++) free(files[i]);
-    free(files);
+    sdm_status s = cli_folder_list(folder, CLI_MESH_ENDINGS, &files, err);
+    if (s) return s;
+    if (files.n < 2)
+        s = sdm_fail(err, SDM_E_ARG,
+                     "%s: %zu mesh files (" CLI_MESH_ENDINGS
+                     ") and no .particles; a model needs at least 2",
+                     folder, files.n);
+    for (size_t i = 0; i < files.n && !s; i++)
+        s = read_shape(files.items[i], files.n, i, &vert, out, err);
+    if (!s) s = cli_ssm_build(files.n, vert, args->import.scale, out, err);
+    cli_folder_free(&files);
     sdm_free(vert);
     return s;
 }

@@ -1,4 +1,5 @@
-/* Makes a statistical shape model of corresponding meshes: alignment and principal components. */
+/* Makes a statistical shape model of corresponding meshes: warps of a surface, alignment and
+ * principal components. */
 #pragma once
 
 #include <stdbool.h>
@@ -23,6 +24,17 @@ sdm_status sdm_ssm_align(size_t n, size_t n_vert, bool scale, double *vert, doub
    SDM_E_ARG: all shapes are equal; SDM_E_NOMEM. */
 sdm_status sdm_ssm_components(size_t n, size_t n_vert, double *vert, const double *mean,
                               sdm_ssm *out, sdm_error *err);
+
+/* The most points of sdm_ssm_warp(): it needs a matrix of their square. */
+#define SDM_SSM_WARP_MAX 8192
+
+/* out[n][n_vert][3] = vert[n_vert][3], warped so that the points from[n_point][3] move onto
+   to[k][n_point][3] in shape k: thin-plate splines in space (Duchon 1977; Bookstein 1989), the sum
+   of a linear map and of weights of the distances from the points. Linear maps of the points are
+   reproduced everywhere. One thread. SDM_E_ARG: fewer than 4 points, more than SDM_SSM_WARP_MAX,
+   two at the same place, all in one plane; SDM_E_NOMEM. */
+sdm_status sdm_ssm_warp(size_t n_point, const double *from, size_t n, const double *to,
+                        size_t n_vert, const double *vert, double *out, sdm_error *err);
 
 #ifdef __cplusplus
 }

@@ -21,7 +21,7 @@ os.chdir(folder.name)
 
 
 def sdmgen(*arguments):
-    return subprocess.run([program, *arguments], capture_output=True, text=True)
+    return subprocess.run([program, *arguments], capture_output=True, text=True, errors="replace")
 
 
 def surface(strips, kind):
@@ -100,39 +100,34 @@ def read(name):
     return reader.GetOutput()
 
 
-def compare(name, data, exact=True):
+def compare(name, data, target, exact=True):
     points, tri = triangles(data)
-    for target in ("back.vtk", "back.vtp"):
-        done = sdmgen("mesh", "--mesh", name, "-o", target)
-        assert done.returncode == 0, (name, done.stderr)
-        got_points, got_tri = triangles(read(target))
-        assert (got_tri == tri).all(), name
-        error = np.abs(got_points - points).max()
-        assert error == 0 if exact else error < 1e-4, (name, error)
+    done = sdmgen("mesh", "--mesh", name, "-o", target)
+    assert done.returncode == 0, (name, done.stderr)
+    got_points, got_tri = triangles(read(target))
+    assert (got_tri == tri).all(), name
+    error = np.abs(got_points - points).max()
+    assert error == 0 if exact else error < 1e-4, (name, error)
 
 
 written = []
-for strips in (False, True):
-    for kind in ("float", "double"):
-        data = surface(strips, kind)
-        for binary in (False, True):
-            for version in (42, 51):
-                name = f"l{strips:d}{kind}{binary:d}{version}.vtk"
-                write_legacy(data, name, binary, version)
-                compare(name, data, exact=binary)
-                written.append(name)
-        n = 0
-        for mode in ("ascii", "inline", "appended"):
-            for compress in (False, True):
-                for encode in (False, True):
-                    for header, ids, big in ((32, 32, False), (64, 64, False), (32, 64, True)):
-                        if mode != "appended" and encode or mode == "ascii" and compress:
-                            continue
-                        name = f"x{strips:d}{kind}{n}.vtp"
-                        n += 1
-                        write_xml(data, name, mode, compress, encode, header, ids, big)
-                        compare(name, data, exact=mode != "ascii")
-                        written.append(name)
+for strips, kind in ((False, "double"), (True, "float")):
+    data = surface(strips, kind)
+    for binary in (False, True):
+        for version in (42, 51):
+            name = f"l{strips:d}{binary:d}{version}.vtk"
+            write_legacy(data, name, binary, version)
+            compare(name, data, "back.vtp" if version == 42 else "back.vtk", exact=binary)
+            written.append(name)
+    for mode, compress, encode in (
+        ("ascii", False, False), ("inline", False, False), ("inline", True, False),
+        ("appended", False, False), ("appended", False, True), ("appended", True, False), ("appended", True, True),
+    ):
+        for header, ids, big in ((32, 32, False), (64, 64, False), (32, 64, True)):
+            name = f"x{strips:d}{len(written)}.vtp"
+            write_xml(data, name, mode, compress, encode, header, ids, big)
+            compare(name, data, "back.vtk" if big else "back.vtp", exact=mode != "ascii")
+            written.append(name)
 
 # other commands take them, too
 assert "triangles" in sdmgen("info", written[0]).stdout
@@ -174,19 +169,19 @@ for mode, compress, encode in (("ascii", 0, 0), ("inline", 0, 0), ("inline", 1, 
 for name in names:
     with open(name, "rb") as file:
         whole = file.read()
-    for trial in range(12):
+    for trial in range(6):
         broken = bytearray(whole)
-        if trial < 5:
+        if trial < 3:
             # data of points follow the mesh in .vtk files
             broken = broken[: chance.randrange(len(broken) * (1 if name.endswith("k") else 3) // 4)]
         else:
-            for _ in range(trial - 4):
+            for _ in range(trial - 2):
                 broken[chance.randrange(len(broken))] = chance.randrange(256)
         with open("broken" + name[-4:], "wb") as file:
             file.write(broken)
         done = sdmgen("mesh", "--mesh", "broken" + name[-4:], "-o", "never.ply")
         assert done.returncode in (0, 3), (name, trial, done)
-        if trial < 5:
+        if trial < 3:
             assert done.returncode == 3, (name, trial)
         if done.returncode:
             refused += 1
@@ -194,5 +189,5 @@ for name in names:
             assert not os.path.exists("never.ply")
         else:
             os.remove("never.ply")
-assert refused > 50
+assert refused > 30
 print(len(written), "files of VTK read,", refused, "damaged ones refused")

@@ -1,4 +1,5 @@
 /* sdmgen exact: computes the exact distance map of a shape or a mesh file. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -11,6 +12,7 @@
 #include "report/points_table.h"
 #include "report/progress_bar.h"
 #include "report/report_audit.h"
+#include "slicer/results_file.h"
 #include "report/terminal.h"
 #include "sdm/exact.h"
 #include "sdm/internal/block_border.h"
@@ -324,6 +326,20 @@ static sdm_status print_json(const job *j, sdm_error *err)
     return cli_print_json(&json, err);
 }
 
+/* Writes the file of --returnparameterfile. */
+static sdm_status write_results(const job *j, sdm_error *err)
+{
+    float min = NAN, max;
+    int64_t inside;
+    cli_results r = {0};
+    if (j->values) find_range(j, &min, &max, &inside);
+    cli_results_real(&r, "volume", j->report.audit.volume);
+    cli_results_text(&r, "closed", j->report.audit.closed ? "yes" : "no");
+    cli_results_real(&r, "error", j->report.union_error_mm + j->bound_mm);
+    cli_results_real(&r, "deepest", (double)min);
+    return cli_results_write(&r, j->args->returns, err);
+}
+
 sdm_status cmd_exact(const cli_args *args, sdm_error *err)
 {
     job j = {.args = args};
@@ -337,6 +353,7 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
         if (!s) s = write_outputs(&j, err);
         if (!s) s = cli_layers_write(&j.layers, args, &j.grid, err);
         if (!s && args->json) s = print_json(&j, err);
+        if (!s) s = write_results(&j, err);
         if (!s) s = judge_signs(&j, err);
     }
     cli_layers_dispose(&j.layers);

@@ -11,6 +11,7 @@
 #include "report/output.h"
 #include "report/points_table.h"
 #include "report/progress_bar.h"
+#include "slicer/results_file.h"
 #include "report/terminal.h"
 #include "sdm/field.h"
 #include "sdm/image.h"
@@ -388,6 +389,20 @@ static sdm_status print_json(const job *j, sdm_error *err)
     return cli_print_json(&json, err);
 }
 
+/* Writes the file of --returnparameterfile: of the last row. */
+static sdm_status write_results(const job *j, sdm_error *err)
+{
+    const size_t n = j->info->n_params;
+    double deepest = NAN;
+    cli_results r = {0};
+    for (size_t i = 0; j->values && i < sdm_grid_count(&j->grid); i++)
+        deepest = fmin(deepest, (double)j->values[i]);
+    cli_results_params(&r, "parameters", j->params, n, j->rows + (j->n_rows - 1) * n);
+    cli_results_real(&r, "error", j->n_exact ? 0 : j->info->accuracy.rmse_mm);
+    cli_results_real(&r, "deepest", deepest);
+    return cli_results_write(&r, j->args->returns, err);
+}
+
 /* The points of --points and what the network says there. */
 typedef struct point_answers {
     double *x; /* [n][3] */
@@ -462,7 +477,8 @@ static sdm_status run_maps(job *j, sdm_error *err)
         cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j->n_rows, NULL);
     }
     cli_progress_end(&progress, !s);
-    return !s && j->args->json ? print_json(j, err) : s;
+    if (!s && j->args->json) s = print_json(j, err);
+    return s ? s : write_results(j, err);
 }
 
 sdm_status cmd_generate(const cli_args *args, sdm_error *err)

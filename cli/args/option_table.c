@@ -154,6 +154,13 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "The shape 'statistical' takes the file by its option model. Prints how much of the\n"
      "variance each mode has.",
      "sdmgen import ssm femur.h5 -o femur.ssm --variance 0.98 --frame ras", 2, 2},
+    {"slicer", "[MODULE] [--install DIR]", "make this program a module of 3D Slicer",
+     "--install DIR: writes the modules SdmgenFit, SdmgenExact and SdmgenGenerate into DIR. Add\n"
+     "DIR to Slicer's additional module paths (Edit, Application Settings, Modules) and start\n"
+     "Slicer again: the modules are in the category Shape models. Each is a link to this\n"
+     "program and a description, which is made of the options of fit, exact and generate.\n"
+     "MODULE: prints the description of this module.",
+     "sdmgen slicer --install ~/sdmgen-slicer", 0, 1},
     {"help", "[COMMAND]", "print help, manual pages or completion scripts", NULL,
      "sdmgen help --completion bash > ~/.local/share/bash-completion/completions/sdmgen", 0, 1},
 };
@@ -486,6 +493,12 @@ const cli_option cli_options[] = {
      "also write the fitted shape as labels on the grid of the image, 1 inside and 0 outside: .nii "
      ".nii.gz .nrrd .mha"},
 
+    {"returnparameterfile", 0, CLI_TEXT, "FILE", NULL, 0, 0,
+     ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT), AT(returns),
+     "also write the main results as lines NAME = VALUE, as 3D Slicer reads them"},
+    {"install", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_SLICER), AT(install),
+     "write the modules into this folder, which is made if it is missing"},
+
     /* printed texts */
     {"dump", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG), AT(dump),
      "print the resolved configuration as YAML"},
@@ -503,8 +516,8 @@ const cli_option cli_options[] = {
      "load shapes from a shared object; may be repeated"},
     {"threads", 0, CLI_INT, "N", NULL, 0, 1024, TRAININGS, AT(threads),
      "number of threads; 0: all (default). Results depend on it with train.minutes only"},
-    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP) & ~TRAININGS, AT(threads),
-     "number of threads; 0: all (default). Results do not depend on it"},
+    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP) & ~ON(CLI_SLICER) & ~TRAININGS,
+     AT(threads), "number of threads; 0: all (default). Results do not depend on it"},
     {"seed", 0, CLI_INT, "N", NULL, 0, 9007199254740992.0,
      ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_SHAPES) | ON(CLI_VERIFY) |
          ON(CLI_BENCH) | ON(CLI_PHANTOM),

@@ -65,6 +65,7 @@ enum {
     CLI_FIT,
     CLI_EXPORT,
     CLI_IMPORT,
+    CLI_SLICER,
     CLI_HELP,
     CLI_N_COMMANDS
 };
@@ -142,6 +143,8 @@ struct cli_args {
     bool man;                        /* help */
     const char *completion;          /* help: shell */
     const char *out;                 /* train, experiment, shapes */
+    const char *install;             /* slicer */
+    const char *returns;             /* generate, exact, fit: file of results */
     const char *rows;                /* generate: the file of --params */
     const char *policy;              /* generate, fit */
     const char *shape;               /* exact, mesh, bench, phantom, fit */

@@ -13,8 +13,6 @@
 // the sd of a tissue may exceed the robust sd by this factor where the shape is right; the sd of
 // the texture and the tails of a distribution that is not Gaussian make up the difference
 #define WIDER_MAX 1.3
-// the inside may differ from the values at the start by this number of their sd
-#define GIVEN_MAX 3.0
 // empty and missing volumes up to this share of that of the shape are below what labels, points and
 // the grids of maps resolve
 #define VOLUME_MIN 0.05
@@ -192,7 +190,7 @@ static void check_tissues(const fit_problem *p, const fit_residuals *s, const sd
             side ? "inside" : "outside", law[side]->sd, s->spread[side]);
     }
     const double off = fabs(law[1]->mean - given->mean) / given->sd;
-    add(v, SDM_FIT_CHECK_GIVEN, off <= GIVEN_MAX, SDM_FIT_DOUBTFUL, off, GIVEN_MAX,
+    add(v, SDM_FIT_CHECK_GIVEN, off <= FIT_GIVEN_MAX, SDM_FIT_DOUBTFUL, off, FIT_GIVEN_MAX,
         "the inside has the mean %.4g, the start %.4g: other values than those of this kind of "
         "image were given",
         law[1]->mean, given->mean);

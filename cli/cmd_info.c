@@ -1,4 +1,4 @@
-/* sdmgen info: describes the content of a model, level set, image or mesh file. */
+/* sdmgen info: describes the content of a model, level set, image, mesh file or shape model. */
 #include <stdio.h>
 #include <string.h>
 
@@ -11,8 +11,10 @@
 #include "report/report_image.h"
 #include "report/terminal.h"
 #include "sdm/internal/distribution.h"
+#include "sdm/internal/file.h"
 #include "sdm/memory.h"
 #include "sdm/model.h"
+#include "ssm/report_ssm.h"
 
 static void print_model(const char *path, const sdm_model_info *m)
 {
@@ -158,10 +160,27 @@ static sdm_status info_vdb(const cli_args *args, const char *path, sdm_error *er
 #endif
 }
 
+static sdm_status info_ssm(const cli_args *args, const char *path, sdm_error *err)
+{
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    sdm_ssm model = {0};
+    sdm_status s = sdm_file_read(path, UINT64_C(1) << 32, &bytes, &size, err);
+    if (!s) s = sdm_ssm_parse(path, bytes, size, &model, err);
+    if (!s && args->json)
+        s = cli_json_ssm(path, &model, err);
+    else if (!s)
+        cli_print_ssm(path, &model);
+    sdm_ssm_dispose(&model);
+    sdm_free(bytes);
+    return s;
+}
+
 sdm_status cmd_info(const cli_args *args, sdm_error *err)
 {
     const char *path = args->files.items[0];
     if (cli_ends_with_any(path, CLI_MESH_ENDINGS)) return info_mesh(args, path, err);
+    if (cli_ends_with(path, ".ssm")) return info_ssm(args, path, err);
     if (sdm_volume_knows(path)) return info_image(args, path, err);
     return cli_ends_with(path, ".vdb") ? info_vdb(args, path, err) : info_model(args, path, err);
 }

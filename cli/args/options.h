@@ -64,6 +64,7 @@ enum {
     CLI_PHANTOM,
     CLI_FIT,
     CLI_EXPORT,
+    CLI_IMPORT,
     CLI_SLICER,
     CLI_HELP,
     CLI_N_COMMANDS
@@ -105,6 +106,14 @@ typedef struct cli_fit_args {
         tolerance, beside;
     double prior_sd, prior_rotation, prior_translation, eps;
 } cli_fit_args;
+
+/* Options of `import` alone; 0 or NULL: option missing. */
+typedef struct cli_import_args {
+    int64_t modes;
+    double variance;
+    bool scale;
+    const char *model, *surface, *particles, *frame, *unit;
+} cli_import_args;
 
 /* A parsed command line. Options that are missing keep the default stated in their help text; seed
  * -1, samples -1, size[0] 0, spacing[0] 0 and origin[0] NaN mean "option missing". A comment names
@@ -165,6 +174,7 @@ struct cli_args {
     cli_pose_args pose;              /* phantom, fit */
     cli_phantom_args phantom;
     cli_fit_args fit;
+    cli_import_args import;
     const char **memory; /* storage of the items of all lists */
 };
 

@@ -42,7 +42,7 @@ def test_images(map, tmp_path):
 
 def test_meshes(map, tmp_path):
     mesh = sdmgen.Mesh(*ball())
-    for ending in (".ply", ".obj", ".off", ".stl"):
+    for ending in (".ply", ".obj", ".off", ".stl", ".vtk", ".vtp"):
         sdmgen.write(tmp_path / f"ball{ending}", mesh)
         again = sdmgen.read(tmp_path / f"ball{ending}")
         assert len(again.triangles) == len(mesh.triangles)

@@ -217,8 +217,8 @@ static void forged_counters_are_refused(void **state)
     static const struct {
         int at;
         int64_t value;
-    } forged[] = {{PHASE_STEP, 0},         {PHASE_STEP, -1}, {PHASE, 77},    {STEP, INT64_MAX},
-                  {N_START, INT64_MAX},    {N_TAKEN, -1},    {PHASE, 1},     {STEP, -1},
+    } forged[] = {{PHASE_STEP, 0},          {PHASE_STEP, -1}, {PHASE, 77},    {STEP, INT64_MAX},
+                  {N_START, INT64_MAX},     {N_TAKEN, -1},    {PHASE, 1},     {STEP, -1},
                   {0, INT64_MAX /* NaN */}, {1, INT64_MAX},   {2, INT64_MAX}, {N_START, -5}};
     sdm_config c;
     sdm_error e = {0};

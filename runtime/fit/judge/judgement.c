@@ -20,6 +20,8 @@
 #define VOLUME_MIN 0.05
 // the same for images with the older observation model, which is biased where they are blurred
 #define VOLUME_MIN_BIASED 0.2
+// voxels larger than this share of the radius of the largest ball inside explain residuals
+#define COARSE 0.5
 // largest share of points that may belong to another surface
 #define STRAY_MAX 0.35
 // A shape that has this Dice coefficient with its blob cannot be told from one: no comparison.
@@ -129,10 +131,10 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_v
     const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps);
     char cause[200] = "another shape lies there, or the organ differs from the model (then say by "
                       "how much it may: tolerance)";
-    if (voxel > radius)
+    if (voxel > COARSE * radius)
         snprintf(cause, sizeof cause,
-                 "the voxels of the maps, %.2g mm, are larger than the largest radius of the "
-                 "shape, %.2g mm: finer ones are needed, or a tolerance",
+                 "the voxels of the maps, %.2g mm, are coarse for a shape whose largest ball has a "
+                 "radius of %.2g mm: finer ones are needed, or a tolerance",
                  voxel, radius);
     add(v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1],
         exact ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, m->chi_square[1], m->limit[1],

@@ -161,7 +161,7 @@ static sdm_status allocate_maps(job *j, sdm_error *err)
 
 static sdm_status open_model(job *j, sdm_error *err)
 {
-    const sdm_status s = sdm_model_open(j->args->files.items[0], &j->model, err);
+    const sdm_status s = cli_open_model(j->args, j->args->files.items[0], &j->model, err);
     if (s) return s;
     j->info = sdm_model_get_info(j->model);
     return cli_model_params(j->info, &j->params, err);

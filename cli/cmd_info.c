@@ -12,48 +12,54 @@
 #include "report/terminal.h"
 #include "sdm/internal/distribution.h"
 #include "sdm/internal/file.h"
+#include "sdm/internal/model_hash.h"
 #include "sdm/memory.h"
 #include "sdm/model.h"
 #include "ssm/report_ssm.h"
 
-static void print_model(const char *path, const sdm_model_info *m)
+static void print_model(const char *path, const sdm_model *model)
 {
+    char hash[SDM_SHA256_TEXT];
+    const sdm_model_info *m = sdm_model_get_info(model);
     const sdm_grid *g = &m->grid;
     const sdm_accuracy *a = &m->accuracy;
-    printf("%s: network '%s' of shape '%s'\n\n", path, m->kind, m->shape);
-    printf("grid         %lld x %lld x %lld voxels of %g x %g x %g mm, origin %g %g %g (LPS)\n",
-           (long long)g->n[0], (long long)g->n[1], (long long)g->n[2], g->spacing[0], g->spacing[1],
-           g->spacing[2], g->origin[0], g->origin[1], g->origin[2]);
+    cli_print("%s: network '%s' of shape '%s'\n\n", path, m->kind, m->shape);
+    cli_print("grid         %lld x %lld x %lld voxels of %g x %g x %g mm, origin %g %g %g (LPS)\n",
+              (long long)g->n[0], (long long)g->n[1], (long long)g->n[2], g->spacing[0],
+              g->spacing[1], g->spacing[2], g->origin[0], g->origin[1], g->origin[2]);
     // parameters and options
     for (size_t i = 0; i < m->n_params; i++) {
         const sdm_model_param *p = &m->params[i];
         char buf[80];
-        printf("%s %-18s %.6g .. %.6g%s%s, default %.6g, %s\n", i ? "            " : "parameters  ",
-               p->name, p->min, p->max, *p->unit ? " " : "", p->unit, p->def,
-               sdm_distribution_text(&p->distribution, buf));
+        cli_print("%s %-18s %.6g .. %.6g%s%s, default %.6g, %s\n",
+                  i ? "            " : "parameters  ", p->name, p->min, p->max, *p->unit ? " " : "",
+                  p->unit, p->def, sdm_distribution_text(&p->distribution, buf));
     }
     for (size_t i = 0; i < m->n_options; i++)
-        printf("%s %-18s %s\n", i ? "            " : "options     ", m->option_names[i],
-               m->option_values[i]);
-    printf(
+        cli_print("%s %-18s %s\n", i ? "            " : "options     ", m->option_names[i],
+                  m->option_values[i]);
+    cli_print(
         "accuracy     on %lld held-out shapes: MSE %.3g mm^2, RMSE %.5f mm, mean %.5f mm, largest "
         "%.5f mm\n",
         (long long)a->samples, a->mse_mm2, a->rmse_mm, a->mae_mm, a->max_abs_mm);
-    printf("             RMSE within %g mm of the surface %.5f mm\n", a->near_mm, a->rmse_near_mm);
-    printf(
+    cli_print("             RMSE within %g mm of the surface %.5f mm\n", a->near_mm,
+              a->rmse_near_mm);
+    cli_print(
         "             RMSE of single maps: 50 %% below %.5f mm, 90 %% below %.5f mm, 99 %% below "
         "%.5f mm\n",
         a->q50_mm, a->q90_mm, a->q99_mm);
-    printf("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
-           (long long)m->train_samples, (unsigned long long)m->seed, m->version);
-    if (m->fine_width) printf("fine level   %zu units a layer (docs/grids.md)\n", m->fine_width);
-    printf("file         %zu bytes, weights %zu bytes, checksum %016llx\n", m->file_bytes,
-           m->weight_bytes, (unsigned long long)m->checksum);
+    cli_print("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
+              (long long)m->train_samples, (unsigned long long)m->seed, m->version);
+    if (m->fine_width) cli_print("fine level   %zu units a layer (docs/grids.md)\n", m->fine_width);
+    cli_print("file         %zu bytes, weights %zu bytes, checksum %016llx\n", m->file_bytes,
+              m->weight_bytes, (unsigned long long)m->checksum);
+    cli_print("SHA-256      %s\n", sdm_model_sha256(model, hash));
 }
 
-static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_error *err)
+static sdm_status json_model(const char *path, const sdm_model *model, sdm_error *err)
 {
-    char checksum[32];
+    char checksum[32], hash[SDM_SHA256_TEXT];
+    const sdm_model_info *m = sdm_model_get_info(model);
     snprintf(checksum, sizeof checksum, "%016llx", (unsigned long long)m->checksum);
     sdm_json j = {0};
     sdm_json_open(&j, NULL, '{');
@@ -77,6 +83,7 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
     sdm_json_int(&j, "weight_bytes", (int64_t)m->weight_bytes);
     sdm_json_int(&j, "fine_width", (int64_t)m->fine_width);
     sdm_json_text(&j, "checksum", checksum);
+    sdm_json_text(&j, "sha256", sdm_model_sha256(model, hash));
     sdm_json_text(&j, "config", m->config ? m->config : "");
     sdm_json_close(&j, '}');
     return cli_print_json(&j, err);
@@ -85,12 +92,12 @@ static sdm_status json_model(const char *path, const sdm_model_info *m, sdm_erro
 static sdm_status info_model(const cli_args *args, const char *path, sdm_error *err)
 {
     sdm_model *model = NULL;
-    sdm_status s = cli_open_model(path, &model, err);
+    sdm_status s = cli_open_unknown(args, path, &model, err);
     if (s) return s;
     if (args->json)
-        s = json_model(path, sdm_model_get_info(model), err);
+        s = json_model(path, model, err);
     else
-        print_model(path, sdm_model_get_info(model));
+        print_model(path, model);
     sdm_model_free(model);
     return s;
 }
@@ -111,7 +118,7 @@ static sdm_status info_mesh(const cli_args *args, const char *path, sdm_error *e
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else if (!s) {
-        printf("%s: triangle mesh\n\n", path);
+        cli_print("%s: triangle mesh\n\n", path);
         cli_print_audit(&audit);
     }
     sdm_part_audit_dispose(&audit);
@@ -150,7 +157,7 @@ static sdm_status info_vdb(const cli_args *args, const char *path, sdm_error *er
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else if (!s) {
-        printf("%s: %s%s", path, text, text[0] && text[strlen(text) - 1] == '\n' ? "" : "\n");
+        cli_print("%s: %s%s", path, text, text[0] && text[strlen(text) - 1] == '\n' ? "" : "\n");
     }
     sdm_free(text);
     return s;
@@ -179,8 +186,13 @@ static sdm_status info_ssm(const cli_args *args, const char *path, sdm_error *er
 sdm_status cmd_info(const cli_args *args, sdm_error *err)
 {
     const char *path = args->files.items[0];
-    if (cli_ends_with_any(path, CLI_MESH_ENDINGS)) return info_mesh(args, path, err);
-    if (cli_ends_with(path, ".ssm")) return info_ssm(args, path, err);
-    if (sdm_volume_knows(path)) return info_image(args, path, err);
-    return cli_ends_with(path, ".vdb") ? info_vdb(args, path, err) : info_model(args, path, err);
+    const bool mesh = cli_ends_with_any(path, CLI_MESH_ENDINGS), vdb = cli_ends_with(path, ".vdb");
+    const bool image = sdm_volume_knows(path), ssm = cli_ends_with(path, ".ssm");
+    const sdm_status s = mesh || vdb || image || ssm ? cli_expect_model(args, err) : SDM_OK;
+    if (s) return s;
+    return mesh    ? info_mesh(args, path, err)
+           : ssm   ? info_ssm(args, path, err)
+           : image ? info_image(args, path, err)
+           : vdb   ? info_vdb(args, path, err)
+                   : info_model(args, path, err);
 }

@@ -2,6 +2,7 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -52,8 +53,16 @@ static int flush_results(int code)
     return code ? code : CLI_EXIT_FAILED;
 }
 
+/* Allocations beyond the limit of --max-memory fail, and failed allocations are errors. */
+static void limit_memory(double gb)
+{
+    const struct rlimit limit = {(rlim_t)(gb * 1e9), (rlim_t)(gb * 1e9)};
+    if (gb > 0) setrlimit(RLIMIT_AS, &limit);
+}
+
 static int run_command(const cli_args *args)
 {
+    limit_memory(args->max_memory);
     cli_set_quiet(args->quiet);
 #ifdef _OPENMP
     if (args->threads > 0) omp_set_num_threads((int)args->threads);

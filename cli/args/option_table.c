@@ -16,6 +16,9 @@
      ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_IMPORT))
 
 /* Commands that train networks. */
+#define WITH_MODELS                                                                                \
+    (ON(CLI_GENERATE) | ON(CLI_EVAL) | ON(CLI_REPORT) | ON(CLI_INFO) | ON(CLI_VERIFY) |            \
+     ON(CLI_BENCH) | ON(CLI_FIT) | ON(CLI_EXPORT))
 #define TRAININGS (ON(CLI_TRAIN) | ON(CLI_EXPERIMENT))
 
 const cli_command cli_commands[CLI_N_COMMANDS] = {
@@ -514,6 +517,11 @@ const cli_option cli_options[] = {
     /* all commands */
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
      "load shapes from a shared object; may be repeated"},
+    {"expect", 0, CLI_TEXT, "SHA256", NULL, 0, 0, WITH_MODELS, AT(expect),
+     "refuse a model file with another SHA-256 than this (sdmgen info prints it)"},
+    {"max-memory", 0, CLI_REAL, "GB", NULL, 0.1, 1e6, ALL & ~ON(CLI_HELP), AT(max_memory),
+     "end with an error instead of using more memory than this, for inputs of unknown origin: "
+     "limits the address space of the program"},
     {"threads", 0, CLI_INT, "N", NULL, 0, 1024, TRAININGS, AT(threads),
      "number of threads; 0: all (default). Results depend on it with train.minutes only"},
     {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP) & ~ON(CLI_SLICER) & ~TRAININGS,

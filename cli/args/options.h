@@ -125,7 +125,9 @@ struct cli_args {
     cli_list files; /* positional arguments */
     cli_list plugins, params, options, outputs;
     bool quiet, json, help;
+    const char *expect;   /* generate, eval, report, info, verify, bench, fit, export */
     const char *progress; /* train, generate, exact, eval, verify, experiment, fit */
+    double max_memory;    /* GB; 0: option missing */
     int64_t threads, seed;
     bool resume;                     /* train */
     bool force;                      /* train, experiment, fit */

@@ -50,6 +50,10 @@ void cli_notice(const char *fmt, ...) SDM_PRINTF(1, 2);
    probably not what the user wants. */
 void cli_warn(const char *fmt, ...) SDM_PRINTF(1, 2);
 
+/* printf() for texts that quote a file: characters that command a terminal are printed as \xNN, as
+ * they are in all messages on stderr. */
+void cli_print(const char *fmt, ...) SDM_PRINTF(1, 2);
+
 /* True when stderr is a terminal that can redraw a line: TERM is set and not "dumb". */
 bool cli_has_terminal(void);
 

@@ -281,7 +281,7 @@ sdm_status cli_bench_network(const cli_args *args, sdm_error *err)
     sdm_model *model = NULL;
     network_times t = {0};
     sdm_status s = cli_open_registry(args, &registry, err);
-    if (!s) s = sdm_model_open(args->files.items[1], &model, err);
+    if (!s) s = cli_open_model(args, args->files.items[1], &model, err);
     const sdm_model_info *info = s ? NULL : sdm_model_get_info(model);
     if (!s) s = open_shape(model, registry, &shape, &t.no_exact, err);
     if (!s && info->n_params > SDM_MAX_PARAMS)

@@ -5,11 +5,9 @@
 #include <stdlib.h>
 
 #include "sdm/builtin_shapes.h"
-#include "sdm/image.h"
 #include "sdm/isosurface.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
-#include "sdm/meshfile.h"
 #include "sdm/runtime.h"
 
 static sdm_error failure;
@@ -27,20 +25,6 @@ static float *vertices; // [n_vert][6] position in mm, normal
 static sdm_mesh mesh;
 static bool cut;
 static double measures[8]; // volume, area, smallest and largest coordinates
-
-/* A page has no files. These two take the place of the library's readers, which would make every
- * page 8 kB larger. */
-sdm_status sdm_mesh_read(const char *path, sdm_mesh *out, sdm_error *err)
-{
-    (void)out;
-    return sdm_fail(err, SDM_E_IO, "%s: a page has no files", path);
-}
-
-sdm_status sdm_npy_read(const char *path, double **read, size_t size[4], int *n_dim, sdm_error *err)
-{
-    (void)read, (void)size, (void)n_dim;
-    return sdm_fail(err, SDM_E_IO, "%s: a page has no files", path);
-}
 
 const char *page_message(void) { return failure.text; }
 

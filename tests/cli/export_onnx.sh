@@ -47,7 +47,7 @@ statistical=$source_folder/configs/statistical
 # shellcheck disable=SC2086 # several words
 {
     train affine shape.name=ellipsoid $template grid.spacing=1
-    train rigid shape.name=linkage shape.options.motion=spatial $template "grid.size=[18,26,21]" grid.spacing=0.6 "grid.centre=[3,0,0]"
+    train rigid shape.name=linkage shape.options.motion=spatial $template "grid.size=[18,26,21]" grid.spacing=0.75 "grid.centre=[4.27,0,0]"
     train warp shape.name=statistical shape.options.mean="$statistical/mean.ply" shape.options.modes="$statistical/modes.npy" \
         shape.options.count=4 $template network.modes=8 data.static=0 "grid.size=[26,22,21]" grid.spacing=0.5
 }

@@ -1,5 +1,5 @@
 /* A template network as ONNX operators: numbers, frames, and the loop over layers of blocks. */
-#include "template_onnx.h"
+#include "template_graph.h"
 
 enum { STEP = SDM_TEMPLATE_STEP };
 

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "sdm/memory.h"
-#include "template_onnx.h"
+#include "template_graph.h"
 
 enum { STEP = SDM_TEMPLATE_STEP };
 

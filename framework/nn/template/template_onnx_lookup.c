@@ -1,5 +1,5 @@
 /* Lookup in templates and in the correction, and small matrices, as ONNX operators. */
-#include "template_onnx.h"
+#include "template_graph.h"
 
 // A constant [3][1].
 static sdm_onnx_value column(sdm_onnx *g, const char *what, double x, double y, double z)

@@ -1,7 +1,7 @@
 /* The warp of a part as ONNX operators: its inverse at the stations by Newton's method, and the
    distances and slopes at the corners of the blocks. Values at S stations are [N][S][...]; nodes
    are those of the warp's lattice. */
-#include "template_onnx.h"
+#include "template_graph.h"
 
 enum { STEP = SDM_TEMPLATE_STEP };
 

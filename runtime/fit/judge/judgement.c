@@ -94,11 +94,13 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
         "not converged after %zu iterations (%.120s); allow more of them, or give a nearer start",
         r->n_iterations, r->reason);
     if (is_image(p)) {
-        add(v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > 0, SDM_FIT_FAILED, r->evidence, 0,
-            "the image shows no such shape near the start: explaining it without one is better by "
-            "%.3g (log-likelihood of independent voxels); check the start pose, and whether the "
-            "inside is %s than the outside in this image",
-            -r->evidence, darker ? "darker" : "brighter");
+        add(v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > SDM_FIT_PREFERRED, SDM_FIT_FAILED, r->evidence,
+            SDM_FIT_PREFERRED,
+            "the image shows no such shape near the start: explaining it without one is %s by %.3g "
+            "(log-likelihood of independent voxels); check the start pose, and whether the inside "
+            "is %s than the outside in this image",
+            r->evidence < 0 ? "better" : "worse only", fabs(r->evidence),
+            darker ? "darker" : "brighter");
         add(v, SDM_FIT_CHECK_CONTRAST, (in < out) == darker, SDM_FIT_FAILED, in - out, 0,
             "the contrast is the opposite of the start's: inside %.4g, outside %.4g, but the start "
             "says that the inside is %s; give tissue values of this kind of image",

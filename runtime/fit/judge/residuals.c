@@ -146,7 +146,7 @@ static void shares_fill(const fit_problem *p, fit_residuals *r, double *list)
         r->sd[i] = 1;
         // Inside the surface, the outside part of a voxel holds all tissues. Outside of it, a
         // tissue field tells which one a voxel holds; without a field it may be any.
-        const double shift = r->expected[i] > 0.5 ? outside_shift(p, i)
+        const double shift = r->expected[i] > 0.5   ? outside_shift(p, i)
                              : p->samples.n_outside ? outside_at(p, r, i).mean - r->middle[0]
                                                     : 0;
         r->residual[i] -= (1 - r->expected[i]) * shift / contrast;
@@ -162,7 +162,8 @@ static void noise_fill(const fit_problem *p, fit_residuals *r)
     for (int side = 0; side < 2; side++) sd[side] = fmax(r->spread[side] / contrast, SD_MIN);
     for (size_t i = 0; i < r->n; i++) {
         const double a = r->expected[i], share = r->residual[i] + a,
-                     wider = a <= 0.5 && p->samples.n_outside ? outside_at(p, r, i).variance_ratio : 1,
+                     wider =
+                         a <= 0.5 && p->samples.n_outside ? outside_at(p, r, i).variance_ratio : 1,
                      outside = sd[0] * sqrt(wider);
         r->used[i] = share < 1 + BEYOND * sd[1];
         r->sd[i] = sqrt(a * sd[1] * sd[1] + (1 - a) * outside * outside);

@@ -12,7 +12,6 @@
 #include "report/points_table.h"
 #include "report/progress_bar.h"
 #include "report/report_audit.h"
-#include "slicer/results_file.h"
 #include "report/terminal.h"
 #include "sdm/exact.h"
 #include "sdm/internal/block_border.h"
@@ -21,6 +20,7 @@
 #include "sdm/internal/methods.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
+#include "slicer/results_file.h"
 
 typedef struct job {
     const cli_args *args;

@@ -11,7 +11,6 @@
 #include "report/output.h"
 #include "report/points_table.h"
 #include "report/progress_bar.h"
-#include "slicer/results_file.h"
 #include "report/terminal.h"
 #include "sdm/field.h"
 #include "sdm/image.h"
@@ -22,6 +21,7 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
 #include "sdm/map.h"
+#include "slicer/results_file.h"
 
 /* The state of one call of the command. */
 typedef struct job {

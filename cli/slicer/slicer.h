@@ -61,7 +61,7 @@ void slicer_describe(const slicer_module *m, sdm_text *out);
 /* An sdmgen command line made from that of a module. */
 typedef struct slicer_line {
     int argc;
-    char **argv;     /* [argc + 1], the last one NULL; points into the module's arguments or memory */
+    char **argv; /* [argc + 1], the last one NULL; points into the module's arguments or memory */
     sdm_text *words; /* storage of the words that were made */
     size_t n_words;
 } slicer_line;

@@ -98,8 +98,9 @@ static sdm_status set_position(const slicer_module *m, const slicer_file *f, cha
         return SDM_OK;
     }
     if (at->target)
-        return sdm_fail(err, SDM_E_ARG, "%s: more than one of image, labels and surface: '%s', '%s'",
-                        m->name, at->target, value);
+        return sdm_fail(err, SDM_E_ARG,
+                        "%s: more than one of image, labels and surface: '%s', '%s'", m->name,
+                        at->target, value);
     at->target = value;
     at->labels = !strcmp(f->flag, "labels");
     return SDM_OK;

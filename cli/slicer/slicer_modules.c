@@ -52,8 +52,10 @@ const slicer_result slicer_results[] = {
     {"dice", "Dice", "overlap with the reference labels, 0 .. 1; empty without them", FIT},
     {"volume", "Volume", "volume that the mesh encloses, mm^3", EXACT},
     {"closed", "Closed", "yes, or no: the mesh has open edges", EXACT},
-    {"error", "Error", "bound of the error of the distances (exact), rms error on held-out shapes "
-     "(network), mm", EXACT | GENERATE},
+    {"error", "Error",
+     "bound of the error of the distances (exact), rms error on held-out shapes "
+     "(network), mm",
+     EXACT | GENERATE},
     {"deepest", "Deepest point", "smallest distance of the map, mm", EXACT | GENERATE}};
 const size_t slicer_n_results = sizeof slicer_results / sizeof *slicer_results;
 

@@ -3,7 +3,7 @@
 # examples and headers relative to the folder of README.md; DOCS: the path of this folder relative to that of the examples. The
 # examples are copied to TO_EXAMPLES.
 file(REMOVE_RECURSE "${TO}")
-file(COPY "${SOURCE}/docs" "${SOURCE}/README.md" "${SOURCE}/CHANGELOG.md" DESTINATION "${TO}")
+file(COPY "${SOURCE}/docs" "${SOURCE}/README.md" "${SOURCE}/CHANGELOG.md" "${SOURCE}/SECURITY.md" DESTINATION "${TO}")
 file(GLOB_RECURSE pages RELATIVE "${TO}" "${TO}/*.md")
 foreach(page IN LISTS pages)
   # the way up from the page to the folder of README.md, in the source tree and in the installation

@@ -2,7 +2,7 @@
 # Shared by ./run and ./run-tests (sourced, bash): installs what is missing and builds.
 
 # what a bare Debian 12 lacks; boost and imath are asked for by OpenVDB's own CMake files
-packages=(gcc g++ cmake ninja-build pkg-config libyaml-dev zlib1g-dev libcairo2-dev libopenvdb-dev libboost-iostreams-dev libcmocka-dev
+packages=(gcc g++ cmake ninja-build pkg-config libyaml-dev zlib1g-dev libcairo2-dev libopenvdb-dev libboost-iostreams-dev libcmocka-dev libhdf5-dev python3-h5py
     clang-14 lld-14 wasi-libc libclang-rt-14-dev-wasm32) # the last four for the pages of sdmgen report
 
 say() { printf '\n== %s\n' "$*"; }

@@ -62,6 +62,8 @@ sdm_status cmd_bench(const cli_args *args, sdm_error *err)
 {
     const char *topic = args->files.items[0];
     if (!strcmp(topic, "network")) return cli_bench_network(args, err);
+    const sdm_status s = cli_expect_model(args, err);
+    if (s) return s;
     const bool points = !strcmp(topic, "points");
     if (!points && strcmp(topic, "exact"))
         return sdm_fail(err, SDM_E_ARG, "bench: '%s': need exact, points or network MODEL", topic);

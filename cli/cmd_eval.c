@@ -143,7 +143,7 @@ sdm_status cmd_eval(const cli_args *args, sdm_error *err)
     sdm_instance *shape = NULL;
     sdm_model *model = NULL;
     sdm_status s = cli_open_registry(args, &registry, err);
-    if (!s) s = sdm_model_open(args->files.items[0], &model, err);
+    if (!s) s = cli_open_model(args, args->files.items[0], &model, err);
     if (!s) s = sdm_runtime_instance(model, registry, &shape, err);
     if (!s) s = measure_model(args, model, shape, err);
     sdm_model_free(model);

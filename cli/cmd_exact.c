@@ -22,6 +22,7 @@
 #include "sdm/internal/threads.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
+#include "slicer/results_file.h"
 
 typedef struct job {
     const cli_args *args;
@@ -333,9 +334,23 @@ static sdm_status print_json(const job *j, sdm_error *err)
         sdm_json_int(&json, "below_zero", (int64_t)c->below_zero);
     }
     sdm_json_text(&json, "values_crc64", hash);
-    cli_json_grid(&json, "grid", &j->grid, false);
+    sdm_json_grid(&json, "grid", &j->grid, false);
     sdm_json_close(&json, '}');
     return cli_print_json(&json, err);
+}
+
+/* Writes the file of --returnparameterfile. */
+static sdm_status write_results(const job *j, sdm_error *err)
+{
+    float min = NAN, max;
+    int64_t inside;
+    cli_results r = {0};
+    if (j->values) find_range(j, &min, &max, &inside);
+    cli_results_real(&r, "volume", j->report.audit.volume);
+    cli_results_text(&r, "closed", j->report.audit.closed ? "yes" : "no");
+    cli_results_real(&r, "error", j->report.union_error_mm + j->bound_mm);
+    cli_results_real(&r, "deepest", (double)min);
+    return cli_results_write(&r, j->args->returns, err);
 }
 
 sdm_status cmd_exact(const cli_args *args, sdm_error *err)
@@ -351,6 +366,7 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
         if (!s) s = write_outputs(&j, err);
         if (!s) s = cli_layers_write(&j.layers, args, &j.grid, err);
         if (!s && args->json) s = print_json(&j, err);
+        if (!s) s = write_results(&j, err);
         if (!s) s = judge_signs(&j, err);
     }
     cli_layers_dispose(&j.layers);

@@ -27,7 +27,7 @@ static sdm_status check_options(const cli_args *args, sdm_error *err)
 static sdm_status export_model(const cli_args *args, sdm_error *err)
 {
     sdm_model *m;
-    sdm_status s = sdm_model_open(args->files.items[0], &m, err);
+    sdm_status s = cli_open_model(args, args->files.items[0], &m, err);
     for (size_t i = 0; i < args->outputs.n && !s; i++)
         s = sdm_model_write_onnx(m, args->outputs.items[i], err);
     sdm_model_free(m);
@@ -37,7 +37,8 @@ static sdm_status export_model(const cli_args *args, sdm_error *err)
 static sdm_status export_shape(const cli_args *args, sdm_error *err)
 {
     cli_shape shape = {0};
-    sdm_status s = cli_shape_open(args, args->shape, &args->options, &shape, err);
+    sdm_status s = cli_expect_model(args, err);
+    if (!s) s = cli_shape_open(args, args->shape, &args->options, &shape, err);
     for (size_t i = 0; i < args->outputs.n && !s; i++)
         s = cli_write_glb(args->outputs.items[i], &shape, err);
     cli_shape_dispose(&shape);

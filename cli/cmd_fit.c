@@ -139,6 +139,7 @@ static sdm_status show_result(cli_fit *f, sdm_error *err)
         if (!s) s = cli_fit_compare(f, err);
         if (!s && write) s = cli_fit_write_files(f, err);
         if (!s) s = print_result(f, err);
+        if (!s) s = cli_fit_write_results(f, err);
     }
     if (s || !f->doubt.status) return s;
     return sdm_fail(err, f->doubt.status, "%s: %s%s", f->path, f->doubt.text,

@@ -23,6 +23,7 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
 #include "sdm/map.h"
+#include "slicer/results_file.h"
 
 /* The state of one call of the command. */
 typedef struct job {
@@ -173,7 +174,7 @@ static sdm_status allocate_maps(job *j, sdm_error *err)
 
 static sdm_status open_model(job *j, sdm_error *err)
 {
-    const sdm_status s = sdm_model_open(j->args->files.items[0], &j->model, err);
+    const sdm_status s = cli_open_model(j->args, j->args->files.items[0], &j->model, err);
     if (s) return s;
     j->info = sdm_model_get_info(j->model);
     cli_warn_quality(j->args->files.items[0], j->info);
@@ -429,10 +430,24 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_real(&json, "error_between_mm", j->own ? 0 : j->info->quality.between_mm);
     if (j->n_rows == 1) sdm_json_real(&json, "volume_mm3", j->volume);
     sdm_json_text(&json, "values_crc64", hash);
-    cli_json_grid(&json, "grid", &j->grid, false);
+    sdm_json_grid(&json, "grid", &j->grid, false);
     if (j->n_rows == 1) cli_json_params(&json, "parameters", j->params, j->info->n_params, j->rows);
     sdm_json_close(&json, '}');
     return cli_print_json(&json, err);
+}
+
+/* Writes the file of --returnparameterfile: of the last row. */
+static sdm_status write_results(const job *j, sdm_error *err)
+{
+    const size_t n = j->info->n_params;
+    double deepest = NAN;
+    cli_results r = {0};
+    for (size_t i = 0; j->values && i < sdm_grid_count(&j->grid); i++)
+        deepest = fmin(deepest, (double)j->values[i]);
+    cli_results_params(&r, "parameters", j->params, n, j->rows + (j->n_rows - 1) * n);
+    cli_results_real(&r, "error", j->n_exact ? 0 : j->info->accuracy.rmse_mm);
+    cli_results_real(&r, "deepest", deepest);
+    return cli_results_write(&r, j->args->returns, err);
 }
 
 /* The points of --points and what the network says there. */
@@ -535,7 +550,8 @@ static sdm_status run_maps(job *j, sdm_error *err)
     }
     cli_progress_end(&progress, !s);
     if (!s && !j->args->json) notice_between(j);
-    return !s && j->args->json ? print_json(j, err) : s;
+    if (!s && j->args->json) s = print_json(j, err);
+    return s ? s : write_results(j, err);
 }
 
 sdm_status cmd_generate(const cli_args *args, sdm_error *err)

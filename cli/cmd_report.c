@@ -10,6 +10,7 @@
 #include "report/terminal.h"
 #include "sdm/internal/config.h"
 #include "sdm/internal/file.h"
+#include "sdm/internal/sha256.h"
 #include "sdm/memory.h"
 
 enum { METRICS_BYTES_MAX = 1 << 26 };
@@ -61,13 +62,15 @@ static sdm_status find_files(const char *path, source *out, sdm_error *err)
     return SDM_OK;
 }
 
-static sdm_status read_files(source *s, sdm_error *err)
+static sdm_status read_files(const cli_args *args, source *s, sdm_error *err)
 {
     size_t size;
+    char hash[SDM_SHA256_TEXT];
     // the model first: its message is the best one if the file is none
-    sdm_status status = sdm_model_open(s->model_path, &s->model, err);
+    sdm_status status = cli_open_model(args, s->model_path, &s->model, err);
     if (!status) status = sdm_file_read(s->model_path, SIZE_MAX, &s->bytes, &size, err);
-    if (!status && size != sdm_model_get_info(s->model)->file_bytes)
+    if (!status && (size != sdm_model_get_info(s->model)->file_bytes ||
+                    (args->expect && strcmp(sdm_sha256(s->bytes, size, hash), args->expect))))
         status = sdm_fail(err, SDM_E_IO, "%s: the file has changed meanwhile", s->model_path);
     if (!status && *s->metrics_path)
         status = sdm_file_read(s->metrics_path, METRICS_BYTES_MAX, &s->metrics, &size, err);
@@ -112,7 +115,7 @@ sdm_status cmd_report(const cli_args *args, sdm_error *err)
     source src = {.model = NULL};
     sdm_status s = check_arguments(args, err);
     if (!s) s = find_files(args->files.items[0], &src, err);
-    if (!s) s = read_files(&src, err);
+    if (!s) s = read_files(args, &src, err);
     if (!s) s = open_shape(args, &src, err);
     if (!s) s = cli_still_make(src.model, &src.still, err);
     if (!s) s = write_page(args, &src, err);

@@ -137,13 +137,10 @@ static void json_params(sdm_json *j, const sdm_param *params, const sdm_distribu
     sdm_json_open(j, "parameters", '[');
     for (size_t i = 0; i < n; i++) {
         sdm_json_open(j, NULL, '{');
-        sdm_json_text(j, "name", params[i].name);
-        sdm_json_text(j, "unit", params[i].unit);
-        sdm_json_real(j, "min", params[i].min);
-        sdm_json_real(j, "max", params[i].max);
-        sdm_json_real(j, "default", params[i].def);
-        if (distributions) cli_json_distribution(j, &distributions[i]);
-        sdm_json_text(j, "help", params[i].help ? params[i].help : "");
+        const sdm_param *p = &params[i];
+        sdm_json_parameter(j, p->name, p->unit, p->min, p->max, p->def);
+        if (distributions) sdm_json_distribution(j, &distributions[i]);
+        sdm_json_text(j, "help", p->help ? p->help : "");
         sdm_json_close(j, '}');
     }
     sdm_json_close(j, ']');

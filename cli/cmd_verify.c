@@ -27,9 +27,9 @@ static sdm_status verify_vdb(const cli_args *args, const char *path, sdm_error *
     const bool whole = strstr(text, "whole map") != NULL;
     sdm_free(text);
     if (!args->json) {
-        printf("%s: %s\n", path,
-               whole ? "hash is right (a whole map, no level set)"
-                     : "hash and level set are right");
+        cli_print("%s: %s\n", path,
+                  whole ? "hash is right (a whole map, no level set)"
+                        : "hash and level set are right");
         return SDM_OK;
     }
     sdm_json j = {0};
@@ -61,12 +61,12 @@ static sdm_status verify_image(const cli_args *args, const char *path, sdm_error
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else if (!s) {
-        printf("%s: complete: %lld x %lld x %lld %s voxels, %s\n", path, (long long)v.grid.n[0],
-               (long long)v.grid.n[1], (long long)v.grid.n[2], sdm_voxel_name(v.stored),
-               v.checked ? "the checksum of the compressed data is right"
-                         : "no checksum: changed voxels cannot be detected");
+        cli_print("%s: complete: %lld x %lld x %lld %s voxels, %s\n", path, (long long)v.grid.n[0],
+                  (long long)v.grid.n[1], (long long)v.grid.n[2], sdm_voxel_name(v.stored),
+                  v.checked ? "the checksum of the compressed data is right"
+                            : "no checksum: changed voxels cannot be detected");
         if (v.n_nan > 0 || v.n_inf > 0)
-            printf("%zu values are NaN, %zu infinite\n", v.n_nan, v.n_inf);
+            cli_print("%zu values are NaN, %zu infinite\n", v.n_nan, v.n_inf);
     }
     sdm_volume_dispose(&v);
     return s;
@@ -94,9 +94,10 @@ static sdm_status report_model(const cli_args *args, const char *path, const sdm
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else {
-        printf("%s: every checksum is right\n", path);
+        cli_print("%s: every checksum is right\n", path);
         if (e->n > 0) {
-            printf("RMSE %.5f mm on %zu random shapes, stated %.5f mm\n", e->rmse_mm, e->n, stated);
+            cli_print("RMSE %.5f mm on %zu random shapes, stated %.5f mm\n", e->rmse_mm, e->n,
+                      stated);
             cli_print_two("", times);
         }
     }
@@ -115,7 +116,7 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
     cli_eval e = {0};
     cli_timing times;
     sdm_status s = cli_open_registry(args, &registry, err);
-    if (!s) s = cli_open_model(path, &model, err); // verifies every checksum
+    if (!s) s = cli_open_unknown(args, path, &model, err); // verifies every checksum
     const sdm_model_info *info = s ? NULL : sdm_model_get_info(model);
     if (!s) cli_warn_quality(path, info);
     const bool known = !s && sdm_registry_find(registry, info->shape, NULL);
@@ -144,7 +145,8 @@ sdm_status cmd_verify(const cli_args *args, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG,
                         "verify: --%s does nothing for %s: it is for the random shapes of a model",
                         args->samples >= 0 ? "samples" : "seed", path);
-    return vdb     ? verify_vdb(args, path, err)
-           : image ? verify_image(args, path, err)
-                   : verify_model(args, path, err);
+    const sdm_status s = vdb || image ? cli_expect_model(args, err) : SDM_OK;
+    if (s) return s;
+    if (vdb) return verify_vdb(args, path, err);
+    return image ? verify_image(args, path, err) : verify_model(args, path, err);
 }

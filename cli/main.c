@@ -2,6 +2,7 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -14,6 +15,7 @@
 #include "commands.h"
 #include "report/crash_guard.h"
 #include "report/terminal.h"
+#include "slicer/slicer.h"
 
 /* The functions of the commands, by index into cli_commands. */
 static sdm_status (*const functions[CLI_N_COMMANDS])(const cli_args *args, sdm_error *err) = {
@@ -22,7 +24,7 @@ static sdm_status (*const functions[CLI_N_COMMANDS])(const cli_args *args, sdm_e
     [CLI_SHAPES] = cmd_shapes,   [CLI_INFO] = cmd_info,         [CLI_VERIFY] = cmd_verify,
     [CLI_CONFIG] = cmd_config,   [CLI_BENCH] = cmd_bench,       [CLI_EXPERIMENT] = cmd_experiment,
     [CLI_PHANTOM] = cmd_phantom, [CLI_FIT] = cmd_fit,           [CLI_EXPORT] = cmd_export,
-    [CLI_HELP] = cmd_help};
+    [CLI_IMPORT] = cmd_import,   [CLI_SLICER] = cmd_slicer,     [CLI_HELP] = cmd_help};
 
 static int print_help(const cli_command *command)
 {
@@ -35,6 +37,14 @@ static int print_help(const cli_command *command)
     return cli_print_text(&text, &err) ? cli_report(&err) : CLI_EXIT_DONE;
 }
 
+static int print_description(const slicer_module *module)
+{
+    sdm_text text = {0};
+    sdm_error err = {0};
+    slicer_describe(module, &text);
+    return cli_print_text(&text, &err) ? cli_report(&err) : CLI_EXIT_DONE;
+}
+
 /* Turns success into failure when stdout cannot be written, for example to a full disk. */
 static int flush_results(int code)
 {
@@ -43,8 +53,16 @@ static int flush_results(int code)
     return code ? code : CLI_EXIT_FAILED;
 }
 
+/* Allocations beyond the limit of --max-memory fail, and failed allocations are errors. */
+static void limit_memory(double gb)
+{
+    const struct rlimit limit = {(rlim_t)(gb * 1e9), (rlim_t)(gb * 1e9)};
+    if (gb > 0) setrlimit(RLIMIT_AS, &limit);
+}
+
 static int run_command(const cli_args *args)
 {
+    limit_memory(args->max_memory);
     cli_set_quiet(args->quiet);
 #ifdef _OPENMP
     if (args->threads > 0) omp_set_num_threads((int)args->threads);
@@ -91,9 +109,14 @@ int main(int argc, char **argv)
     if (argc == 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h")))
         return flush_results(print_help(NULL));
 
-    cli_args args;
+    const slicer_module *module = slicer_find_module(argv[0]);
+    slicer_line line = {.argc = argc, .argv = argv};
     sdm_error err = {0};
-    const sdm_status s = cli_parse(argc, argv, &args, &err);
+    if (module && argc == 2 && !strcmp(argv[1], "--xml"))
+        return flush_results(print_description(module));
+    sdm_status s = module ? slicer_translate(module, argc, argv, &line, &err) : SDM_OK;
+    cli_args args = {0};
+    if (!s) s = cli_parse(line.argc, line.argv, &args, &err);
     cli_set_form(args.progress);
     int code;
     if (s)
@@ -102,6 +125,7 @@ int main(int argc, char **argv)
         code = print_help(args.command);
     else
         code = run_command(&args);
+    if (module) slicer_line_dispose(&line);
     cli_args_dispose(&args);
     return flush_results(code);
 }

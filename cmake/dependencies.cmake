@@ -59,6 +59,16 @@ if(SDM_CONFIG)
   endif()
 endif()
 
+if(SDM_CONFIG AND SDM_HDF5)
+  if(PKG_CONFIG_FOUND)
+    pkg_search_module(HDF5 IMPORTED_TARGET hdf5-serial hdf5)
+  endif()
+  if(NOT HDF5_FOUND)
+    message(FATAL_ERROR "HDF5 not found: install libhdf5-dev and pkg-config, or configure with "
+      "-DSDM_HDF5=OFF (shape models from .h5.json files and meshes only)")
+  endif()
+endif()
+
 if(SDM_VDB)
   # Debian installs FindOpenVDB.cmake in a separate folder
   list(APPEND CMAKE_MODULE_PATH "/usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB")

@@ -5,11 +5,9 @@
 #include <stdlib.h>
 
 #include "sdm/builtin_shapes.h"
-#include "sdm/image.h"
 #include "sdm/isosurface.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
-#include "sdm/meshfile.h"
 #include "sdm/runtime.h"
 
 static sdm_error failure;
@@ -28,26 +26,12 @@ static sdm_mesh mesh;
 static bool cut;
 static double measures[8]; // volume, area, smallest and largest coordinates
 
-/* A page has no files. These two take the place of the library's readers, which would make every
- * page 8 kB larger. */
-sdm_status sdm_mesh_read(const char *path, sdm_mesh *out, sdm_error *err)
-{
-    (void)out;
-    return sdm_fail(err, SDM_E_IO, "%s: a page has no files", path);
-}
-
-sdm_status sdm_npy_read(const char *path, double **read, size_t size[4], int *n_dim, sdm_error *err)
-{
-    (void)read, (void)size, (void)n_dim;
-    return sdm_fail(err, SDM_E_IO, "%s: a page has no files", path);
-}
-
 const char *page_message(void) { return failure.text; }
 
 void *page_alloc(size_t size) { return malloc(size); }
 
-/* The shape of the model for maps by the exact engine: a built-in one without data files, or none.
- */
+/* shape = an instance of the model's shape, from which the exact engine makes maps. NULL if the
+   shape is no built-in one or needs a data file: a page has neither plug-ins nor files. */
 static void open_shape(void)
 {
     sdm_registry *shapes = NULL;

@@ -9,14 +9,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sdm/internal/ssm.h"
 #include "sdm/shape.h"
 
-enum { MEAN, MODES, DEVIATIONS, COUNT, LIMIT, N_OPTIONS };
+enum { MEAN, MODES, DEVIATIONS, COUNT, LIMIT, MODEL, N_OPTIONS };
 
 #define MODES_MAX 64
 
 static const sdm_option OPTIONS[N_OPTIONS] = {
-    [MEAN] = {"mean", SDM_OPTION_FILE, "mm", 0, 0, 0, NULL, "the mean mesh (.ply .stl .obj .off)"},
+    [MEAN] = {"mean", SDM_OPTION_FILE, "mm", 0, 0, 0, NULL,
+              "the mean mesh (.ply .stl .obj .off .vtk .vtp)"},
     [MODES] = {"modes", SDM_OPTION_FILE, "mm", 0, 0, 0, NULL,
                "the modes (.npy), [modes][vertices][3] or [modes][3 vertices]"},
     [DEVIATIONS] = {"deviations", SDM_OPTION_FILE, "", 0, 0, 0, NULL,
@@ -27,6 +29,9 @@ static const sdm_option OPTIONS[N_OPTIONS] = {
                "how many of the modes are used; 0: all"},
     [LIMIT] = {"limit", SDM_OPTION_REAL, "sd", 0.01, 10, 3, NULL,
                "range of every weight: -limit .. limit"},
+    [MODEL] = {"model", SDM_OPTION_FILE, "", 0, 0, 0, NULL,
+               "a whole model (.ssm, from `sdmgen import ssm`) in place of mean, modes and "
+               "deviations"},
 };
 
 typedef struct model {
@@ -168,10 +173,36 @@ static int model_build(const sdm_host *host, const sdm_mesh_out *mean, const arr
     return 0;
 }
 
+/* The model of an .ssm file. */
+static int create_from_model(const sdm_host *host, const sdm_option_value *options, void **self)
+{
+    const char *path = options[MODEL].text;
+    if (options[MEAN].text[0] || options[MODES].text[0] || options[DEVIATIONS].text[0])
+        return host->fail(host, "option 'model' excludes 'mean', 'modes' and 'deviations'");
+    const unsigned char *bytes;
+    size_t size;
+    sdm_ssm ssm;
+    sdm_error err = {0};
+    int failed = host->read_file(host, path, &bytes, &size);
+    if (failed) return failed;
+    if (sdm_ssm_parse(path, bytes, size, &ssm, &err)) return host->fail(host, err.text);
+    const sdm_mesh_out mean = {ssm.mean, ssm.tri, ssm.n_vert, ssm.n_tri};
+    const array modes = {path, ssm.modes, {ssm.n_modes, ssm.n_vert, 3}, 3}, none = {.path = path};
+    const size_t n_modes = modes_count(host, &modes, options[COUNT].number);
+    model *m = NULL;
+    failed = n_modes == 0
+                 ? 1
+                 : model_build(host, &mean, &modes, &none, n_modes, options[LIMIT].number, &m);
+    sdm_ssm_dispose(&ssm);
+    *self = m;
+    return failed;
+}
+
 static int statistical_create(const sdm_host *host, const sdm_option_value *options, void **self)
 {
+    if (options[MODEL].text[0]) return create_from_model(host, options, self);
     if (!options[MEAN].text[0])
-        return host->fail(host, "option 'mean' is missing: the file of the mean mesh");
+        return host->fail(host, "option 'mean' is missing: the file of the mean mesh (or 'model')");
     if (!options[MODES].text[0])
         return host->fail(host, "option 'modes' is missing: the .npy file of the modes");
     array modes = {.path = options[MODES].text}, deviations = {.path = options[DEVIATIONS].text};

@@ -11,6 +11,7 @@
 #include "state/checkpoint.h"
 #include "state/export_model.h"
 #include "state/progress.h"
+#include "train_folder.h"
 #include "training.h"
 
 /* Less than this part of the budget is no use for a second kind. */
@@ -165,10 +166,13 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     sdm_team *team = NULL;
     trainer_init(&r, shape, folder, hooks, &t);
     const size_t existing = sdm_folder_existing(folder);
+    int lock = -1;
     sdm_status s = sdm_make_folder(folder, err);
+    if (!s) s = trainer_folder_take(folder, &lock, err);
     if (!s) s = SDM_ALLOC(&r.settled, 1, "configuration", err);
     if (!s) s = sdm_team_start(t.n_threads, &team, err);
     if (!s) s = train_all(&r, &t, &result, err);
+    trainer_folder_leave(folder, lock);
     if (s) sdm_folder_remove_empty(folder, existing);
     if (!s && report) *report = result;
     for (size_t i = 0; i < 2; i++) trainer_dataset_dispose(&r.gain[i].maps);

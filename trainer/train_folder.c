@@ -1,7 +1,17 @@
-/* Whether a folder is free for a run. */
+/* Whether a folder is free for a run, and the lock with which a run takes it. */
+#define _DEFAULT_SOURCE // flock(), gethostname()
+#include "train_folder.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "sdm/internal/file.h"
 #include "sdm/internal/train.h"
 
 sdm_status sdm_train_check_folder(const char *folder, bool resume, bool force, sdm_error *err)
@@ -29,4 +39,88 @@ sdm_status sdm_train_check_folder(const char *folder, bool resume, bool force, s
         err, SDM_E_ARG,
         "%s holds %s: continue with --resume, start again with --force, or choose --out DIR",
         folder, files[there[0] ? 0 : 1].content);
+}
+
+/* The files of a run, which alone writes them. */
+static const char *const run_files[] = {"model.sdm",   "checkpoint.sdmc", "metrics.jsonl",
+                                        "config.yaml", "loss.png",        "slices.png"};
+
+static void path_in(const char *folder, const char *name, char path[SDM_PATH_TEXT_MAX + 300])
+{
+    snprintf(path, SDM_PATH_TEXT_MAX + 300, "%s/%s", folder, name);
+}
+
+/* Removes the temporary files of runs that were killed. What cannot be removed harms nobody. */
+static void remove_leftovers(const char *folder)
+{
+    DIR *list = opendir(folder);
+    if (!list) return;
+    for (const struct dirent *one; (one = readdir(list));)
+        for (size_t i = 0; i < sizeof run_files / sizeof *run_files; i++) {
+            char path[SDM_PATH_TEXT_MAX + 300];
+            if (!sdm_outfile_is_temp(one->d_name, run_files[i])) continue;
+            path_in(folder, one->d_name, path);
+            unlink(path);
+        }
+    closedir(list);
+}
+
+static sdm_status fail_taken(const char *folder, int fd, sdm_error *err)
+{
+    char who[200] = "";
+    const ssize_t n = pread(fd, who, sizeof who - 1, 0);
+    who[n > 0 ? n : 0] = '\0';
+    who[strcspn(who, "\n")] = '\0';
+    return sdm_fail(err, SDM_E_ARG,
+                    "%s: another training writes into this folder%s%s%s: wait for its end, or "
+                    "choose --out DIR",
+                    folder, *who ? " (" : "", who, *who ? ")" : "");
+}
+
+/* Writes process and host into the lock, for the message of fail_taken() alone. */
+static void sign_lock(int fd)
+{
+    char host[100] = "", text[160];
+    gethostname(host, sizeof host - 1);
+    const int n = snprintf(text, sizeof text, "process %ld on %s\n", (long)getpid(), host);
+    if (ftruncate(fd, 0) || pwrite(fd, text, (size_t)n, 0) != n) return;
+}
+
+/* true unless the run that had the lock removed the file after it was opened here. */
+static bool is_in_place(const char *path, int fd)
+{
+    struct stat mine, there;
+    return !fstat(fd, &mine) && !stat(path, &there) && mine.st_ino == there.st_ino &&
+           mine.st_dev == there.st_dev;
+}
+
+sdm_status trainer_folder_take(const char *folder, int *lock, sdm_error *err)
+{
+    char path[SDM_PATH_TEXT_MAX + 300];
+    path_in(folder, "run.lock", path);
+    for (*lock = -1; *lock < 0;) {
+        const int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
+        if (fd < 0) return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", path, strerror(errno));
+        const int code = flock(fd, LOCK_EX | LOCK_NB) ? errno : 0;
+        const sdm_status s = code == EWOULDBLOCK ? fail_taken(folder, fd, err) : SDM_OK;
+        if (!code && is_in_place(path, fd)) {
+            *lock = fd;
+            continue;
+        }
+        if (code && !s) unlink(path); // no locks here
+        close(fd);
+        if (s || code) return s;
+    }
+    sign_lock(*lock);
+    remove_leftovers(folder);
+    return SDM_OK;
+}
+
+void trainer_folder_leave(const char *folder, int lock)
+{
+    char path[SDM_PATH_TEXT_MAX + 300];
+    if (lock < 0) return;
+    path_in(folder, "run.lock", path);
+    unlink(path); // before others can take it
+    close(lock);
 }

@@ -153,8 +153,10 @@ static sdm_status train_finish(trainer *t, sdm_outfile **config, sdm_train_repor
     }
     t->phase = phase;
     t->metrics->size = lines;
-    if (s != SDM_E_QUALITY && !trainer_checkpoint_write(t, NULL))
-        trainer_message(t, "a checkpoint is in %s: go on with --resume", t->folder);
+    if (s != SDM_E_QUALITY && !trainer_checkpoint_write(t, NULL) && err) {
+        const sdm_error why = *err;
+        sdm_fail(err, s, "%s; a checkpoint is in %s: go on with --resume", why.text, t->folder);
+    }
     return s;
 }
 

@@ -13,9 +13,12 @@
 #define REPORTS                                                                                    \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) |              \
      ON(CLI_SHAPES) | ON(CLI_INFO) | ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |         \
-     ON(CLI_PHANTOM) | ON(CLI_FIT))
+     ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_IMPORT))
 
 /* Commands that train networks. */
+#define WITH_MODELS                                                                                \
+    (ON(CLI_GENERATE) | ON(CLI_EVAL) | ON(CLI_REPORT) | ON(CLI_INFO) | ON(CLI_VERIFY) |            \
+     ON(CLI_BENCH) | ON(CLI_FIT) | ON(CLI_EXPORT))
 #define TRAININGS (ON(CLI_TRAIN) | ON(CLI_EXPERIMENT))
 
 const cli_command cli_commands[CLI_N_COMMANDS] = {
@@ -30,26 +33,28 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "sdmgen train configs/cochlea.yaml train.minutes=5 --out runs/short", 1, SIZE_MAX},
     {"generate", "MODEL [-p name=value ...] -o FILE", "make distance maps with a trained network",
      "Parameters without -p have the model's default. The ending of FILE selects the output:\n"
-     ".vdb (level set), .nii .nii.gz .nrrd .mha .npy (image), .ply .stl .obj .off (zero\n"
-     "surface), .png .svg .pdf (three slices). With --params each row of the table makes one\n"
-     "output; the number of the row replaces %d (or %04d) in FILE, or is appended to the name.",
+     ".vdb (level set), .nii .nii.gz .nrrd .mha .npy (image), .ply .stl .obj .off .vtk\n"
+     ".vtp (zero surface), .png .svg .pdf (three slices). With --params each row of the table\n"
+     "makes one output; the number of the row replaces %d (or %04d) in FILE, or is appended to\n"
+     "the name.",
      "sdmgen generate runs/cochlea/model.sdm -p a=4.2 -p alpha=0.6 -o cochlea.vdb -o "
      "cochlea.nii.gz",
      1, 1},
     {"exact", "--shape NAME | --mesh FILE [-o FILE]", "compute an exact distance map",
      "Computes the signed distance of every voxel to a shape or to a mesh file (.ply .stl\n"
-     ".obj .off, mm). A surface that overlaps itself stands for the union of the volumes it\n"
-     "encloses. Without grid options the grid is fitted to the bounding box of the mesh, with\n"
-     "a margin of a tenth of its longest edge on every side: 64 voxels along that edge,\n"
-     "margins included. With --points FILE, distances at points in any order. A mesh that is\n"
-     "not closed, or parts that are inside out, give a warning.",
+     ".obj .off .vtk .vtp, mm). A surface that overlaps itself stands for the union of the\n"
+     "volumes it encloses. Without grid options the grid is fitted to the bounding box of the\n"
+     "mesh, with a margin of a tenth of its longest edge on every side: 64 voxels along that\n"
+     "edge, margins included. With --points FILE, distances at points in any order. A mesh that\n"
+     "is not closed, or parts that are inside out, give a warning.",
      "sdmgen exact --shape cochlea -p a=4.2 --size 60,50,50 --spacing 0.2 -o cochlea.nrrd", 0, 0},
     {"mesh", "--shape NAME [-p name=value ...] | --mesh FILE [-o FILE]",
      "write the surface mesh of a shape, or audit and mend a mesh",
-     "Makes the mesh of a shape or reads a mesh file (.ply .stl .obj .off, mm), and warns of\n"
-     "defects. --audit prints the state of every part and the volume of the union. Exit code\n"
-     "of --audit and --json 3: the mesh is not closed; 4: parts are inside out, or it encloses\n"
-     "no volume; files are written all the same. --turn-parts turns parts that are inside out.",
+     "Makes the mesh of a shape or reads a mesh file (.ply .stl .obj .off .vtk .vtp, mm), and\n"
+     "warns of defects. --audit prints the state of every part and the volume of the union.\n"
+     "Exit code of --audit and --json 3: the mesh is not closed; 4: parts are inside out, or it\n"
+     "encloses no volume; files are written all the same. --turn-parts turns parts that are\n"
+     "inside out.",
      "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0},
     {"eval", "MODEL", "measure a network on new random shapes",
      "Draws random shapes that the training did not use and compares the network with the\n"
@@ -75,8 +80,8 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "overrides may follow), wrong velocities, results that differ from call to call. -o FILE\n"
      "draws nine shapes. Exit code 3: meshes are broken; 4: maps or trainings suffer.",
      "sdmgen shapes check cochlea -o cochlea.png", 0, SIZE_MAX},
-    {"info", "FILE", "describe the content of a model, level set, image or mesh file", NULL,
-     "sdmgen info runs/cochlea/model.sdm", 1, 1},
+    {"info", "FILE", "describe the content of a model, level set, image, mesh file or shape model",
+     NULL, "sdmgen info runs/cochlea/model.sdm", 1, 1},
     {"verify", "FILE", "check a model, level set or image file",
      "A model: checks all checksums and, if the shape is known, measures the accuracy again\n"
      "on random shapes; exit code 4 if the RMSE is more than 25 % above the stated one.\n"
@@ -126,11 +131,12 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "Estimates the parameters and the pose of the shape, with their uncertainty, using the\n"
      "network of MODEL or (--exact, --shape) the exact engine. IMAGE is a volume (.nii\n"
      ".nii.gz .nrrd .nhdr .mha .mhd); with --label, a label map or segmentation of these\n"
-     "types; a mesh (.ply .stl .obj .off); or points (.csv with the header x,y,z, or .npy).\n"
+     "types; a mesh (.ply .stl .obj .off .vtk .vtp); or points (.csv with the header x,y,z,\n"
+     "or .npy).\n"
      "Without a start pose the shape starts in the middle of the image, labels or points,\n"
      "and many rotations are tried. The ending of FILE in -o selects the output: .vdb .ply\n"
-     ".stl .obj .off the fitted shape in the estimated pose; .nii .nii.gz .nrrd .mha .npy\n"
-     "distances on the grid of the image; .png .svg .pdf the contour over the\n"
+     ".stl .obj .off .vtk .vtp the fitted shape in the estimated pose; .nii .nii.gz .nrrd .mha\n"
+     ".npy distances on the grid of the image; .png .svg .pdf the contour over the\n"
      "image; .json the results.\n"
      "Exit code 4: the fit failed or is not to be trusted; files are then written only with\n"
      "--force.",
@@ -144,6 +150,20 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "and imnet. --shape: the mesh as binary glTF 2.0; if it is linear in its parameters, as a\n"
      "statistical shape is, with a morph target for each of its first eight parameters.",
      "sdmgen export runs/cochlea/model.sdm -o cochlea.onnx", 0, 1},
+    {"import", "ssm SOURCE -o FILE.ssm", "turn a statistical shape model into a file of sdmgen",
+     "SOURCE is a model of Scalismo or Statismo (.h5, or .h5.json), a folder of meshes whose\n"
+     "points correspond, or a folder of the particles of ShapeWorks (.particles) with a mesh\n"
+     "(--surface): they are aligned, and their principal components become the modes.\n"
+     "The shape 'statistical' takes the file by its option model. Prints how much of the\n"
+     "variance each mode has.",
+     "sdmgen import ssm femur.h5 -o femur.ssm --variance 0.98 --frame ras", 2, 2},
+    {"slicer", "[MODULE] [--install DIR]", "make this program a module of 3D Slicer",
+     "--install DIR: writes the modules SdmgenFit, SdmgenExact and SdmgenGenerate into DIR. Add\n"
+     "DIR to Slicer's additional module paths (Edit, Application Settings, Modules) and start\n"
+     "Slicer again: the modules are in the category Shape models. Each is a link to this\n"
+     "program and a description, which is made of the options of fit, exact and generate.\n"
+     "MODULE: prints the description of this module.",
+     "sdmgen slicer --install ~/sdmgen-slicer", 0, 1},
     {"help", "[COMMAND]", "print help, manual pages or completion scripts", NULL,
      "sdmgen help --completion bash > ~/.local/share/bash-completion/completions/sdmgen", 0, 1},
 };
@@ -215,7 +235,8 @@ const cli_option cli_options[] = {
      "most --tolerance; edt: distance transform, prints the bound on its error"},
     {"points", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(points),
      "distances at the points of a file instead of a map: .csv (x,y,z), .npy ([n][3]) or the "
-     "vertices of .ply .stl .obj .off, LPS mm; -o FILE.csv or FILE.npy (float64), one row a point"},
+     "vertices of .ply .stl .obj .off .vtk .vtp, LPS mm; -o FILE.csv or FILE.npy (float64), one "
+     "row a point"},
     {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_EXACT), AT(columns),
      "columns for --points: distance,gradient,closest,triangle (default distance)"},
     {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_GENERATE), AT(columns),
@@ -234,15 +255,15 @@ const cli_option cli_options[] = {
 
     /* the output */
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(outputs),
-     "output: .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl .obj .off .png .svg .pdf; may be "
-     "repeated"},
+     "output: .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl .obj .off .vtk .vtp .png .svg .pdf; may "
+     "be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_PHANTOM), AT(outputs),
      "the image: .nii .nii.gz .nrrd .mha .npy; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_MESH), AT(outputs),
-     "output: .ply .stl .obj .off; may be repeated"},
+     "output: .ply .stl .obj .off .vtk .vtp; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(outputs),
-     "output: .vdb .ply .stl .obj .off .nii .nii.gz .nrrd .mha .npy .png .svg .pdf .json; may "
-     "be repeated"},
+     "output: .vdb .ply .stl .obj .off .vtk .vtp .nii .nii.gz .nrrd .mha .npy .png .svg .pdf "
+     ".json; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_EXPORT), AT(outputs),
      "output: .onnx (MODEL) or .glb (--shape); may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_SHAPES), AT(outputs),
@@ -250,6 +271,25 @@ const cli_option cli_options[] = {
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_REPORT), AT(outputs), "the page: .html"},
     {"no-model", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_REPORT), AT(no_model),
      "leave out the model and the runtime: pictures at the default parameters alone"},
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_IMPORT), AT(outputs), "output: .ssm"},
+    {"modes", 0, CLI_INT, "N", NULL, 1, 1048576, ON(CLI_IMPORT), AT(import.modes),
+     "keep the first N modes (default: all, at most 64)"},
+    {"variance", 0, CLI_REAL, "F", NULL, 1e-6, 1, ON(CLI_IMPORT), AT(import.variance),
+     "keep the fewest modes with this fraction of the variance, e.g. 0.98"},
+    {"frame", 0, CLI_CHOICE, NULL, "lps|ras", 0, 0, ON(CLI_IMPORT), AT(import.frame),
+     "axes of the source (default lps); ras: x and y change their signs"},
+    {"unit", 0, CLI_CHOICE, NULL, "mm|cm|m|um", 0, 0, ON(CLI_IMPORT), AT(import.unit),
+     "unit of the source (default mm)"},
+    {"surface", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_IMPORT), AT(import.surface),
+     "mesh whose triangles are used, for a model without triangles: its vertices are the points; "
+     "for particles: the mesh of one shape, which is warped onto the others"},
+    {"particles", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_IMPORT), AT(import.particles),
+     "folder of particles: those on the mesh of --surface (default: NAME_local.particles for "
+     "NAME.vtk; else its vertices are the particles)"},
+    {"model", 0, CLI_TEXT, "NAME", NULL, 0, 0, ON(CLI_IMPORT), AT(import.model),
+     "which model of a file with several (its catalog)"},
+    {"scale", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_IMPORT), AT(import.scale),
+     "folder: remove differences of size (default: size is a part of shape)"},
     {"closest", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(closest),
      "also write the nearest surface point of every voxel: float32 [z][y][x][3], mm"},
     {"normal", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(normal),
@@ -456,6 +496,12 @@ const cli_option cli_options[] = {
      "also write the fitted shape as labels on the grid of the image, 1 inside and 0 outside: .nii "
      ".nii.gz .nrrd .mha"},
 
+    {"returnparameterfile", 0, CLI_TEXT, "FILE", NULL, 0, 0,
+     ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT), AT(returns),
+     "also write the main results as lines NAME = VALUE, as 3D Slicer reads them"},
+    {"install", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_SLICER), AT(install),
+     "write the modules into this folder, which is made if it is missing"},
+
     /* printed texts */
     {"dump", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_CONFIG), AT(dump),
      "print the resolved configuration as YAML"},
@@ -471,10 +517,15 @@ const cli_option cli_options[] = {
     /* all commands */
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
      "load shapes from a shared object; may be repeated"},
+    {"expect", 0, CLI_TEXT, "SHA256", NULL, 0, 0, WITH_MODELS, AT(expect),
+     "refuse a model file with another SHA-256 than this (sdmgen info prints it)"},
+    {"max-memory", 0, CLI_REAL, "GB", NULL, 0.1, 1e6, ALL & ~ON(CLI_HELP), AT(max_memory),
+     "end with an error instead of using more memory than this, for inputs of unknown origin: "
+     "limits the address space of the program"},
     {"threads", 0, CLI_INT, "N", NULL, 0, 1024, TRAININGS, AT(threads),
      "number of threads; 0: all (default). Results depend on it with train.minutes only"},
-    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP) & ~TRAININGS, AT(threads),
-     "number of threads; 0: all (default). Results do not depend on it"},
+    {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP) & ~ON(CLI_SLICER) & ~TRAININGS,
+     AT(threads), "number of threads; 0: all (default). Results do not depend on it"},
     {"seed", 0, CLI_INT, "N", NULL, 0, 9007199254740992.0,
      ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_SHAPES) | ON(CLI_VERIFY) |
          ON(CLI_BENCH) | ON(CLI_PHANTOM),

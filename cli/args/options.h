@@ -64,6 +64,8 @@ enum {
     CLI_PHANTOM,
     CLI_FIT,
     CLI_EXPORT,
+    CLI_IMPORT,
+    CLI_SLICER,
     CLI_HELP,
     CLI_N_COMMANDS
 };
@@ -105,6 +107,14 @@ typedef struct cli_fit_args {
     double prior_sd, prior_rotation, prior_translation, eps;
 } cli_fit_args;
 
+/* Options of `import` alone; 0 or NULL: option missing. */
+typedef struct cli_import_args {
+    int64_t modes;
+    double variance;
+    bool scale;
+    const char *model, *surface, *particles, *frame, *unit;
+} cli_import_args;
+
 /* A parsed command line. Options that are missing keep the default stated in their help text; seed
  * -1, samples -1, size[0] 0, spacing[0] 0 and origin[0] NaN mean "option missing". A comment names
  * the commands that have the options. */
@@ -115,7 +125,9 @@ struct cli_args {
     cli_list files; /* positional arguments */
     cli_list plugins, params, options, outputs;
     bool quiet, json, help;
+    const char *expect;   /* generate, eval, report, info, verify, bench, fit, export */
     const char *progress; /* train, generate, exact, eval, verify, experiment, fit */
+    double max_memory;    /* GB; 0: option missing */
     int64_t threads, seed;
     bool resume;                     /* train */
     bool force;                      /* train, experiment, fit */
@@ -133,6 +145,8 @@ struct cli_args {
     bool man;                        /* help */
     const char *completion;          /* help: shell */
     const char *out;                 /* train, experiment, shapes */
+    const char *install;             /* slicer */
+    const char *returns;             /* generate, exact, fit: file of results */
     const char *rows;                /* generate: the file of --params */
     const char *policy;              /* generate, fit */
     const char *shape;               /* exact, mesh, bench, phantom, fit */
@@ -162,6 +176,7 @@ struct cli_args {
     cli_pose_args pose;              /* phantom, fit */
     cli_phantom_args phantom;
     cli_fit_args fit;
+    cli_import_args import;
     const char **memory; /* storage of the items of all lists */
 };
 

@@ -119,6 +119,9 @@ sdm_status cli_fit_compare(cli_fit *f, sdm_error *err);
  * f->doubt where the mirror image is better or as good. */
 sdm_status cli_fit_mirror(cli_fit *f, sdm_error *err);
 
+/* Writes the file of --returnparameterfile. */
+sdm_status cli_fit_write_results(const cli_fit *f, sdm_error *err);
+
 /* Prints the verdict as text; adds it to a JSON object. */
 void cli_fit_print_verdict(const cli_fit *f);
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);

@@ -9,7 +9,7 @@
 static void add_matrix(sdm_json *j, const char *key, const double *m, size_t n)
 {
     sdm_json_open(j, key, '[');
-    for (size_t i = 0; i < n; i++) cli_json_reals(j, NULL, m + i * n, n);
+    for (size_t i = 0; i < n; i++) sdm_json_reals(j, NULL, m + i * n, n);
     sdm_json_close(j, ']');
 }
 
@@ -31,10 +31,10 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
     sdm_json_close(j, ']');
     // pose
     sdm_json_open(j, "pose", '{');
-    cli_json_reals(j, "rotation_rad", r->pose.rotation, 3);
-    cli_json_reals(j, "translation_mm", r->pose.translation, 3);
-    cli_json_reals(j, "rotation_sd_rad", r->sd + f->n_params, 3);
-    cli_json_reals(j, "translation_sd_mm", r->sd + f->n_params + 3, 3);
+    sdm_json_reals(j, "rotation_rad", r->pose.rotation, 3);
+    sdm_json_reals(j, "translation_mm", r->pose.translation, 3);
+    sdm_json_reals(j, "rotation_sd_rad", r->sd + f->n_params, 3);
+    sdm_json_reals(j, "translation_sd_mm", r->sd + f->n_params + 3, 3);
     sdm_json_text(j, "meaning",
                   "world = R x + translation, LPS mm; R turns about the origin of the shape's "
                   "frame by the rotation "
@@ -113,7 +113,7 @@ static void add_work(sdm_json *j, const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
     sdm_json_int(j, "iterations", (int64_t)r->n_iterations);
-    cli_json_reals(j, "objective", r->objective, r->n_iterations);
+    sdm_json_reals(j, "objective", r->objective, r->n_iterations);
     sdm_json_bool(j, "start_clamped", f->start_clamped || r->start_clamped);
     sdm_json_int(j, "turn", (int64_t)r->turn);
     sdm_json_int(j, "maps_network", (int64_t)r->n_network);
@@ -145,6 +145,6 @@ void cli_fit_json(const cli_fit *f, sdm_json *j)
     add_overlap(j, f);
     add_target(j, f);
     add_work(j, f);
-    if (f->target.kind != SDM_FIT_POINTS) cli_json_grid(j, "grid", &f->target.grid, false);
+    if (f->target.kind != SDM_FIT_POINTS) sdm_json_grid(j, "grid", &f->target.grid, false);
     sdm_json_close(j, '}');
 }

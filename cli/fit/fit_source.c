@@ -13,7 +13,7 @@ static sdm_status open_model(cli_fit *f, sdm_error *err)
     const cli_args *args = f->args;
     if (args->options.n)
         return sdm_fail(err, SDM_E_ARG, "fit: -O belongs to --shape; a model has its own options");
-    sdm_status s = sdm_model_open(f->model_path, &f->model, err);
+    sdm_status s = cli_open_model(args, f->model_path, &f->model, err);
     if (s) return s;
     const sdm_model_info *info = sdm_model_get_info(f->model);
     if (!args->fit.exact) cli_warn_quality(f->model_path, info);
@@ -37,7 +37,8 @@ static sdm_status open_model(cli_fit *f, sdm_error *err)
 
 static sdm_status open_shape(cli_fit *f, sdm_error *err)
 {
-    sdm_status s = cli_open_registry(f->args, &f->registry, err);
+    sdm_status s = cli_expect_model(f->args, err);
+    if (!s) s = cli_open_registry(f->args, &f->registry, err);
     if (!s) s = cli_create_shape(f->registry, f->args->shape, &f->args->options, &f->shape, err);
     if (!s) f->shape_name = f->args->shape;
     return s;

@@ -125,7 +125,6 @@ sdm_status cli_fit_read_target(cli_fit *f, sdm_error *err)
     if (cli_ends_with_any(f->path, CLI_MESH_ENDINGS " .csv .npy")) return read_points(f, err);
     return sdm_fail(err, SDM_E_ARG,
                     "fit: image '%s': its name must end in .nii .nii.gz .nrrd .nhdr .mha .mhd "
-                    "(volume), .ply .stl .obj "
-                    ".off (mesh), .csv or .npy (points)",
+                    "(volume), " CLI_MESH_ENDINGS " (mesh), .csv or .npy (points)",
                     f->path);
 }

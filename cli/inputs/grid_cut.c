@@ -12,7 +12,7 @@
  * these are lower bounds. */
 static void warn(const char *where, double beyond[3][2], bool least, const char *mend)
 {
-    char faces[160] = "";
+    char faces[240] = "";
     for (int a = 0; a < 3; a++)
         for (int side = 0; side < 2; side++) {
             const size_t used = strlen(faces);

@@ -30,13 +30,13 @@ void cli_warn_quality(const char *path, const sdm_model_info *m)
 void cli_print_quality(const sdm_model_quality *q)
 {
     if (!*q->grade) {
-        printf("verdict      not stored: trained by an earlier version\n");
+        cli_print("verdict      not stored: trained by an earlier version\n");
         return;
     }
-    printf("verdict      %s; the grid cuts %.3g %% of the held-out shapes\n", q->grade,
+    cli_print("verdict      %s; the grid cuts %.3g %% of the held-out shapes\n", q->grade,
            100 * q->cut);
     if (!isnan(q->between_mm))
-        printf(
+        cli_print(
             "             between the voxels exact maps, interpolated linearly, miss the surface "
             "by %.5f mm RMS\n",
             q->between_mm);

@@ -148,10 +148,11 @@ sdm_status cli_read_points(const char *path, double **x, size_t *n, sdm_error *e
     else if (cli_ends_with_any(path, CLI_MESH_ENDINGS))
         s = read_vertices(path, x, n, err);
     else
-        return sdm_fail(err, SDM_E_ARG,
-                        "points '%s': the name must end in .csv (x,y,z), .npy ([n][3]) or "
-                        ".ply .stl .obj .off (vertices)",
-                        path);
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "points '%s': the name must end in .csv (x,y,z), .npy ([n][3]) or " CLI_MESH_ENDINGS
+            " (vertices)",
+            path);
     if (!s && *n == 0) s = sdm_fail(err, SDM_E_FORMAT, "%s: no points", path);
     if (!s) return SDM_OK;
     sdm_free(*x);

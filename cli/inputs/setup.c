@@ -9,6 +9,7 @@
 #include "report/files.h"
 #include "report/terminal.h"
 #include "sdm/builtin_shapes.h"
+#include "sdm/internal/model_hash.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
 
@@ -110,10 +111,40 @@ void cli_shape_dispose(cli_shape *shape)
     *shape = (cli_shape){0};
 }
 
-sdm_status cli_open_model(const char *path, sdm_model **out, sdm_error *err)
+/* SDM_E_ARG unless the value of --expect is a SHA-256. */
+static sdm_status check_hash_text(const char *text, sdm_error *err)
+{
+    const size_t digits = strspn(text, "0123456789abcdef");
+    if (digits == SDM_SHA256_TEXT - 1 && !text[digits]) return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG,
+                    "--expect '%.80s': need a SHA-256, 64 digits 0-9 and a-f, as sha256sum and "
+                    "`sdmgen info` print it",
+                    text);
+}
+
+sdm_status cli_open_model(const cli_args *args, const char *path, sdm_model **out, sdm_error *err)
+{
+    char hash[SDM_SHA256_TEXT];
+    *out = NULL;
+    sdm_status s = args->expect ? check_hash_text(args->expect, err) : SDM_OK;
+    if (!s) s = sdm_model_open(path, out, err);
+    if (s || !args->expect || !strcmp(sdm_model_sha256(*out, hash), args->expect)) return s;
+    sdm_model_free(*out);
+    *out = NULL;
+    return sdm_fail(err, SDM_E_FORMAT, "%s: not the model of --expect: its SHA-256 is %s", path,
+                    hash);
+}
+
+sdm_status cli_expect_model(const cli_args *args, sdm_error *err)
+{
+    return args->expect ? sdm_fail(err, SDM_E_ARG, "--expect is the hash of a model: there is none")
+                        : SDM_OK;
+}
+
+sdm_status cli_open_unknown(const cli_args *args, const char *path, sdm_model **out, sdm_error *err)
 {
     sdm_error why = {0};
-    const sdm_status s = sdm_model_open(path, out, &why);
+    const sdm_status s = cli_open_model(args, path, out, &why);
     if (!s) return s;
     const bool other = s == SDM_E_FORMAT && !cli_ends_with(path, ".sdm");
     return sdm_fail(err, s, "%s%s", why.text,

@@ -36,9 +36,18 @@ sdm_status cli_shape_open(const cli_args *args, const char *name, const cli_list
                           cli_shape *out, sdm_error *err);
 void cli_shape_dispose(cli_shape *shape);
 
-/* Opens a model, for commands that also accept other types of files: if the file is no model, the
- * message lists these types. *out is freed with sdm_model_free(). */
-sdm_status cli_open_model(const char *path, sdm_model **out, sdm_error *err);
+/* Opens a model, which must be the one of --expect if that is given. *out is freed with
+ * sdm_model_free(). Errors of sdm_model_open(); SDM_E_FORMAT: another model; SDM_E_ARG: --expect is
+ * no hash. */
+sdm_status cli_open_model(const cli_args *args, const char *path, sdm_model **out, sdm_error *err);
+
+/* The same for commands that also accept other types of files: if the file is no model, the message
+ * lists these types. */
+sdm_status cli_open_unknown(const cli_args *args, const char *path, sdm_model **out,
+                            sdm_error *err);
+
+/* SDM_E_ARG if --expect is given: for commands whose input is no model. */
+sdm_status cli_expect_model(const cli_args *args, sdm_error *err);
 
 /* *out[info->n_params] = the parameters of a model in the form of a shape's. Their texts belong to
  * `info`; the array is freed with sdm_free(). */

@@ -69,13 +69,11 @@ static void set_limit(int resource, uint64_t value)
  * need terabytes of it. */
 static void limit_child(limits most)
 {
-#if !SANITIZED
 #ifdef __GLIBC__
     (void)mallopt(M_ARENA_MAX, 1);
 #endif
-    const long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    set_limit(RLIMIT_AS, bytes_now() + most.bytes + (uint64_t)processors * 16 * MEGABYTE);
-#endif
+    const uint64_t stacks = (uint64_t)sysconf(_SC_NPROCESSORS_ONLN) * 16 * MEGABYTE;
+    if (!SANITIZED) set_limit(RLIMIT_AS, bytes_now() + most.bytes + stacks);
     set_limit(RLIMIT_CPU, most.seconds);
     set_limit(RLIMIT_CORE, 0);
 }

@@ -4,51 +4,13 @@
 #include "page.h"
 #include "report/json_values.h"
 
-static void add_parameters(const cli_page *page, sdm_json *j)
-{
-    sdm_json_open(j, "parameters", '[');
-    for (size_t i = 0; i < page->info->n_params; i++) {
-        const sdm_model_param *p = &page->info->params[i];
-        sdm_json_open(j, NULL, '{');
-        sdm_json_text(j, "name", p->name);
-        sdm_json_text(j, "unit", p->unit);
-        sdm_json_real(j, "min", p->min);
-        sdm_json_real(j, "max", p->max);
-        sdm_json_real(j, "default", p->def);
-        cli_json_distribution(j, &p->distribution);
-        if (page->of_shape && page->of_shape[i].help)
-            sdm_json_text(j, "help", page->of_shape[i].help);
-        sdm_json_close(j, '}');
-    }
-    sdm_json_close(j, ']');
-    sdm_json_open(j, "options", '{');
-    for (size_t i = 0; i < page->info->n_options; i++)
-        sdm_json_text(j, page->info->option_names[i], page->info->option_values[i]);
-    sdm_json_close(j, '}');
-}
-
-static void add_accuracy(const sdm_accuracy *a, sdm_json *j)
-{
-    sdm_json_open(j, "accuracy", '{');
-    sdm_json_int(j, "shapes", a->samples);
-    sdm_json_real(j, "rmse_mm", a->rmse_mm);
-    sdm_json_real(j, "mae_mm", a->mae_mm);
-    sdm_json_real(j, "max_abs_mm", a->max_abs_mm);
-    sdm_json_real(j, "rmse_near_mm", a->rmse_near_mm);
-    sdm_json_real(j, "near_mm", a->near_mm);
-    sdm_json_real(j, "q50_mm", a->q50_mm);
-    sdm_json_real(j, "q90_mm", a->q90_mm);
-    sdm_json_real(j, "q99_mm", a->q99_mm);
-    sdm_json_close(j, '}');
-}
-
 static void add_still(const cli_still *s, sdm_json *j)
 {
     sdm_json_open(j, "at_default", '{');
     sdm_json_real(j, "volume_mm3", s->volume);
     sdm_json_real(j, "area_mm2", s->area);
-    cli_json_reals(j, "min", s->min, 3);
-    cli_json_reals(j, "max", s->max, 3);
+    sdm_json_reals(j, "min", s->min, 3);
+    sdm_json_reals(j, "max", s->max, 3);
     sdm_json_bool(j, "cut", s->cut);
     sdm_json_uint(j, "vertices", s->n_vert);
     sdm_json_uint(j, "triangles", s->n_tri);
@@ -78,9 +40,12 @@ void cli_page_figures(const cli_page *page, sdm_json *j)
     sdm_json_uint(j, "file_bytes", m->file_bytes);
     sdm_json_real(j, "multiply_adds", m->macs);
     sdm_json_close(j, '}');
-    cli_json_grid(j, "grid", &m->grid, true);
-    add_parameters(page, j);
-    add_accuracy(&m->accuracy, j);
+    sdm_json_grid(j, "grid", &m->grid, true);
+    cli_json_model_params(j, m, page->of_shape);
+    sdm_json_open(j, "accuracy", '{');
+    sdm_json_int(j, "shapes", m->accuracy.samples);
+    cli_json_accuracy(j, &m->accuracy);
+    sdm_json_close(j, '}');
     add_still(page->still, j);
     if (page->metrics) cli_page_history(page->metrics, j);
     sdm_json_close(j, '}');

@@ -23,8 +23,8 @@ static void add_shape(sdm_json *j, const cli_phantom *p)
 static void add_pose(sdm_json *j, const sdm_pose *pose)
 {
     sdm_json_open(j, "pose", '{');
-    cli_json_reals(j, "rotation_rad", pose->rotation, 3);
-    cli_json_reals(j, "translation_mm", pose->translation, 3);
+    sdm_json_reals(j, "rotation_rad", pose->rotation, 3);
+    sdm_json_reals(j, "translation_mm", pose->translation, 3);
     sdm_json_text(j, "meaning",
                   "world = R x + translation, LPS mm; R turns about the origin of the shape's "
                   "frame by the rotation "
@@ -50,7 +50,7 @@ static void add_image(sdm_json *j, const sdm_phantom_opts *o)
         sdm_json_real(j, "air_mm", o->air_mm);
         sdm_json_real(j, "air_clear_mm", o->air_clear_mm);
     }
-    cli_json_reals(j, "blur_mm", o->blur, 3);
+    sdm_json_reals(j, "blur_mm", o->blur, 3);
     sdm_json_real(j, "texture_mm", o->texture_mm);
     sdm_json_real(j, "noise", o->noise);
     sdm_json_bool(j, "noise_is_blurred", o->noise_is_blurred);
@@ -64,7 +64,7 @@ void cli_phantom_truth(const cli_phantom *p, size_t inside, sdm_json *j)
     sdm_json_text(j, "made_by", "sdmgen " SDM_VERSION_TEXT);
     add_shape(j, p);
     add_pose(j, &p->pose);
-    cli_json_grid(j, "grid", &p->grid, true);
+    sdm_json_grid(j, "grid", &p->grid, true);
     add_image(j, &p->opts);
     sdm_json_int(j, "inside_voxels", (int64_t)inside);
     sdm_json_bool(j, "cut", p->cut);

@@ -19,10 +19,10 @@ bool cli_ends_with(const char *path, const char *suffix)
 
 bool cli_ends_with_any(const char *path, const char *endings)
 {
-    for (char ending[16]; *endings; endings += strspn(endings, " ")) {
+    const size_t n = strlen(path);
+    for (; *endings; endings += strspn(endings, " ")) {
         const size_t length = strcspn(endings, " ");
-        snprintf(ending, sizeof ending, "%.*s", (int)length, endings);
-        if (cli_ends_with(path, ending)) return true;
+        if (n > length && !strncasecmp(path + n - length, endings, length)) return true;
         endings += length;
     }
     return false;
@@ -65,8 +65,13 @@ static bool is_same_file(const char *a, const char *b)
  * options are included. */
 static sdm_status find_inputs(const cli_args *args, cli_list *out, sdm_error *err)
 {
-    const char *const single[] = {args->mesh, args->rows, args->points, args->fit.reference,
-                                  args->fit.start_points};
+    const char *const single[] = {args->mesh,
+                                  args->rows,
+                                  args->points,
+                                  args->fit.reference,
+                                  args->fit.start_points,
+                                  args->import.surface,
+                                  args->import.particles};
     const size_t n_single = sizeof single / sizeof *single;
     const sdm_status s =
         SDM_ALLOC(&out->items, args->files.n + args->options.n + n_single, "names of files", err);
@@ -83,9 +88,9 @@ static sdm_status find_inputs(const cli_args *args, cli_list *out, sdm_error *er
 
 static sdm_status find_outputs(const cli_args *args, cli_list *out, sdm_error *err)
 {
-    const char *const single[] = {args->closest,       args->normal,       args->triangle,
-                                  args->jacobian,      args->gradient,     args->fit.label_out,
-                                  args->phantom.label, args->phantom.truth};
+    const char *const single[] = {args->closest,       args->normal,        args->triangle,
+                                  args->jacobian,      args->gradient,      args->fit.label_out,
+                                  args->phantom.label, args->phantom.truth, args->returns};
     const size_t n_single = sizeof single / sizeof *single;
     const sdm_status s = SDM_ALLOC(&out->items, args->outputs.n + n_single, "names of files", err);
     if (s) return s;

@@ -5,7 +5,7 @@
 
 /* Endings of the volumes that can be written, and of mesh files; separated by spaces. */
 #define CLI_VOLUME_ENDINGS ".nii .nii.gz .nrrd .mha"
-#define CLI_MESH_ENDINGS ".ply .stl .obj .off"
+#define CLI_MESH_ENDINGS ".ply .stl .obj .off .vtk .vtp"
 
 /* True when the name has this ending, in upper or lower case, after at least one other
  * character. */

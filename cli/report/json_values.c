@@ -1,14 +1,7 @@
-/* Adds vectors, parameters and grids to JSON texts, and writes JSON files. */
+/* JSON of values of parameters and of models, and JSON files (json_values.h). */
 #include "json_values.h"
 
 #include "sdm/internal/file.h"
-
-void cli_json_reals(sdm_json *json, const char *key, const double *v, size_t n)
-{
-    sdm_json_open(json, key, '[');
-    for (size_t i = 0; i < n; i++) sdm_json_real(json, NULL, v[i]);
-    sdm_json_close(json, ']');
-}
 
 void cli_json_params(sdm_json *json, const char *key, const sdm_param *params, size_t n,
                      const double *values)
@@ -18,25 +11,34 @@ void cli_json_params(sdm_json *json, const char *key, const sdm_param *params, s
     sdm_json_close(json, '}');
 }
 
-void cli_json_distribution(sdm_json *json, const sdm_distribution *d)
+void cli_json_model_params(sdm_json *json, const sdm_model_info *m, const sdm_param *of_shape)
 {
-    const bool normal = d->kind == SDM_DISTRIBUTION_NORMAL;
-    sdm_json_text(json, "distribution", normal ? "normal" : "uniform");
-    if (!normal) return;
-    sdm_json_real(json, "mean", d->mean);
-    sdm_json_real(json, "deviation", d->deviation);
+    sdm_json_open(json, "parameters", '[');
+    for (size_t i = 0; i < m->n_params; i++) {
+        const sdm_model_param *p = &m->params[i];
+        sdm_json_open(json, NULL, '{');
+        sdm_json_parameter(json, p->name, p->unit, p->min, p->max, p->def);
+        sdm_json_distribution(json, &p->distribution);
+        if (of_shape && of_shape[i].help) sdm_json_text(json, "help", of_shape[i].help);
+        sdm_json_close(json, '}');
+    }
+    sdm_json_close(json, ']');
+    sdm_json_open(json, "options", '{');
+    for (size_t i = 0; i < m->n_options; i++)
+        sdm_json_text(json, m->option_names[i], m->option_values[i]);
+    sdm_json_close(json, '}');
 }
 
-void cli_json_grid(sdm_json *json, const char *key, const sdm_grid *g, bool with_direction)
+void cli_json_accuracy(sdm_json *json, const sdm_accuracy *a)
 {
-    sdm_json_open(json, key, '{');
-    sdm_json_open(json, "size", '[');
-    for (int i = 0; i < 3; i++) sdm_json_int(json, NULL, g->n[i]);
-    sdm_json_close(json, ']');
-    cli_json_reals(json, "spacing", g->spacing, 3);
-    cli_json_reals(json, "origin", g->origin, 3);
-    if (with_direction) cli_json_reals(json, "direction", g->dir, 9);
-    sdm_json_close(json, '}');
+    sdm_json_real(json, "rmse_mm", a->rmse_mm);
+    sdm_json_real(json, "mae_mm", a->mae_mm);
+    sdm_json_real(json, "max_abs_mm", a->max_abs_mm);
+    sdm_json_real(json, "rmse_near_mm", a->rmse_near_mm);
+    sdm_json_real(json, "near_mm", a->near_mm);
+    sdm_json_real(json, "q50_mm", a->q50_mm);
+    sdm_json_real(json, "q90_mm", a->q90_mm);
+    sdm_json_real(json, "q99_mm", a->q99_mm);
 }
 
 sdm_status cli_json_write(const sdm_json *json, const char *path, sdm_error *err)

@@ -1,23 +1,20 @@
-/* JSON members that several commands print alike: vectors, parameters, grids; and JSON files. */
+/* JSON members that several commands print alike: values of parameters, models; and JSON files. */
 #pragma once
 
-#include "sdm/grid.h"
-#include "sdm/internal/text.h"
+#include "sdm/internal/json_describe.h"
+#include "sdm/model.h"
 #include "sdm/shape.h"
-
-/* Adds v[n] as an array. key: NULL inside an array. */
-void cli_json_reals(sdm_json *json, const char *key, const double *v, size_t n);
 
 /* Adds an object with one member for each parameter: its name and values[i]. */
 void cli_json_params(sdm_json *json, const char *key, const sdm_param *params, size_t n,
                      const double *values);
 
-/* Adds the member "distribution": "uniform" or "normal", the latter with "mean" and "deviation". */
-void cli_json_distribution(sdm_json *json, const sdm_distribution *d);
+/* Adds what a model says about its parameters and options: the array "parameters" and the object
+ * "options". of_shape[parameters]: adds their help; NULL: without. */
+void cli_json_model_params(sdm_json *json, const sdm_model_info *m, const sdm_param *of_shape);
 
-/* Adds the grid as an object: size, spacing and origin (mm), and with `with_direction` the
- * direction matrix. */
-void cli_json_grid(sdm_json *json, const char *key, const sdm_grid *g, bool with_direction);
+/* Adds the errors of a model on held-out shapes, mm, to the open object. */
+void cli_json_accuracy(sdm_json *json, const sdm_accuracy *a);
 
 /* Writes the finished text and a line feed to the file `path`. SDM_E_NOMEM when the text is
  * incomplete, SDM_E_IO. */

@@ -28,8 +28,8 @@ static const struct {
 } kinds[] = {{".vdb", KIND_VDB},     {".nii", KIND_IMAGE},   {".nii.gz", KIND_IMAGE},
              {".nrrd", KIND_IMAGE},  {".mha", KIND_IMAGE},   {".npy", KIND_IMAGE},
              {".ply", KIND_SURFACE}, {".stl", KIND_SURFACE}, {".obj", KIND_SURFACE},
-             {".off", KIND_SURFACE}, {".png", KIND_PICTURE}, {".svg", KIND_PICTURE},
-             {".pdf", KIND_PICTURE}};
+             {".off", KIND_SURFACE}, {".vtk", KIND_SURFACE}, {".vtp", KIND_SURFACE},
+             {".png", KIND_PICTURE}, {".svg", KIND_PICTURE}, {".pdf", KIND_PICTURE}};
 enum { N_KINDS = sizeof kinds / sizeof *kinds };
 
 /* The type of the file by its ending; *suffix (may be NULL) points to the ending. */
@@ -47,13 +47,15 @@ sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
 {
     const file_kind kind = kind_of(path, NULL);
     if (meshes_only && kind != KIND_SURFACE)
-        return sdm_fail(err, SDM_E_ARG, "output '%s': its name must end in .ply .stl .obj or .off",
+        return sdm_fail(err, SDM_E_ARG,
+                        "output '%s': its name must end in .ply .stl .obj .off .vtk "
+                        "or .vtp",
                         path);
     if (kind == KIND_NONE)
         return sdm_fail(
             err, SDM_E_ARG,
             "output '%s': its name must end in .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl "
-            ".obj .off .png .svg or .pdf",
+            ".obj .off .vtk .vtp .png .svg or .pdf",
             path);
 #ifndef SDM_HAVE_VDB
     if (kind == KIND_VDB)

@@ -69,8 +69,7 @@ static void print_json(const char *title, double fraction, const char *text)
     sdm_json_text(&json, "title", title);
     sdm_json_text(&json, "text", text);
     sdm_json_close(&json, '}');
-    if (!json.text.failed) fprintf(stderr, "%s\n", json.text.data);
-    sdm_json_dispose(&json);
+    cli_json_line(&json);
 }
 
 /* The elements that 3D Slicer finds among other output of a module. */

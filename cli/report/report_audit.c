@@ -86,8 +86,8 @@ void cli_json_audit(sdm_json *json, const sdm_audit *a)
     sdm_json_int(json, "self_intersections", (int64_t)a->self_intersections);
     sdm_json_real(json, "volume_mm3", a->volume);
     sdm_json_real(json, "area_mm2", a->area);
-    cli_json_reals(json, "min", a->min, 3);
-    cli_json_reals(json, "max", a->max, 3);
+    sdm_json_reals(json, "min", a->min, 3);
+    sdm_json_reals(json, "max", a->max, 3);
 }
 
 void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
@@ -110,8 +110,8 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
         sdm_json_int(json, "meets_others", (int64_t)p->met);
         sdm_json_real(json, "volume_mm3", p->volume);
         sdm_json_real(json, "area_mm2", p->area);
-        cli_json_reals(json, "min", p->min, 3);
-        cli_json_reals(json, "max", p->max, 3);
+        sdm_json_reals(json, "min", p->min, 3);
+        sdm_json_reals(json, "max", p->max, 3);
         sdm_json_close(json, '}');
     }
     sdm_json_close(json, ']');

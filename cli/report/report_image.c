@@ -22,22 +22,22 @@ static void print_grid(const sdm_grid *g)
 
 void cli_print_volume(const char *path, const sdm_volume *v)
 {
-    printf("%s: image of %s voxels", path, sdm_voxel_name(v->stored));
-    if (v->n_layers > 1) printf(", %zu layers", v->n_layers);
-    printf("\n\n");
+    cli_print("%s: image of %s voxels", path, sdm_voxel_name(v->stored));
+    if (v->n_layers > 1) cli_print(", %zu layers", v->n_layers);
+    cli_print("\n\n");
     print_grid(&v->grid);
     if (!v->placed)
-        printf(
+        cli_print(
             "             the file states no frame: axes and origin are defaults of its format\n");
-    printf("values       %.9g .. %.9g\n", (double)v->min, (double)v->max);
+    cli_print("values       %.9g .. %.9g\n", (double)v->min, (double)v->max);
     if (v->n_nan > 0 || v->n_inf > 0)
-        printf("             %zu are NaN, %zu infinite\n", v->n_nan, v->n_inf);
+        cli_print("             %zu are NaN, %zu infinite\n", v->n_nan, v->n_inf);
     for (size_t i = 0; i < v->n_segments; i++) {
         const sdm_segment *s = &v->segments[i];
-        printf("%s '%s' (%s): value %lld in layer %zu\n", i ? "            " : "segments    ",
-               s->name, s->id, (long long)s->value, s->layer);
+        cli_print("%s '%s' (%s): value %lld in layer %zu\n", i ? "            " : "segments    ",
+                  s->name, s->id, (long long)s->value, s->layer);
     }
-    if (v->text[0]) printf("description  %s\n", v->text);
+    if (v->text[0]) cli_print("description  %s\n", v->text);
 }
 
 void cli_json_volume(sdm_json *j, const char *path, const sdm_volume *v)
@@ -45,8 +45,8 @@ void cli_json_volume(sdm_json *j, const char *path, const sdm_volume *v)
     sdm_json_text(j, "file", path);
     sdm_json_text(j, "type", "image");
     sdm_json_text(j, "voxel_type", sdm_voxel_name(v->stored));
-    cli_json_grid(j, "grid", &v->grid, false);
-    cli_json_reals(j, "direction", v->grid.dir, 9);
+    sdm_json_grid(j, "grid", &v->grid, false);
+    sdm_json_reals(j, "direction", v->grid.dir, 9);
     sdm_json_bool(j, "placed", v->placed);
     sdm_json_int(j, "layers", (int64_t)v->n_layers);
     sdm_json_real(j, "min", (double)v->min);

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "args/options.h"
+#include "sdm/internal/utf8.h"
 
 static bool quiet_wanted;
 static cli_form form;
@@ -51,14 +52,20 @@ void cli_set_form(const char *name)
 
 cli_form cli_get_form(void) { return form; }
 
-void cli_json_line(const char *key, const char *text)
+void cli_json_line(sdm_json *json)
+{
+    if (!json->text.failed) fprintf(stderr, "%s\n", json->text.data);
+    sdm_json_dispose(json);
+}
+
+/* Prints an object with one member. */
+static void print_json_message(const char *key, const char *text)
 {
     sdm_json json = {0};
     sdm_json_open(&json, NULL, '{');
     sdm_json_text(&json, key, text);
     sdm_json_close(&json, '}');
-    if (!json.text.failed) fprintf(stderr, "%s\n", json.text.data);
-    sdm_json_dispose(&json);
+    cli_json_line(&json);
 }
 
 bool cli_has_terminal(void)
@@ -96,10 +103,13 @@ int cli_report(const sdm_error *err)
     snprintf(named, sizeof named, "%s", err->text[0] ? err->text : sdm_status_name(err->status));
     cli_name_options(named);
     const char *text = named;
+    sdm_text shown = {0};
     if (form == CLI_FORM_JSON) {
-        cli_json_line("error", text);
+        print_json_message("error", text);
         return exit_code_of(err->status);
     }
+    sdm_text_add_shown(&shown, text);
+    text = shown.failed ? sdm_status_name(err->status) : shown.data;
     while (*text) {
         const size_t length = strcspn(text, "\n");
         if (!(err->status == SDM_E_CONFIG && has_place(text, length)))
@@ -108,26 +118,49 @@ int cli_report(const sdm_error *err)
         fprintf(stderr, "%.*s\n", (int)length, text);
         text += length + (text[length] == '\n');
     }
+    sdm_text_dispose(&shown);
     return exit_code_of(err->status);
+}
+
+/* *out = the formatted text, as it is to be shown or, for JSON, as it is. */
+static void format_text(sdm_text *out, bool as_shown, const char *fmt, va_list args)
+{
+    va_list again;
+    va_copy(again, args);
+    const int length = vsnprintf(NULL, 0, fmt, again);
+    va_end(again);
+    char *text = length < 0 ? NULL : malloc((size_t)length + 1);
+    if (text) vsnprintf(text, (size_t)length + 1, fmt, args);
+    if (as_shown)
+        sdm_text_add_shown(out, text ? text : fmt);
+    else
+        sdm_text_add(out, "%s", text ? text : fmt);
+    free(text);
 }
 
 /* Prints a notice or a warning; `kind` is its key in JSON, `begin` its beginning elsewhere. */
 static void print_line(const char *kind, const char *begin, const char *fmt, va_list args)
 {
-    if (form == CLI_FORM_JSON) {
-        va_list again;
-        va_copy(again, args);
-        const int length = vsnprintf(NULL, 0, fmt, again);
-        va_end(again);
-        char *text = length < 0 ? NULL : malloc((size_t)length + 1);
-        if (text) vsnprintf(text, (size_t)length + 1, fmt, args);
-        cli_json_line(kind, text ? text : fmt);
-        free(text);
-        return;
-    }
-    fputs(begin, stderr);
-    vfprintf(stderr, fmt, args);
-    fputc('\n', stderr);
+    const bool json = form == CLI_FORM_JSON;
+    sdm_text text = {0};
+    format_text(&text, !json, fmt, args);
+    const char *line = text.failed || !text.data ? fmt : text.data;
+    if (json)
+        print_json_message(kind, line);
+    else
+        fprintf(stderr, "%s%s\n", begin, line);
+    sdm_text_dispose(&text);
+}
+
+void cli_print(const char *fmt, ...)
+{
+    sdm_text text = {0};
+    va_list args;
+    va_start(args, fmt);
+    format_text(&text, true, fmt, args);
+    va_end(args);
+    fputs(text.failed || !text.data ? "(out of memory)\n" : text.data, stdout);
+    sdm_text_dispose(&text);
 }
 
 void cli_notice(const char *fmt, ...)

@@ -34,8 +34,9 @@ typedef enum cli_form {
 void cli_set_form(const char *name);
 cli_form cli_get_form(void);
 
-/* Prints {"key":"text"} as a line on stderr. */
-void cli_json_line(const char *key, const char *text);
+/* Prints a finished JSON object as one line on stderr and frees it; an incomplete one is dropped.
+ */
+void cli_json_line(sdm_json *json);
 
 /* Prints the message of a failure on stderr, "sdmgen: error: text". Lines of a configuration error
    that begin with the place of the mistake, "file:line:column:", have no such prefix. Returns the
@@ -48,6 +49,10 @@ void cli_notice(const char *fmt, ...) SDM_PRINTF(1, 2);
 /* Prints "sdmgen: warning: text" on stderr, quiet or not: the input has a fault, or the result is
    probably not what the user wants. */
 void cli_warn(const char *fmt, ...) SDM_PRINTF(1, 2);
+
+/* printf() for texts that quote a file: characters that command a terminal are printed as \xNN, as
+ * they are in all messages on stderr. */
+void cli_print(const char *fmt, ...) SDM_PRINTF(1, 2);
 
 /* True when stderr is a terminal that can redraw a line: TERM is set and not "dumb". */
 bool cli_has_terminal(void);

@@ -200,15 +200,15 @@ static sdm_status print_json(const check *c, sdm_error *err)
     sdm_json_int(&j, "vertices", (int64_t)f->n_vert);
     sdm_json_int(&j, "triangles", (int64_t)f->n_tri);
     sdm_json_real(&j, "ms_mesh", f->ms_mesh);
-    cli_json_reals(&j, "union_volume_mm3", f->volume, 2);
-    cli_json_reals(&j, "union_area_mm2", f->area, 2);
-    cli_json_reals(&j, "min", f->low, 3);
-    cli_json_reals(&j, "max", f->high, 3);
+    sdm_json_reals(&j, "union_volume_mm3", f->volume, 2);
+    sdm_json_reals(&j, "union_area_mm2", f->area, 2);
+    sdm_json_reals(&j, "min", f->low, 3);
+    sdm_json_reals(&j, "max", f->high, 3);
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
         add_count(&j, c, counts[i].key, counts[i].count);
     if (c->survey.grid) {
-        cli_json_grid(&j, "grid", c->survey.grid, true);
-        cli_json_reals(&j, "beyond_mm", &f->beyond[0][0], 6);
+        sdm_json_grid(&j, "grid", c->survey.grid, true);
+        sdm_json_reals(&j, "beyond_mm", &f->beyond[0][0], 6);
     }
     add_jumps(&j, c);
     if (f->has_velocity) sdm_json_real(&j, "velocity_error", f->velocity_error);

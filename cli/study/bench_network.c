@@ -219,7 +219,7 @@ static void print_times(const network_times *t, const sdm_model_info *info)
 
 static void add_field_json(const cli_field_times *t, sdm_json *j)
 {
-    cli_json_grid(j, "field_grid", &t->grid, false);
+    sdm_json_grid(j, "field_grid", &t->grid, false);
     sdm_json_real(j, "ms_field_params", t->ms_params);
     sdm_json_real(j, "ms_field_map", t->ms_map);
     sdm_json_real(j, "ms_field_band", t->ms_band);
@@ -281,7 +281,7 @@ sdm_status cli_bench_network(const cli_args *args, sdm_error *err)
     sdm_model *model = NULL;
     network_times t = {0};
     sdm_status s = cli_open_registry(args, &registry, err);
-    if (!s) s = sdm_model_open(args->files.items[1], &model, err);
+    if (!s) s = cli_open_model(args, args->files.items[1], &model, err);
     const sdm_model_info *info = s ? NULL : sdm_model_get_info(model);
     if (!s) s = open_shape(model, registry, &shape, &t.no_exact, err);
     if (!s && info->n_params > SDM_MAX_PARAMS)

@@ -114,6 +114,19 @@ static int temp_open(const char *path, char **temp)
     }
 }
 
+bool sdm_outfile_is_temp(const char *name, const char *of)
+{
+    const size_t n = strlen(of);
+    if (strncmp(name, of, n)) return false;
+    name += n;
+    for (int part = 0; part < 2; part++) {
+        const size_t digits = *name == '.' ? strspn(name + 1, "0123456789") : 0;
+        if (digits == 0) return false;
+        name += 1 + digits;
+    }
+    return !strcmp(name, ".tmp");
+}
+
 /* Gives the open file the permissions of the one that it replaces; its owner may always write it.
  * false: it cannot, see errno. WASI has no permissions. */
 static bool keep_permissions(int fd, mode_t mode)

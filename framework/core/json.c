@@ -3,17 +3,25 @@
 #include <string.h>
 
 #include "sdm/internal/text.h"
+#include "sdm/internal/utf8.h"
 
+/* JSON is UTF-8: bytes that are not become U+FFFD. DEL is legal, and commands a terminal. */
 static void json_quote(sdm_text *t, const char *s)
 {
     sdm_text_add(t, "\"");
     for (; *s; s++) {
         const unsigned char c = (unsigned char)*s;
+        const size_t n = sdm_utf8_length(s);
+        if (n != 1) {
+            sdm_text_add(t, "%.*s", n ? (int)n : 3, n ? s : "\xEF\xBF\xBD");
+            s += n ? n - 1 : 0;
+            continue;
+        }
         if (c == '"' || c == '\\')
             sdm_text_add(t, "\\%c", c);
         else if (c == '\n')
             sdm_text_add(t, "\\n");
-        else if (c < 0x20)
+        else if (c < 0x20 || c == 0x7F)
             sdm_text_add(t, "\\u%04x", c);
         else
             sdm_text_add(t, "%c", c);

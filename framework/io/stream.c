@@ -2,15 +2,19 @@
 #include "stream.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #define ANY_WINDOW (15 + 32) /* zlib: 32 KiB window, gzip or zlib wrapper */
 /* Largest ratio of uncompressed to compressed bytes of deflate (zlib's technical notes). */
 #define DEFLATE_RATIO 1032
 #define PART_MAX ((size_t)1 << 30) /* zlib counts in unsigned int */
 
-sdm_status sdm_stream_open(sdm_stream *in, const char *path, sdm_error *err)
+/* Opens `path`; flags: O_NOFOLLOW or 0. A FIFO is opened without waiting for a writer, and refused.
+ */
+static sdm_status open_file(sdm_stream *in, const char *path, int flags, sdm_error *err)
 {
     memset(in, 0, sizeof *in);
     const size_t n = strlen(path);
@@ -18,14 +22,24 @@ sdm_status sdm_stream_open(sdm_stream *in, const char *path, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG, "%.80s...: the name of the file is too long", path);
     memcpy(in->path, path, n);
     struct stat st;
-    if (stat(path, &st))
-        return sdm_fail(err, SDM_E_IO, "%s: cannot open: %s", path, strerror(errno));
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | flags);
+    if (fd < 0 && errno == ELOOP && flags)
+        return sdm_fail(err, SDM_E_UNSUPPORTED,
+                        "%s: a symbolic link, which is not followed: put the file itself there",
+                        path);
+    in->file = fd < 0 || fstat(fd, &st) ? NULL : fdopen(fd, "rb");
+    const int code = errno;
+    if (!in->file && fd >= 0) close(fd);
+    if (!in->file) return sdm_fail(err, SDM_E_IO, "%s: cannot open: %s", path, strerror(code));
     if (!S_ISREG(st.st_mode)) return sdm_fail(err, SDM_E_IO, "%s: not a regular file", path);
-    in->file = fopen(path, "rb");
-    if (!in->file) return sdm_fail(err, SDM_E_IO, "%s: cannot open: %s", path, strerror(errno));
     in->left = (uint64_t)st.st_size;
     in->at = in->end = in->bytes;
     return SDM_OK;
+}
+
+sdm_status sdm_stream_open(sdm_stream *in, const char *path, sdm_error *err)
+{
+    return open_file(in, path, 0, err);
 }
 
 void sdm_stream_close(sdm_stream *in)
@@ -55,7 +69,7 @@ sdm_status sdm_stream_detach(sdm_stream *in, const char *name, sdm_error *err)
     char header[sizeof in->path];
     memcpy(header, in->path, sizeof header);
     sdm_stream_close(in);
-    const sdm_status s = sdm_stream_open(in, path, err);
+    const sdm_status s = open_file(in, path, O_NOFOLLOW, err);
     return s ? sdm_fail_in(err, s, "%s", header) : SDM_OK;
 }
 

@@ -35,7 +35,7 @@ sdm_status sdm_stream_open(sdm_stream *in, const char *path, sdm_error *err);
 void sdm_stream_close(sdm_stream *in);
 
 /* Closes the header and opens `name`, the file of its voxels, in the same folder. SDM_E_UNSUPPORTED
- * for a name that leads out of the folder. */
+ * for a name that leads out of the folder, also by a symbolic link. */
 sdm_status sdm_stream_detach(sdm_stream *in, const char *name, sdm_error *err);
 
 /* Switches decompression on: from the next byte to its end, the file is gzip (RFC 1952) or zlib

@@ -20,7 +20,7 @@ from ._mesh import Mesh
 from ._model import Model
 
 IMAGES = (".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd")
-MESHES = (".ply", ".stl", ".obj", ".off")
+MESHES = (".ply", ".stl", ".obj", ".off", ".vtk", ".vtp")
 _TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64")
 
 
@@ -30,7 +30,7 @@ def _ends(path: Any, endings: tuple[str, ...]) -> bool:
 
 def read(path: Any) -> Union[Image, Mesh, Model, NDArray[Any]]:
     """Reads a file by the ending of its name: an image or segmentation (.nii .nii.gz .nrrd .nhdr .mha
-    .mhd) as an Image of float32, a mesh (.ply .stl .obj .off), a model (.sdm), or an array (.npy)."""
+    .mhd) as an Image of float32, a mesh (.ply .stl .obj .off .vtk .vtp), a model (.sdm), or an array (.npy)."""
     if _ends(path, IMAGES):
         return read_image(path)
     if _ends(path, MESHES):
@@ -82,7 +82,7 @@ def write(
 ) -> None:
     """Writes a map, an image, a band or a mesh; the ending of the name selects the format: .nii
     .nii.gz .nrrd .mha (image), .npy (a map's array), .vdb (a map or band as an OpenVDB level set),
-    .ply .stl .obj .off (a mesh, or the zero surface of a map). The file appears under its name only
+    .ply .stl .obj .off .vtk .vtp (a mesh, or the zero surface of a map). The file appears under its name only
     when it is complete.
 
     .vdb: `band`, the half width of the band in voxels (default 3); `dense`, the whole map; `half`,

@@ -176,13 +176,13 @@ class Mesh:
 
     @classmethod
     def read(cls, path: Any) -> Mesh:
-        """The mesh of a .ply, .stl, .obj or .off file."""
+        """The mesh of a .ply, .stl, .obj, .off, .vtk or .vtp file."""
         mesh = make("sdm_mesh")
         call("sdm_mesh_read", path_bytes(path), byref(mesh))
         return cls(*taken_mesh(mesh))
 
     def write(self, path: Any) -> None:
-        """Writes a .ply, .stl, .obj or .off file."""
+        """Writes a .ply, .stl, .obj, .off, .vtk or .vtp file."""
         call("sdm_mesh_write", path_bytes(path), byref(self._c))
 
     def audit(self) -> Audit:

@@ -33,12 +33,12 @@ typedef struct spline_place {
 typedef struct spline_axis {
     size_t n;
     int axis;           /* of the map */
-    int32_t *cell;      /* [n] */
-    int32_t *node;      /* [n] */
-    float (*weight)[4]; /* [n] */
-    float *beyond;      /* [n] mm, >= 0 */
+    int32_t *cell;      /* [n] as in spline_place */
+    int32_t *node;      /* [n] as in spline_place */
+    float (*weight)[4]; /* [n] weights of the coefficients cell .. cell + 3 */
+    float *beyond;      /* [n] distance from the end of the box to the voxel, mm; 0: inside */
     int32_t low, high;  /* the coefficients in use: low .. high - 1 */
-    bool leaves;        /* a position lies beyond the box */
+    bool leaves;        /* a voxel lies outside of the box */
 } spline_axis;
 
 /* The shape of the spline of a map of n[3] voxels. */

@@ -42,9 +42,10 @@ static sdm_status check_file(const char *path, const char *option, const char *w
     if (s) return s;
     snprintf(found, sizeof found, "%016llx", (unsigned long long)crc);
     if (!strcmp(found, wanted)) return SDM_OK;
+    // a model may name any file: its checksum is nobody's business
     return sdm_fail(err, SDM_E_FORMAT,
-                    "%s: not the file '%s' of the training: its CRC-64 is %s, need %s", path,
-                    option, found, wanted);
+                    "%s: not the file '%s' of the training: its CRC-64 is not %.16s", path, option,
+                    wanted);
 }
 
 /* The options of the shape, from the model file. */
@@ -54,14 +55,13 @@ typedef struct model_options {
     char (*beside)[4096]; // [n] paths of the data files in the folder of the model
 } model_options;
 
-/* Finds the data file of the last option: at the path it had in training, or in the folder of the
-   model. */
+/* Finds the data file of the last option: in the folder of the model, or at the path it had in
+   training. */
 static sdm_status find_file(const sdm_model_info *info, model_options *o, const char *wanted,
                             sdm_error *err)
 {
     sdm_named_text *file = &o->given[o->n - 1];
     char *beside = o->beside[o->n - 1];
-    if (!check_file(file->value, file->name, wanted, NULL)) return SDM_OK;
     const char *slash = strrchr(file->value, '/');
     if (info->folder)
         snprintf(beside, sizeof *o->beside, "%s%s", info->folder, slash ? slash + 1 : file->value);
@@ -70,6 +70,7 @@ static sdm_status find_file(const sdm_model_info *info, model_options *o, const 
         return SDM_OK;
     }
     const sdm_status s = check_file(file->value, file->name, wanted, err);
+    if (!s) return s;
     return sdm_fail_in(err, s, "data file '%s' of the exact shape, here or beside the model",
                        file->name);
 }

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "band.h"
+#include "headroom.h"
 #include "sdm/internal/block_border.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
@@ -197,8 +198,13 @@ Grid::Ptr new_grid(const openvdb::math::Transform::Ptr &transform, float backgro
 }
 
 Grid::Ptr grid_of(const openvdb::math::Transform::Ptr &transform, const sdm_band &box,
-                  float background, bool dense, bool half)
+                  float background, bool dense, bool half, sdm_error *err)
 {
+    const int64_t count = box.n[0] * box.n[1] * box.n[2];
+    need(sdm_vdb_headroom(static_cast<uint64_t>(std::count_if(
+                              box.values, box.values + count,
+                              [=](float v) { return dense || std::fabs(v) < background; })),
+                          err));
     Grid::Ptr grid = new_grid(transform, background, dense, half);
     Grid::Accessor acc = grid->getAccessor();
     const int low = -box.pad & ~7, dim = 8;
@@ -274,7 +280,7 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
     need(sdm_band_close(&g, values, background, &o, &box.band, err));
     report.cut = box.band.cut;
     report.estimated_voxels = box.band.estimated;
-    Grid::Ptr grid = grid_of(transform, box.band, background, false, o.half);
+    Grid::Ptr grid = grid_of(transform, box.band, background, false, o.half, err);
     mend_creases(*grid, o, report, err);
     return grid;
 }
@@ -309,6 +315,7 @@ Grid::Ptr make_from_blocks(const sdm_blocks &b, const sdm_vdb_opts &o, sdm_vdb_r
         need(sdm_fail(err, SDM_E_ARG,
                       "the band leaves the grid: blocks cannot be closed at its border; write the "
                       "whole map"));
+    need(sdm_vdb_headroom(static_cast<uint64_t>(b.n_block) * Leaf::SIZE / 3, err));
     Grid::Ptr grid = new_grid(transform, background, false, o.half);
     Grid::Accessor acc = grid->getAccessor();
     bool inside = false;
@@ -345,7 +352,7 @@ Grid::Ptr make_dense(const sdm_grid &g, const float *values, const sdm_vdb_opts 
         for (int a = 0; a < 3; a++)
             report.cut = report.cut || (values[i] < 0 && (at[a] == 0 || at[a] == g.n[a] - 1));
     }
-    return grid_of(transform_of(g, false), box.band, background, true, o.half);
+    return grid_of(transform_of(g, false), box.band, background, true, o.half, err);
 }
 
 // ---- reading

@@ -88,7 +88,7 @@ class Graph:
             "MatMul": lambda a, x, y: np.matmul(x, y), "Identity": lambda a, x: x,
             "Concat": lambda a, *x: np.concatenate(x, a["axis"]), "Gather": lambda a, x, i: np.take(x, i, a["axis"]),
             "Reshape": lambda a, x, d: x.reshape(d), "Transpose": lambda a, x: x.transpose(a["perm"]),
-            "Slice": lambda a, x, b, e: x[b[0]:e[0]], "Sigmoid": lambda a, x: 1 / (1 + np.exp(-x)),
+            "Slice": lambda a, x, b, e, axis: x[(slice(None),) * int(axis[0]) + (slice(int(b[0]), int(e[0])),)], "Sigmoid": lambda a, x: 1 / (1 + np.exp(-x)),
             "Tanh": lambda a, x: np.tanh(x), "Relu": lambda a, x: np.maximum(x, 0),
             "LeakyRelu": lambda a, x: np.where(x < 0, np.float32(a["alpha"]) * x, x),
         }

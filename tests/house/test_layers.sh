@@ -38,25 +38,25 @@ check() {
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
         own("core", "blocks export grid memory pose shape status") # shape: types alone
-         own("core", "block_border checksum clock distribution envelope file heap mat3 near processor rng rotation sampling shared table team text threads vec3")
+         own("core", "block_border checksum clock container distribution envelope file heap json_describe json_read mat3 near processor rng rotation sampling sha256 shared table team text threads utf8 vec3")
          own("config", "config experiment mistakes")
         own("geom", "exact isosurface mesh")
         own("geom", "brute_force builder methods part_audit")
         own("nn", "model")
-        own("nn", "container fine kernels model_onnx model_threads pod point_network sdmnn template")
-        own("io", "glb image meshfile npy picture volume")
+        own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template")
+        own("io", "glb image meshfile npy picture ssm volume")
         own("shape", "callback registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
          own("all", "sdmgen") # the header that includes all public ones
-         own("trainer", "train train_file verdict")
+         own("trainer", "ssm_build train train_file verdict")
         parts("core", "core")
         parts("config", "core config")
         parts("geom", "core geom")
         parts("nn", "core nn")
         parts("io", "core geom io")
         parts("shape", "core geom io shape")
-        parts("shapes", "core geom shape shapes")
+        parts("shapes", "core geom io shape shapes")
         parts("runtime", "core geom nn io shape runtime")
         parts("all", "core geom nn io shape shapes runtime trainer all")
         parts("trainer", "core config geom nn io shape trainer")
@@ -65,8 +65,8 @@ check() {
         rooms("framework/nn/", "kernels onnx fine model pod template point sdmnn open")
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit/judge fit vdb")
-        rooms("trainer/", "numerics data state pod fine template direct .")
-        rooms("cli/", "args report inputs shapes phantom fit study page .")
+        rooms("trainer/", "numerics ssm data state pod fine template direct .")
+        rooms("cli/", "args slicer report inputs shapes phantom fit ssm study page .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", "."); rooms("shapes/", ".")
         while ((getline line < files) > 0) {
             exists[line] = 1

@@ -1,5 +1,6 @@
 /* Mesh files: round trips, every variant of the formats, and hostile content.
- * Tests: builder.c meshfile.c obj.c off.c ply.c ply_header.c scan.c stl.c */
+ * Tests: builder.c meshfile.c obj.c off.c ply.c ply_header.c polydata.c scan.c stl.c vtk.c
+ * vtk_types.c vtp.c vtp_data.c vtp_tags.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,7 +15,7 @@
 #include "sdm/internal/rng.h"
 #include "sdm/meshfile.h"
 
-static const char *const extensions[] = {".ply", ".stl", ".obj", ".off"};
+static const char *const extensions[] = {".ply", ".stl", ".obj", ".off", ".vtk", ".vtp"};
 
 static void file_save(const char *path, const void *data, size_t size)
 {

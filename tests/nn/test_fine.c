@@ -209,7 +209,7 @@ static void test_derivatives_agree_with_differences(void **state)
     const double step = 3e-4;
     static float maps[2 * N], ends[2][N], fine[2 * FINE], after[2][FINE];
     double largest = 0, error = 0;
-    // maps that lie on a line: the derivative of each voxel is a constant
+    // The maps at the two ends of the step: each voxel moves by its derivative, maps[N + i].
     fill_map(0, maps);
     for (int i = 0; i < N; i++) {
         maps[N + i] = (float)(0.3 * sdm_rng_normal(8, 1, (uint64_t)i));

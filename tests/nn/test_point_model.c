@@ -11,8 +11,8 @@
 
 #include <cmocka.h>
 
+#include "model_faults.h"
 #include "sdm/internal/container.h"
-#include "sdm/internal/heap.h"
 #include "sdm/internal/model_threads.h"
 #include "sdm/internal/point_network.h"
 #include "sdm/internal/rng.h"
@@ -243,16 +243,6 @@ static void file_keeps_everything(void **state)
     sdm_free(t.weights);
 }
 
-static void expect_refused(const uint8_t *bytes, size_t size, const char *what, size_t at)
-{
-    sdm_model *m = NULL;
-    sdm_error e = {0};
-    const sdm_status s = sdm_model_open_memory("file", bytes, size, &m, &e);
-    if (s != SDM_E_FORMAT) fail_msg("%s at %zu gives status %d", what, at, s);
-    assert_null(m);
-    assert_memory_equal(e.text, "file: ", 6);
-}
-
 static void damage_is_refused(void **state)
 {
     (void)state;
@@ -261,11 +251,11 @@ static void damage_is_refused(void **state)
     uint8_t *bytes;
     size_t size;
     assert_int_equal(sdm_point_build(&t.spec, &bytes, &size, NULL), SDM_OK);
-    for (size_t n = 0; n < size; n += n < 300 ? 1 : 211) expect_refused(bytes, n, "truncation", n);
+    for (size_t n = 0; n < size; n += n < 300 ? 1 : 211) expect_damaged(bytes, n, "truncation", n);
     for (size_t i = 0; i < size; i += i < 300 ? 1 : 101)
         for (int bit = 0; bit < 8; bit++) {
             bytes[i] ^= (uint8_t)(1 << bit);
-            expect_refused(bytes, size, "flipped bit", i);
+            expect_damaged(bytes, size, "flipped bit", i);
             bytes[i] ^= (uint8_t)(1 << bit);
         }
     sdm_free(bytes);
@@ -309,7 +299,7 @@ static void hostile_sections(void **state)
         memcpy(at, lines[i][1], strlen(lines[i][1]));
         sections[0].data = text;
         assert_int_equal(sdm_container_build(sections, n, &changed, &changed_size, NULL), SDM_OK);
-        expect_refused(changed, changed_size, lines[i][1], i);
+        expect_damaged(changed, changed_size, lines[i][1], i);
         sdm_free(changed);
     }
     sections[0] = meta;
@@ -321,12 +311,12 @@ static void hostile_sections(void **state)
         for (size_t k = 0; k < n; k++)
             if (k != i) left[kept++] = sections[k];
         assert_int_equal(sdm_container_build(left, kept, &changed, &changed_size, NULL), SDM_OK);
-        expect_refused(changed, changed_size, "missing section", i);
+        expect_damaged(changed, changed_size, "missing section", i);
         sdm_free(changed);
         if (strncmp(names[i], "point.", 6) != 0) continue;
         sections[i].size -= 4;
         assert_int_equal(sdm_container_build(sections, n, &changed, &changed_size, NULL), SDM_OK);
-        expect_refused(changed, changed_size, "short section", i);
+        expect_damaged(changed, changed_size, "short section", i);
         sdm_free(changed);
         sections[i].size += 4;
     }
@@ -334,38 +324,17 @@ static void hostile_sections(void **state)
     sdm_free(t.weights);
 }
 
+static sdm_status build(const void *spec, uint8_t **bytes, size_t *size, sdm_error *err)
+{
+    return sdm_point_build(spec, bytes, size, err);
+}
+
 static void every_allocation_may_fail(void **state)
 {
     (void)state;
     toy t;
     toy_make(&t, false, false, 0);
-    uint8_t *bytes = NULL;
-    size_t size = 0;
-    sdm_error e;
-    sdm_status s = SDM_E_NOMEM;
-    unsigned long n = 1;
-    // Building the file.
-    for (; s; n++) {
-        sdm_alloc_fail_after(n);
-        s = sdm_point_build(&t.spec, &bytes, &size, &e);
-        if (s) assert_int_equal(s, SDM_E_NOMEM);
-        assert_true(n < 100);
-    }
-    sdm_alloc_fail_after(0);
-    assert_true(n > 3);
-    sdm_model *m = NULL;
-    s = SDM_E_NOMEM;
-    // Opening the model.
-    for (n = 1; s; n++) {
-        sdm_alloc_fail_after(n);
-        s = sdm_model_open_memory("toy", bytes, size, &m, &e);
-        if (s) assert_int_equal(s, SDM_E_NOMEM);
-        assert_true(n < 100);
-    }
-    sdm_alloc_fail_after(0);
-    assert_true(n > 4);
-    sdm_model_free(m);
-    sdm_free(bytes);
+    sdm_model_free(open_with_failing_allocations(build, &t.spec, 3, 4));
     sdm_free(t.weights);
 }
 

@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
+#include "model_faults.h"
 #include "sdm/internal/container.h"
-#include "sdm/internal/heap.h"
 #include "template_toy.h"
 
 static const double ORIGIN[3] = {0, 0, 0};
@@ -264,37 +264,23 @@ static void hostile_weights_are_harmless(void **state)
         }
 }
 
+static sdm_status build(const void *spec, uint8_t **bytes, size_t *size, sdm_error *err)
+{
+    toy t = *(const toy *)spec;
+    return toy_build(&t, bytes, size, err);
+}
+
 static void every_allocation_may_fail(void **state)
 {
     (void)state;
     toy t = make();
-    uint8_t *bytes = NULL;
-    size_t size = 0;
+    sdm_model *m = open_with_failing_allocations(build, &t, 4, 5);
     sdm_error e;
     sdm_status s = SDM_E_NOMEM;
     unsigned long n = 1;
-    for (; s; n++) {
-        sdm_alloc_fail_after(n);
-        s = toy_build(&t, &bytes, &size, &e);
-        sdm_alloc_fail_after(0);
-        if (s) assert_int_equal(s, SDM_E_NOMEM);
-        assert_true(n < 100);
-    }
-    assert_true(n > 4);
-    sdm_model *m = NULL;
-    s = SDM_E_NOMEM;
-    for (n = 1; s; n++) {
-        sdm_alloc_fail_after(n);
-        s = sdm_model_open_memory("toy", bytes, size, &m, &e);
-        sdm_alloc_fail_after(0);
-        if (s) assert_int_equal(s, SDM_E_NOMEM);
-        assert_true(n < 100);
-    }
-    assert_true(n > 5);
     const double p[P] = {0, 3}, y[3] = {0};
     double x[3];
-    s = SDM_E_NOMEM;
-    for (n = 1; s; n++) {
+    for (; s; n++) {
         sdm_alloc_fail_after(n);
         s = sdm_template_carry(m, p, y, 1, x, &e);
         sdm_alloc_fail_after(0);
@@ -303,7 +289,6 @@ static void every_allocation_may_fail(void **state)
     }
     assert_true(n > 4);
     sdm_model_free(m);
-    sdm_free(bytes);
     toy_dispose(&t);
 }
 

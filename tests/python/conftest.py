@@ -5,6 +5,7 @@ PYTHONPATH (the folder of the package)."""
 
 import os
 import subprocess
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,15 @@ def model_file(tmp_path_factory):
 @pytest.fixture(scope="session")
 def model(model_file):
     return sdmgen.Model(model_file)
+
+
+def in_threads(n, work):
+    """Calls work(0) .. work(n - 1) at the same time; returns when all have returned."""
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(n)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
 
 
 def ball(radius=1.0, stretch=1.0, n=12):

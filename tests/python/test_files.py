@@ -1,5 +1,8 @@
 """Files: what is written can be read, by this package, by the program and by other libraries."""
 
+import sys
+import types
+
 import numpy as np
 import pytest
 from conftest import ball
@@ -39,7 +42,7 @@ def test_images(map, tmp_path):
 
 def test_meshes(map, tmp_path):
     mesh = sdmgen.Mesh(*ball())
-    for ending in (".ply", ".obj", ".off", ".stl"):
+    for ending in (".ply", ".obj", ".off", ".stl", ".vtk", ".vtp"):
         sdmgen.write(tmp_path / f"ball{ending}", mesh)
         again = sdmgen.read(tmp_path / f"ball{ending}")
         assert len(again.triangles) == len(mesh.triangles)
@@ -77,6 +80,46 @@ def test_simpleitk(map):
     image = map.to_itk()
     assert np.array_equal(sitk.GetArrayFromImage(image), map.values)
     assert np.allclose(image.TransformIndexToPhysicalPoint((3, 4, 5)), map.grid.points()[5, 4, 3])
+
+
+class FakeImage:
+    """What SimpleITK's documentation says of an image made from an array [z, y, x]: indices are (x, y, z),
+    the direction is a matrix row by row, point = origin + direction (spacing * index)."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def SetOrigin(self, values):
+        self.origin = self.three(values)
+
+    def SetSpacing(self, values):
+        self.spacing = self.three(values)
+
+    def SetDirection(self, values):
+        assert len(values) == 9 and all(type(v) is float for v in values)
+        self.direction = np.reshape(values, (3, 3))
+
+    def GetPixel(self, index):
+        x, y, z = index
+        return self.array[z, y, x]
+
+    def TransformIndexToPhysicalPoint(self, index):
+        return self.origin + self.direction @ (self.spacing * np.array(index))
+
+    @staticmethod
+    def three(values):
+        assert len(values) == 3 and all(type(v) is float for v in values)
+        return np.array(values)
+
+
+def test_itk_without_it(map, monkeypatch):
+    """Debian has no SimpleITK: the calls are checked against what its documentation says."""
+    monkeypatch.setitem(sys.modules, "SimpleITK", types.SimpleNamespace(GetImageFromArray=FakeImage))
+    turned = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    grid = sdmgen.Grid(map.grid.size, (0.5, 0.75, 1.25), (1, 2, 3), turned)
+    image = sdmgen.Map(map.values, grid).to_itk()
+    assert image.GetPixel((3, 4, 5)) == map.values[5, 4, 3]
+    assert np.allclose(image.TransformIndexToPhysicalPoint((3, 4, 5)), grid.points()[5, 4, 3])
 
 
 def test_vtk(map):

@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import ball
+from conftest import ball, in_threads
 
 import sdmgen
 
@@ -196,11 +196,7 @@ def test_eight_threads(model):
             if ok is not True:
                 wrong.append(ok)
 
-    threads = [threading.Thread(target=work, args=(i,)) for i in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    in_threads(8, work)
     assert not wrong
 
 

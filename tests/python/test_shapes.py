@@ -2,11 +2,10 @@
 library; their mistakes."""
 
 import gc
-import threading
 
 import numpy as np
 import pytest
-from conftest import ball
+from conftest import ball, in_threads
 
 import sdmgen
 
@@ -128,11 +127,7 @@ def test_a_failure_belongs_to_its_call():
                 if a <= 1.5 or f"no mesh at {a}" not in error.text:
                     wrong.append(error)
 
-    threads = [threading.Thread(target=work, args=(k,)) for k in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    in_threads(8, work)
     assert not wrong
 
 

@@ -144,7 +144,7 @@ static sdm_status direct_run(trainer *t, bool resumed, sdm_error *err)
         const double now = trainer_seconds(t);
         if (trainer_evaluation_due(t, now) && (s = direct_evaluate(t, d, rate, err))) break;
         trainer_step_done(t);
-        s = trainer_checkpoint_if_due(t, now, err);
+        trainer_checkpoint_if_due(t, now);
     }
     if (!s && t->evaluated_step != t->step) s = direct_evaluate(t, d, 0, err);
     return s;

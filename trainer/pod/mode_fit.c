@@ -244,7 +244,7 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
                 done = trainer_best_note(t, &pod->mode_fit, at, t->heldout_mse);
         }
         trainer_step_done(t);
-        s = trainer_checkpoint_if_due(t, now, err);
+        trainer_checkpoint_if_due(t, now);
     }
     if (!s && t->evaluated_step != t->step) s = evaluate(pod, &b, batch, 0, err);
     if (!s) {

@@ -305,10 +305,11 @@ sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err)
  * have a different budget), or of the time until trainer_seconds() = `end`. */
 static double refine_fraction(const trainer *t, double end)
 {
-    if (!trainer_by_time(t))
-        return (double)t->phase_step / (double)(trainer_steps(t) - (t->step - t->phase_step));
-    const double length = end - t->phase_started;
-    return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
+    const bool by_time = trainer_by_time(t);
+    const double length =
+        by_time ? end - t->phase_started : (double)(trainer_steps(t) - (t->step - t->phase_step));
+    const double used = by_time ? trainer_seconds(t) - t->phase_started : (double)t->phase_step;
+    return length > 0 ? used / length : 1;
 }
 
 sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
@@ -352,7 +353,7 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
                 done = trainer_best_note(t, &pod->refine, at, t->heldout_mse);
         }
         trainer_step_done(t);
-        s = trainer_checkpoint_if_due(t, now, err);
+        trainer_checkpoint_if_due(t, now);
     }
     if (!s && t->evaluated_step != t->step)
         s = trainer_refine_note(pod, pod->refine.average, 0, err);

@@ -98,10 +98,12 @@ sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err)
     return s;
 }
 
-sdm_status trainer_checkpoint_if_due(trainer *t, double now, sdm_error *err)
+void trainer_checkpoint_if_due(trainer *t, double now)
 {
-    if (!(now - t->last_checkpoint > t->config->train.checkpoint_seconds)) return SDM_OK;
-    return trainer_checkpoint_write(t, err);
+    sdm_error reason = {0};
+    if (!(now - t->last_checkpoint > t->config->train.checkpoint_seconds)) return;
+    if (trainer_checkpoint_write(t, &reason))
+        trainer_warn(t, "no checkpoint, training goes on and tries again: %s", reason.text);
 }
 
 sdm_status trainer_stop(trainer *t, sdm_error *err)
@@ -289,14 +291,34 @@ static sdm_status plan_read(const trainer *t, const checkpoint_file *o, sample_p
     return SDM_OK;
 }
 
+/* The bytes of a bool in a file are not to be read as one before they are known to be 0 or 1. */
+static bool is_bool(const bool *stored)
+{
+    uint8_t byte;
+    memcpy(&byte, stored, sizeof byte);
+    return byte <= 1;
+}
+
+static bool ends(const char *text, size_t size) { return memchr(text, '\0', size); }
+
+/* true: the result of the first training can be used without reading beyond its texts. */
+static bool report_is_sound(const sdm_train_report *r)
+{
+    const sdm_verdict *v = &r->verdict;
+    return r->steps >= 0 && r->seconds >= 0 && ends(r->model_path, sizeof r->model_path) &&
+           is_bool(&r->compared) && is_bool(&v->limited) && (unsigned)v->grade <= SDM_GRADE_POOR &&
+           (unsigned)v->limit < SDM_CAUSES && ends(v->key, sizeof v->key) &&
+           ends(v->sentence, sizeof v->sentence);
+}
+
 /* Reads the turns of a run with two kinds. */
 static sdm_status turns_read(const trainer *t, const sdm_section *stored, training_turns *out,
                              sdm_error *err)
 {
     if (stored->size == sizeof *out) memcpy(out, stored->data, sizeof *out);
     bool sound = stored->size == sizeof *out && out->n == 2 && (out->at == 0 || out->at == 1) &&
-                 out->share > 0 && out->share <= 1 &&
-                 memchr(out->first.model_path, '\0', sizeof out->first.model_path);
+                 out->share > 0 && out->share <= 1 && is_bool(&out->chosen) &&
+                 report_is_sound(&out->first);
     for (int i = 0; i < 2 && sound; i++)
         sound = out->kind[i] == SDM_NETWORK_POD || out->kind[i] == SDM_NETWORK_TEMPLATE;
     return sound ? SDM_OK
@@ -337,13 +359,15 @@ sdm_status trainer_checkpoint_read(trainer *t, bool *found, sdm_error *err)
     s = check_config(t, section_find(&o, "config"), &then, err);
     if (!s) {
         const dataset *d = &t->data;
-        // refuse counters that contradict each other
-        const bool sound =
-            (then.phase == SDM_PHASE_MODE_FIT || then.phase == SDM_PHASE_REFINE) &&
-            then.n_start >= 0 && (size_t)then.n_start <= d->n_start &&
-            then.n_taken >= then.n_start && (size_t)then.n_taken <= d->n_start + d->n_online &&
-            then.phase_step >= 0 && then.step >= then.phase_step && isfinite(then.seconds) &&
-            then.phase_started >= 0 && then.seconds >= then.phase_started;
+        // refuse counters that contradict each other; all steps of the first phase are its own
+        const bool sound = (then.phase == SDM_PHASE_REFINE ||
+                            (then.phase == SDM_PHASE_MODE_FIT && then.step == then.phase_step)) &&
+                           then.n_start >= 0 && (size_t)then.n_start <= d->n_start &&
+                           then.n_taken >= then.n_start &&
+                           (size_t)then.n_taken <= d->n_start + d->n_online &&
+                           then.phase_step >= 0 && then.step >= then.phase_step &&
+                           isfinite(then.seconds) && isfinite(then.last_evaluation) &&
+                           then.phase_started >= 0 && then.seconds >= then.phase_started;
         if (!sound)
             s = sdm_fail(err, SDM_E_FORMAT,
                          "%s/checkpoint.sdmc: its counters contradict each other", t->folder);

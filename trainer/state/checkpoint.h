@@ -12,8 +12,10 @@ sdm_status trainer_checkpoint_remove(const trainer *t, sdm_error *err);
 /* Writes the checkpoint atomically. */
 sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err);
 
-/* Writes a checkpoint if the last one is older than train.checkpoint_seconds at time `now`. */
-sdm_status trainer_checkpoint_if_due(trainer *t, double now, sdm_error *err);
+/* Writes a checkpoint if the last one is older than train.checkpoint_seconds at time `now`. If it
+ * cannot be written, a warning tells it, and the next time is as far away as after a written one.
+ */
+void trainer_checkpoint_if_due(trainer *t, double now);
 
 /* *out = the kinds that the run trains whose checkpoint is in the folder of t, and where it was.
  *found: false if there is no checkpoint. SDM_E_FORMAT: it is damaged. */

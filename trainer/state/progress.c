@@ -182,15 +182,20 @@ sdm_status trainer_metrics_write(const trainer *t, sdm_error *err)
     return s;
 }
 
-/* Closes the object *j, adds it as a line and writes the file. */
+/* Closes the object *j, adds it as a line and writes the file. During a training a file that cannot
+ * be written is no error: the next line brings it up to date. */
 static sdm_status metrics_add(trainer *t, sdm_json *j, sdm_error *err)
 {
+    sdm_error reason = {0};
     sdm_json_close(j, '}');
     if (!j->text.failed) sdm_text_add(t->metrics, "%s\n", j->text.data);
     const bool failed = j->text.failed || t->metrics->failed;
     sdm_json_dispose(j);
-    return failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics")
-                  : trainer_metrics_write(t, err);
+    if (failed) return sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics");
+    if (t->phase == SDM_PHASE_EVALUATE) return trainer_metrics_write(t, err);
+    if (trainer_metrics_write(t, &reason))
+        trainer_warn(t, "no line in metrics.jsonl, the next one brings it: %s", reason.text);
+    return SDM_OK;
 }
 
 sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)

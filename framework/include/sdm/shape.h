@@ -85,8 +85,8 @@ typedef struct sdm_host {
      * Returns 0 or non-zero. */
     int (*read_file)(const struct sdm_host *host, const char *path, const unsigned char **data,
                      size_t *size);
-    /* Reads a mesh file (.ply .stl .obj .off) into *out, whose arrays are valid until the callback
-     * returns. Only for create(). Returns 0 or non-zero. */
+    /* Reads a mesh file (.ply .stl .obj .off .vtk .vtp) into *out, whose arrays are valid until the
+     * callback returns. Only for create(). Returns 0 or non-zero. */
     int (*read_mesh)(const struct sdm_host *host, const char *path, sdm_mesh_out *out);
     /* Reads a .npy file of float32 or float64 in C order, at most 4 dimensions. *values (converted
      * to double) is valid until the callback returns; sizes in shape[0 .. *n_dim - 1]. Only for

@@ -109,7 +109,10 @@ static sdm_status read_voxels(sdm_stream *in, const sdm_image_header *h, sdm_vol
     const size_t count = sdm_grid_count(&v->grid), size = sdm_voxel_size(h->type);
     size_t total;
     sdm_status s = count_voxels(in, h, count, &total, err);
-    if (!s) s = SDM_ALLOC(&v->values, total, in->path, err);
+    // pages of memory are used as the voxels come: a header may declare more than there are
+    void *values = NULL;
+    if (!s) s = sdm_alloc_unset(&values, total, sizeof *v->values, in->path, err);
+    v->values = values;
     if (s) return s;
     v->min = INFINITY;
     v->max = -INFINITY;

@@ -12,10 +12,10 @@ typedef struct mesh_format {
     sdm_status (*write)(sdm_outfile *f, const sdm_mesh *m, sdm_error *err);
 } mesh_format;
 
-static const mesh_format formats[] = {{".ply", sdm_ply_read, sdm_ply_write},
-                                      {".stl", sdm_stl_read, sdm_stl_write},
-                                      {".obj", sdm_obj_read, sdm_obj_write},
-                                      {".off", sdm_off_read, sdm_off_write}};
+static const mesh_format formats[] = {
+    {".ply", sdm_ply_read, sdm_ply_write}, {".stl", sdm_stl_read, sdm_stl_write},
+    {".obj", sdm_obj_read, sdm_obj_write}, {".off", sdm_off_read, sdm_off_write},
+    {".vtk", sdm_vtk_read, sdm_vtk_write}, {".vtp", sdm_vtp_read, sdm_vtp_write}};
 
 static sdm_status find_format(const char *path, const mesh_format **out, sdm_error *err)
 {
@@ -24,7 +24,7 @@ static sdm_status find_format(const char *path, const mesh_format **out, sdm_err
         if (sdm_has_ext(path, formats[i].ext)) return SDM_OK;
     }
     return sdm_fail(err, SDM_E_UNSUPPORTED,
-                    "%s: unknown type of mesh file, known are .ply .stl .obj .off", path);
+                    "%s: unknown type of mesh file, known are .ply .stl .obj .off .vtk .vtp", path);
 }
 
 sdm_status sdm_mesh_read(const char *path, sdm_mesh *out, sdm_error *err)

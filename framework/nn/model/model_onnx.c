@@ -4,6 +4,7 @@
 #include <stdio.h>
 
 #include "model_kind.h"
+#include "sdm/internal/json_describe.h"
 
 // x[N][P] = the parameters scaled to [-1, 1]: (params - centre) * factor
 static sdm_onnx_value scale(const sdm_model *m, sdm_onnx *g, sdm_onnx_value params)
@@ -30,36 +31,13 @@ sdm_onnx_value sdm_model_onnx_maps(const sdm_model *m, sdm_onnx *g, sdm_onnx_val
     return sdm_onnx_reshape(g, rows, 4, (const int64_t[]){-1, n[2], n[1], n[0]});
 }
 
-static void add_reals(sdm_json *j, const char *key, const double *v, size_t n)
-{
-    sdm_json_open(j, key, '[');
-    for (size_t i = 0; i < n; i++) sdm_json_real(j, NULL, v[i]);
-    sdm_json_close(j, ']');
-}
-
-static void describe_grid(const sdm_grid *grid, sdm_json *j)
-{
-    sdm_json_open(j, NULL, '{');
-    sdm_json_open(j, "size", '[');
-    for (int i = 0; i < 3; i++) sdm_json_int(j, NULL, grid->n[i]);
-    sdm_json_close(j, ']');
-    add_reals(j, "spacing", grid->spacing, 3);
-    add_reals(j, "origin", grid->origin, 3);
-    add_reals(j, "direction", grid->dir, 9);
-    sdm_json_close(j, '}');
-}
-
 static void describe_params(const sdm_model_info *info, sdm_json *j)
 {
     sdm_json_open(j, NULL, '[');
     for (size_t i = 0; i < info->n_params; i++) {
         const sdm_model_param *p = &info->params[i];
         sdm_json_open(j, NULL, '{');
-        sdm_json_text(j, "name", p->name);
-        sdm_json_text(j, "unit", p->unit);
-        sdm_json_real(j, "min", p->min);
-        sdm_json_real(j, "max", p->max);
-        sdm_json_real(j, "default", p->def);
+        sdm_json_parameter(j, p->name, p->unit, p->min, p->max, p->def);
         sdm_json_close(j, '}');
     }
     sdm_json_close(j, ']');
@@ -87,7 +65,7 @@ static sdm_status describe(const sdm_model *m, sdm_onnx *g, sdm_error *err)
     sdm_onnx_metadata(g, "rmse_mm", sdm_format_real(info->accuracy.rmse_mm, text));
     snprintf(text, sizeof text, "%016llx", (unsigned long long)info->checksum);
     sdm_onnx_metadata(g, "model", text);
-    describe_grid(&info->grid, &grid);
+    sdm_json_grid(&grid, NULL, &info->grid, true);
     describe_params(info, &params);
     const bool grid_done = add_json(g, "grid", &grid),
                params_done = add_json(g, "parameters", &params);
@@ -97,12 +75,6 @@ static sdm_status describe(const sdm_model *m, sdm_onnx *g, sdm_error *err)
 
 sdm_status sdm_model_write_onnx(const sdm_model *m, const char *path, sdm_error *err)
 {
-    if (!m->kind->onnx)
-        return sdm_fail(err, SDM_E_UNSUPPORTED,
-                        "a network of kind '%s' cannot be written as ONNX: it carries its template "
-                        "along by interpolation at displaced points of space, for which opset 13 "
-                        "has no operator; train one of another kind (network.kind: pod)",
-                        m->kind->name);
     const size_t dims[] = {(size_t)m->info.grid.n[2], (size_t)m->info.grid.n[1],
                            (size_t)m->info.grid.n[0]};
     sdm_onnx *g;

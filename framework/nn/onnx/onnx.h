@@ -17,6 +17,13 @@ typedef uint32_t sdm_onnx_value;
 
 enum { SDM_ONNX_MAX_DIMS = 5 };
 
+/* Types of elements, as in onnx.proto. */
+typedef enum sdm_onnx_type {
+    SDM_ONNX_FLOAT = 1,
+    SDM_ONNX_INT32 = 6,
+    SDM_ONNX_INT64 = 7
+} sdm_onnx_type;
+
 /* *out = an empty graph with the input `params`[N][n_params], whose value is *input; free it with
    sdm_onnx_free(). SDM_E_NOMEM. */
 sdm_status sdm_onnx_create(size_t n_params, sdm_onnx **out, sdm_onnx_value *input, sdm_error *err);
@@ -34,6 +41,17 @@ typedef void (*sdm_onnx_fill)(const void *user, size_t item, float *to);
  */
 sdm_onnx_value sdm_onnx_weights(sdm_onnx *g, const char *what, size_t n_dims, const size_t *dims,
                                 sdm_onnx_fill fill, const void *user);
+
+/* A layer of a network: `user` of the function that fills the matrix of sdm_onnx_layer_weights().
+ */
+typedef struct sdm_onnx_layer {
+    const void *network;
+    size_t layer;
+} sdm_onnx_layer;
+
+/* The matrix [rows][columns] of a layer; the network must live as long as the graph. */
+sdm_onnx_value sdm_onnx_layer_weights(sdm_onnx *g, size_t rows, size_t columns, sdm_onnx_fill fill,
+                                      const void *network, size_t layer);
 
 /* Tensors with given elements, which must live as long as the graph: floats, 32-bit integers, and a
    copied list of n 64-bit integers. */
@@ -65,6 +83,36 @@ sdm_onnx_value sdm_onnx_node3(sdm_onnx *g, const char *op, sdm_onnx_value a, sdm
 sdm_onnx_value sdm_onnx_gather(sdm_onnx *g, sdm_onnx_value from, sdm_onnx_value index, int axis);
 sdm_onnx_value sdm_onnx_reshape(sdm_onnx *g, sdm_onnx_value from, size_t n, const int64_t *dims);
 sdm_onnx_value sdm_onnx_activate(sdm_onnx *g, int kind, sdm_onnx_value from);
+
+/* a + b, a - b, a * b, and the product of matrices. */
+sdm_onnx_value sdm_onnx_add(sdm_onnx *g, sdm_onnx_value a, sdm_onnx_value b);
+sdm_onnx_value sdm_onnx_sub(sdm_onnx *g, sdm_onnx_value a, sdm_onnx_value b);
+sdm_onnx_value sdm_onnx_mul(sdm_onnx *g, sdm_onnx_value a, sdm_onnx_value b);
+sdm_onnx_value sdm_onnx_product(sdm_onnx *g, sdm_onnx_value a, sdm_onnx_value b);
+
+/* A value with elements of another type. */
+sdm_onnx_value sdm_onnx_cast(sdm_onnx *g, sdm_onnx_value v, sdm_onnx_type to);
+
+/* A tensor of floats from values that are copied. */
+sdm_onnx_value sdm_onnx_constant(sdm_onnx *g, const char *what, size_t n_dims, const size_t *dims,
+                                 const double *values);
+
+/* Along one axis (negative: counted from the last): the elements index[n], which are copied; the
+   elements first .. end - 1; the sum, and the extreme (op: ReduceMin or ReduceMax), which keep the
+   axis. Values joined along an axis; a value with its n axes in the order axes[n]. */
+sdm_onnx_value sdm_onnx_pick(sdm_onnx *g, sdm_onnx_value from, int axis, size_t n,
+                             const int32_t *index);
+sdm_onnx_value sdm_onnx_slice(sdm_onnx *g, sdm_onnx_value from, int64_t axis, int64_t first,
+                              int64_t end);
+sdm_onnx_value sdm_onnx_sum(sdm_onnx *g, sdm_onnx_value from, int64_t axis);
+sdm_onnx_value sdm_onnx_extreme(sdm_onnx *g, const char *op, sdm_onnx_value from, int64_t axis);
+sdm_onnx_value sdm_onnx_join(sdm_onnx *g, int axis, size_t n, const sdm_onnx_value *parts);
+sdm_onnx_value sdm_onnx_transpose(sdm_onnx *g, sdm_onnx_value from, size_t n, const int64_t *axes);
+
+/* phi[n_terms][N] = products of normalised Legendre polynomials of x[n_params][N];
+   exponents[n_terms][n_params] <= degree, degree <= 16, as from sdm_poly_table(). */
+sdm_onnx_value sdm_onnx_polynomials(sdm_onnx *g, sdm_onnx_value x, const uint8_t *exponents,
+                                    size_t n_terms, size_t n_params, size_t degree);
 
 /* A loop over the first dimension of `over`: the nodes between the two calls belong to its body and
    may use all values of the graph. sdm_onnx_loop_begin() returns the current slice of `over`, which

@@ -14,7 +14,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
 
 enum { IR_VERSION = 7, OPSET = 13 };
 
-static size_t element_bytes(int type) { return type == ONNX_INT64 ? 8 : 4; }
+static size_t element_bytes(int type) { return type == SDM_ONNX_INT64 ? 8 : 4; }
 
 // bytes of one item of dims[0]; a tensor fits in memory, so that nothing overflows
 static double item_bytes(const onnx_tensor *t)

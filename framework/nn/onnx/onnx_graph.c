@@ -89,19 +89,29 @@ static sdm_onnx_value add_tensor(sdm_onnx *g, int type, const char *what, size_t
 sdm_onnx_value sdm_onnx_weights(sdm_onnx *g, const char *what, size_t n_dims, const size_t *dims,
                                 sdm_onnx_fill fill, const void *user)
 {
-    return add_tensor(g, ONNX_FLOAT, what, n_dims, dims, fill, user, NULL);
+    return add_tensor(g, SDM_ONNX_FLOAT, what, n_dims, dims, fill, user, NULL);
+}
+
+sdm_onnx_value sdm_onnx_layer_weights(sdm_onnx *g, size_t rows, size_t columns, sdm_onnx_fill fill,
+                                      const void *network, size_t layer)
+{
+    const size_t dims[] = {rows, columns};
+    sdm_onnx_layer *user = sdm_onnx_memory(g, 1, sizeof *user);
+    if (!user) return 0;
+    *user = (sdm_onnx_layer){network, layer};
+    return sdm_onnx_weights(g, "layer", 2, dims, fill, user);
 }
 
 sdm_onnx_value sdm_onnx_floats(sdm_onnx *g, const char *what, size_t n_dims, const size_t *dims,
                                const float *values)
 {
-    return add_tensor(g, ONNX_FLOAT, what, n_dims, dims, NULL, NULL, values);
+    return add_tensor(g, SDM_ONNX_FLOAT, what, n_dims, dims, NULL, NULL, values);
 }
 
 sdm_onnx_value sdm_onnx_indices(sdm_onnx *g, const char *what, size_t n_dims, const size_t *dims,
                                 const int32_t *values)
 {
-    return add_tensor(g, ONNX_INT32, what, n_dims, dims, NULL, NULL, values);
+    return add_tensor(g, SDM_ONNX_INT32, what, n_dims, dims, NULL, NULL, values);
 }
 
 sdm_onnx_value sdm_onnx_list(sdm_onnx *g, size_t n, const int64_t *values)
@@ -109,7 +119,7 @@ sdm_onnx_value sdm_onnx_list(sdm_onnx *g, size_t n, const int64_t *values)
     int64_t *copy = sdm_onnx_memory(g, n, sizeof *copy);
     if (!copy) return 0;
     memcpy(copy, values, n * sizeof *copy);
-    return add_tensor(g, ONNX_INT64, "list", 1, &n, NULL, NULL, copy);
+    return add_tensor(g, SDM_ONNX_INT64, "list", 1, &n, NULL, NULL, copy);
 }
 
 sdm_onnx_value sdm_onnx_scalar(sdm_onnx *g, double value)
@@ -224,7 +234,7 @@ void onnx_describe(sdm_proto *graph, unsigned field, const char *name, size_t n_
         sdm_proto_message(&shape, 1, &dim);
         sdm_proto_dispose(&dim);
     }
-    sdm_proto_int(&tensor, 1, ONNX_FLOAT);
+    sdm_proto_int(&tensor, 1, SDM_ONNX_FLOAT);
     sdm_proto_message(&tensor, 2, &shape);
     sdm_proto_message(&type, 1, &tensor);
     sdm_proto_text(&value, 1, name);

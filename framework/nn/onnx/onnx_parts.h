@@ -3,9 +3,6 @@
 
 #include "onnx.h"
 
-/* Types of elements, as in onnx.proto. */
-enum { ONNX_FLOAT = 1, ONNX_INT32 = 6, ONNX_INT64 = 7 };
-
 /* A tensor: its elements come from `fill`, or, if that is NULL, from `data`. */
 typedef struct onnx_tensor {
     sdm_onnx_value value;

@@ -3,6 +3,7 @@
 
 #include "model/model_kind.h"
 #include "sdm/internal/file.h"
+#include "sdm/internal/model_hash.h"
 #include "sdm/memory.h"
 
 #define MODEL_BYTES_MAX (UINT64_C(16) << 30)
@@ -43,6 +44,11 @@ sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err)
     memcpy(m->folder, slash ? path : "./", length);
     m->info.folder = m->folder;
     return SDM_OK;
+}
+
+const char *sdm_model_sha256(const sdm_model *m, char text[SDM_SHA256_TEXT])
+{
+    return sdm_sha256(m->file, m->info.file_bytes, text);
 }
 
 const sdm_model_info *sdm_model_get_info(const sdm_model *m) { return &m->info; }

@@ -6,7 +6,6 @@
    [blocks][outputs][rank], Reshape puts the outputs in rows, [blocks * outputs][N]. The rows of all
    buckets of a level are joined. The level below gathers its coefficients from them, and the map
    its voxels. Ranks and numbers of outputs are rounded up to few sizes, with weights of zero. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -44,23 +43,16 @@ static void read_row(sdm_pod_type type, const void *weights, size_t at, size_t n
         sdm_panel_row_i8(n_wide, k, (const int8_t *)weights + at, row, w);
         return;
     }
-    at += row / SDM_PANEL * SDM_PANEL * k + row % SDM_PANEL;
-    for (size_t i = 0; i < k; i++, at += SDM_PANEL)
-        w[i] = type == SDM_POD_F16 ? sdm_half_to_float(((const uint16_t *)weights)[at])
-                                   : ((const float *)weights)[at];
+    for (size_t i = 0; i < k; i++)
+        w[i] = sdm_weight_at(weights, type == SDM_POD_F16, at + sdm_panel_index(k, row, i));
 }
 
 // weights
 
-typedef struct mlp_layer {
-    const pod_network *m;
-    size_t layer;
-} mlp_layer;
-
 static void fill_layer(const void *user, size_t row, float *to)
 {
-    const mlp_layer *l = user;
-    const pod_network *m = l->m;
+    const sdm_onnx_layer *l = user;
+    const pod_network *m = l->network;
     const size_t k = sdm_pod_layer_inputs(&m->arch, l->layer);
     read_row(m->type, m->layer[l->layer], 0, k, k, row, to);
     for (size_t i = 0; i < k && m->type == SDM_POD_I8; i++) to[i] *= m->layer_scale[l->layer][row];
@@ -97,52 +89,12 @@ static void fill_basis(const void *user, size_t item, float *to)
 
 // latents
 
-// values[(degree + 1) * P][N]: the normalised Legendre polynomials of x[P][N], degree by degree
-static sdm_onnx_value legendre(sdm_onnx *g, sdm_onnx_value x, size_t degree)
-{
-    // one = x - x + 1 has the dimensions of x
-    sdm_onnx_value p[2] = {
-        sdm_onnx_node2(g, "Add", sdm_onnx_node2(g, "Sub", x, x), sdm_onnx_scalar(g, 1)), x};
-    sdm_onnx_value all[17];
-    all[0] = p[0];
-    for (size_t k = 1; k <= degree; k++) {
-        const double dk = (double)k;
-        all[k] = sdm_onnx_node2(g, "Mul", p[1], sdm_onnx_scalar(g, sqrt(2 * dk + 1)));
-        if (k == degree) break;
-        // (k + 1) P(k+1) = (2k + 1) x P(k) - k P(k-1)
-        const sdm_onnx_value next =
-            sdm_onnx_node2(g, "Sub",
-                           sdm_onnx_node2(g, "Mul", sdm_onnx_node2(g, "Mul", x, p[1]),
-                                          sdm_onnx_scalar(g, (2 * dk + 1) / (dk + 1))),
-                           sdm_onnx_node2(g, "Mul", p[0], sdm_onnx_scalar(g, dk / (dk + 1))));
-        p[0] = p[1], p[1] = next;
-    }
-    sdm_onnx_set_int(g, "axis", 0);
-    return sdm_onnx_node(g, "Concat", degree + 1, all);
-}
-
-// phi[T][N]: products of as many Legendre polynomials as a product has variables with a degree
-// above 0
+// phi[T][N]: the polynomials of the head and of the MLP
 static sdm_onnx_value polynomials(const pod_network *m, sdm_onnx *g, sdm_onnx_value x)
 {
     const sdm_pod_arch *a = &m->arch;
-    const size_t total = max_size(a->n_terms, 1 + a->n_inputs), n = a->n_params,
-                 degree = max_size(a->degree, a->input_degree), n_factors = n < degree ? n : degree;
-    const sdm_onnx_value values = legendre(g, x, degree);
-    sdm_onnx_value phi = 0;
-    for (size_t f = 0; f < n_factors; f++) {
-        // row of the (f + 1)-th factor of each product; row 0 is the constant 1
-        int32_t *row = sdm_onnx_memory(g, total, sizeof *row);
-        if (!row) return 0;
-        for (size_t t = 0; t < total; t++)
-            for (size_t v = 0, seen = 0; v < n; v++)
-                if (m->exponents[t * n + v] && seen++ == f)
-                    row[t] = (int32_t)(m->exponents[t * n + v] * n + v);
-        const sdm_onnx_value factor = sdm_onnx_gather(
-            g, values, sdm_onnx_indices(g, "factors of the polynomials", 1, &total, row), 0);
-        phi = f ? sdm_onnx_node2(g, "Mul", phi, factor) : factor;
-    }
-    return phi;
+    return sdm_onnx_polynomials(g, x, m->exponents, max_size(a->n_terms, 1 + a->n_inputs),
+                                a->n_params, max_size(a->degree, a->input_degree));
 }
 
 // h[W][N]: the MLP
@@ -150,11 +102,9 @@ static sdm_onnx_value mlp(const pod_network *m, sdm_onnx *g, sdm_onnx_value h)
 {
     const sdm_pod_arch *a = &m->arch;
     for (size_t l = 0; l < a->depth; l++) {
-        mlp_layer *user = sdm_onnx_memory(g, 1, sizeof *user);
-        if (!user) return 0;
-        *user = (mlp_layer){m, l};
-        const size_t dims[] = {a->width, sdm_pod_layer_inputs(a, l)};
-        h = sdm_onnx_node2(g, "MatMul", sdm_onnx_weights(g, "layer", 2, dims, fill_layer, user), h);
+        const sdm_onnx_value w =
+            sdm_onnx_layer_weights(g, a->width, sdm_pod_layer_inputs(a, l), fill_layer, m, l);
+        h = sdm_onnx_node2(g, "MatMul", w, h);
         h = sdm_onnx_node2(
             g, "Add", h, sdm_onnx_floats(g, "bias", 2, (const size_t[]){a->width, 1}, m->bias[l]));
         h = sdm_onnx_activate(g, a->activation, h);
@@ -162,21 +112,14 @@ static sdm_onnx_value mlp(const pod_network *m, sdm_onnx *g, sdm_onnx_value h)
     return h;
 }
 
-// rows first .. end - 1 of a value
-static sdm_onnx_value slice(sdm_onnx *g, sdm_onnx_value from, size_t first, size_t end)
-{
-    return sdm_onnx_node3(g, "Slice", from, sdm_onnx_list(g, 1, (const int64_t[]){(int64_t)first}),
-                          sdm_onnx_list(g, 1, (const int64_t[]){(int64_t)end}));
-}
-
 // coefficients[K][N] of the highest level
 static sdm_onnx_value head(const pod_network *m, sdm_onnx *g, sdm_onnx_value x)
 {
     const sdm_pod_arch *a = &m->arch;
     const sdm_onnx_value phi = polynomials(m, g, x);
-    sdm_onnx_value z = slice(g, phi, 0, a->n_terms);
+    sdm_onnx_value z = sdm_onnx_slice(g, phi, 0, 0, (int64_t)a->n_terms);
     if (a->depth) {
-        const sdm_onnx_value h = mlp(m, g, slice(g, phi, 1, 1 + a->n_inputs));
+        const sdm_onnx_value h = mlp(m, g, sdm_onnx_slice(g, phi, 0, 1, 1 + (int64_t)a->n_inputs));
         sdm_onnx_set_int(g, "axis", 0);
         z = sdm_onnx_node2(g, "Concat", z, h);
     }

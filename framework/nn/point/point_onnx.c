@@ -4,24 +4,14 @@
 #include "point_internal.h"
 #include "sdm/internal/kernels.h"
 
-// A layer; `user` of fill_hidden().
-typedef struct layer_weights {
-    const point_network *k;
-    size_t layer;
-} layer_weights;
-
 // row `input` of the part of W_l that multiplies h_(l-1), transposed: [W_(l-1)][W_l]
 static void fill_hidden(const void *user, size_t input, float *to)
 {
-    const layer_weights *w = user;
-    const point_network *k = w->k;
-    const size_t before = k->arch.width[w->layer - 1];
-    for (size_t o = 0; o < k->arch.width[w->layer]; o++) {
-        const size_t at =
-            k->hidden_at[w->layer] + (o / SDM_PANEL * before + input) * SDM_PANEL + o % SDM_PANEL;
-        to[o] = k->half ? sdm_half_to_float(((const uint16_t *)k->hidden)[at])
-                        : ((const float *)k->hidden)[at];
-    }
+    const sdm_onnx_layer *l = user;
+    const point_network *k = l->network;
+    const size_t at = k->hidden_at[l->layer], before = k->arch.width[l->layer - 1];
+    for (size_t o = 0; o < k->arch.width[l->layer]; o++)
+        to[o] = sdm_weight_at(k->hidden, k->half, at + sdm_panel_index(before, o, input));
 }
 
 // q[V][3] of the voxels of a plane
@@ -82,14 +72,9 @@ sdm_onnx_value sdm_point_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x)
                                sdm_onnx_floats(g, "coordinates", 2, (const size_t[]){3, width},
                                                k->input[l] + a->n_params * width)));
         if (l) {
-            layer_weights *user = sdm_onnx_memory(g, 1, sizeof *user);
-            if (!user) return 0;
-            *user = (layer_weights){k, l};
-            const size_t dims[] = {a->width[l - 1], width};
-            sum = sdm_onnx_node2(
-                g, "Add", sum,
-                sdm_onnx_node2(g, "MatMul", h,
-                               sdm_onnx_weights(g, "layer", 2, dims, fill_hidden, user)));
+            const sdm_onnx_value w =
+                sdm_onnx_layer_weights(g, a->width[l - 1], width, fill_hidden, k, l);
+            sum = sdm_onnx_node2(g, "Add", sum, sdm_onnx_node2(g, "MatMul", h, w));
         }
         h = sdm_onnx_activate(g, a->activation, sum);
     }

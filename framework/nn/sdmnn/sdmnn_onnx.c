@@ -13,19 +13,15 @@ static void fill_volume(const void *user, size_t row, float *to)
 {
     const sdmnn_model *k = user;
     const size_t n = k->plan.arch.width;
-    size_t at = row / SDM_PANEL * SDM_PANEL * n + row % SDM_PANEL;
-    for (size_t i = 0; i < n; i++, at += SDM_PANEL)
-        to[i] = k->half ? sdm_half_to_float(((const uint16_t *)k->volume)[at])
-                        : ((const float *)k->volume)[at];
+    for (size_t i = 0; i < n; i++)
+        to[i] = sdm_weight_at(k->volume, k->half, sdm_panel_index(n, row, i));
 }
 
 static void fill_conv(const void *user, size_t output, float *to)
 {
     const conv_weights *c = user;
     const size_t at = c->at + output * c->row;
-    for (size_t i = 0; i < c->row; i++)
-        to[i] = c->k->half ? sdm_half_to_float(((const uint16_t *)c->k->conv)[at + i])
-                           : ((const float *)c->k->conv)[at + i];
+    for (size_t i = 0; i < c->row; i++) to[i] = sdm_weight_at(c->k->conv, c->k->half, at + i);
 }
 
 // x[N][in] * w^T + bias

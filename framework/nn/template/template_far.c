@@ -47,7 +47,8 @@ float sdm_template_far(const template_work *w, size_t c, const template_block *b
     if (isnan(value[0])) return 0; // every value is a sum with terms of all corners
     if (part->rigid) return 1;
     const float voxels = voxels_per_mm(w), from = SDM_TEMPLATE_FAR_VOXELS, to = from + 1;
-    int32_t near = 0, far = 0; // of the type of the comparisons, so that the loop is vectorised
+    // The counter is as wide as the floats that are compared: the compiler vectorises the loop.
+    int32_t near = 0, far = 0;
     for (size_t v = 0; v < VOXELS; v++) {
         const float distance = fabsf(value[v]) * voxels;
         near += distance <= from;

@@ -95,6 +95,11 @@ typedef struct warp_scratch {
 void sdm_template_invert(const template_network *k, const sdm_template_part *part,
                          const part_pose *pose, const sdm_grid *grid, const warp_scratch *w);
 
+/* Turns n samples of `width` functions into coefficients of the cubic B-splines that interpolate
+   them, n >= 3; stride: floats from one sample to the next. At both ends the second derivative is
+   zero. */
+void sdm_template_spline(float *v, size_t n, size_t stride, size_t width);
+
 /* Turns points[stations][4] into the coefficients of the cubic B-splines that interpolate them. */
 void sdm_template_prefilter(const template_network *k, float *points);
 
@@ -116,3 +121,6 @@ void sdm_template_jacobian(const sdm_model *m, const double *params, float *valu
 size_t sdm_template_jvp_scratch_bytes(const sdm_model *m, int n_threads);
 void sdm_template_jvp(const sdm_model *m, const double *params, const double *direction,
                       float *values, float *tangent, void *scratch, int n_threads);
+
+/* template_onnx.c: entry of the function table. */
+sdm_onnx_value sdm_template_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x);

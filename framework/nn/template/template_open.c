@@ -206,4 +206,5 @@ const sdm_model_kind sdm_kind_template = {.name = "template",
                                               sdm_template_jacobian_scratch_bytes,
                                           .jacobian = sdm_template_jacobian,
                                           .jvp_scratch_bytes = sdm_template_jvp_scratch_bytes,
-                                          .jvp = sdm_template_jvp};
+                                          .jvp = sdm_template_jvp,
+                                          .onnx = sdm_template_onnx};

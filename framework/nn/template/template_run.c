@@ -70,7 +70,8 @@ void sdm_template_lookup(const template_work *w, size_t c, size_t n)
     const float *const u[3] = {r->u[0], r->u[1], r->u[2]};
     float end[3];
     for (int a = 0; a < 3; a++) end[a] = (float)(near->n[a] - 1);
-    int32_t count = 0; // of the type of the comparisons, so that the loop is vectorised
+    // The counter is as wide as the floats that are compared: the compiler vectorises the loop.
+    int32_t count = 0;
     for (size_t i = 0; i < n; i++) count += is_near(u, end, i);
     // the run of points within `near`: first .. last - 1
     size_t first = 0, last = n;

@@ -202,10 +202,7 @@ void sdm_template_inverse_slope(const part_pose *pose, const double dm[9], doubl
     for (int i = 0; i < 9; i++) out[i] = -out[i];
 }
 
-// Turns n samples of `width` functions into coefficients of the cubic B-splines that interpolate
-// them, n >= 3; stride: floats from one sample to the next. At both ends the second derivative is
-// zero.
-static void spline_prefilter(float *v, size_t n, size_t stride, size_t width)
+void sdm_template_spline(float *v, size_t n, size_t stride, size_t width)
 {
     // (c[i-1] + 4 c[i] + c[i+1]) / 6 = v[i], c[0] = v[0], c[n-1] = v[n-1]: Thomas algorithm. Its
     // factors reach their limit, 2 - sqrt(3), within a few steps.
@@ -230,9 +227,9 @@ void sdm_template_prefilter(const template_network *k, float *points)
 {
     const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2], line = 4 * nx,
                  plane = line * ny;
-    for (size_t i = 0; i < ny * nz; i++) spline_prefilter(points + line * i, nx, 4, 4);
-    for (size_t z = 0; z < nz; z++) spline_prefilter(points + plane * z, ny, line, line);
-    spline_prefilter(points, nz, plane, plane);
+    for (size_t i = 0; i < ny * nz; i++) sdm_template_spline(points + line * i, nx, 4, 4);
+    for (size_t z = 0; z < nz; z++) sdm_template_spline(points + plane * z, ny, line, line);
+    sdm_template_spline(points, nz, plane, plane);
 }
 
 // y[3] = a start for the station `at`, from the lines of stations before it along y and z: what

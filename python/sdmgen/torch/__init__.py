@@ -16,9 +16,11 @@ import torch
 from torch import Tensor, nn
 
 from .._model import Model
-from ._networks import Network, Point, Pod, Sdmnn, load
+from ._load import load
+from ._networks import Network, Pod, Point, Sdmnn
+from ._template import Template
 
-__all__ = ["Network", "Pod", "Point", "Sdm", "Sdmnn", "load"]
+__all__ = ["Network", "Pod", "Point", "Sdm", "Sdmnn", "Template", "load"]
 
 
 class _Maps(torch.autograd.Function):

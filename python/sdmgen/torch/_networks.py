@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from .._errors import UnsupportedError
 from ._blocks import Block, blocks_of, leaves_of
+from ._polynomials import exponents_of, polynomials
 from ._weights import Array, File, Panels
 
 ACTIVATIONS: tuple[Callable[[Tensor], Tensor], ...] = (
@@ -72,13 +72,8 @@ class Pod(Network):
         self._read_decoder(file, levels, file.int("pod.block"))
 
     def _read_polynomials(self, n: int) -> None:
-        def products(left: int, variables: int) -> list[list[int]]:
-            if variables == 1:
-                return [[left]]
-            return [[e, *rest] for e in range(left, -1, -1) for rest in products(left - e, variables - 1)]
-
         degree = max(self.degree, self.input_degree)
-        table = [row for d in range(degree + 1) for row in products(d, n)]
+        table = exponents_of(degree, n)
         self.index("exponents", table)
         self.n_terms = sum(sum(row) <= self.degree for row in table)
         self.n_inputs = sum(0 < sum(row) <= self.input_degree for row in table)
@@ -147,20 +142,10 @@ class Pod(Network):
             else:
                 self.index("target_0", _voxel_order(file.model.grid.shape, level, target))
 
-    def polynomials(self, params: Tensor) -> Tensor:
-        """Products of normalised Legendre polynomials of the scaled parameters: [n, products]."""
-        x = self.scaled(params)
-        values = [torch.ones_like(x), x]
-        for k in range(1, max(self.degree, self.input_degree)):
-            values.append(((2 * k + 1) * x * values[k] - k * values[k - 1]) / (k + 1))
-        table = torch.stack([(2 * k + 1) ** 0.5 * value for k, value in enumerate(values)], dim=-1)
-        chosen = table[:, torch.arange(x.shape[1], device=x.device), self.exponents]
-        product: Tensor = chosen.prod(dim=-1)
-        return product
-
     def forward(self, params: Tensor) -> Tensor:
         """Parameters [n, k] -> maps [n, z, y, x], mm, NEGATIVE INSIDE."""
-        phi = self.polynomials(params).to(self.head.dtype)
+        degree = max(self.degree, self.input_degree)
+        phi = polynomials(self.scaled(params), degree, self.exponents).to(self.head.dtype)
         latent = phi[:, : self.n_terms]
         if len(self.layers):
             h = phi[:, 1 : 1 + self.n_inputs]
@@ -309,12 +294,3 @@ def _repeat(x: Tensor, times: int, shape: Any) -> Tensor:
     for axis in (2, 3, 4):
         x = x.repeat_interleave(times, dim=axis)
     return x[:, :, : shape[0], : shape[1], : shape[2]]
-
-
-def load(path: Any) -> Network:
-    """The network of a model file as a module: Pod, Point or Sdmnn."""
-    file = File(path)
-    kinds: dict[str, Callable[[Any], Network]] = {"pod": Pod, "deepsdf": Point, "imnet": Point, "sdmnn": Sdmnn}
-    if file.model.kind not in kinds:
-        raise UnsupportedError("unsupported", f"networks of the kind '{file.model.kind}' are not modules; use Sdm(model)")
-    return kinds[file.model.kind](file)

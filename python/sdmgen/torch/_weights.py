@@ -16,12 +16,15 @@ _PANEL = 16
 
 
 class File:
-    """The sections of a model file and the values of its description."""
+    """The sections of a model file, or of its bytes, and the values of its description."""
 
     def __init__(self, path: Any) -> None:
         # the library checks the file: all checksums, sizes and values
-        with open(os.fspath(path), "rb") as file:
-            self._bytes = file.read()
+        if isinstance(path, (bytes, memoryview)):
+            self._bytes = bytes(path)
+        else:
+            with open(os.fspath(path), "rb") as file:
+                self._bytes = file.read()
         self.model = Model(self._bytes)
         self.sections: dict[str, memoryview] = {}
         for i in range(struct.unpack_from("<I", self._bytes, 12)[0]):

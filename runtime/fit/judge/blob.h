@@ -1,5 +1,6 @@
-/* The rival of a shape: a blob, the ellipsoid of the same volume and moments in the same place. A
-   shape that explains the image no better than a blob is not seen in it. */
+/* Compares the fitted shape with a blob, the ellipsoid that has its volume, centre of mass and
+   second moments. If the blob explains the image as well as the shape, the image does not show the
+   shape's form. */
 #pragma once
 
 #include "fit/solver/problem.h"

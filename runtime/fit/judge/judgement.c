@@ -14,8 +14,6 @@
 // the sd of a tissue may exceed the robust sd by this factor where the shape is right; the sd of
 // the texture and the tails of a distribution that is not Gaussian make up the difference
 #define WIDER_MAX 1.3
-// the inside may differ from the values at the start by this number of their sd
-#define GIVEN_MAX 3.0
 // empty and missing volumes up to this share of that of the shape are below what labels, points and
 // the grids of maps resolve
 #define VOLUME_MIN 0.05
@@ -110,11 +108,13 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
         "not converged after %zu iterations (%.120s); allow more of them, or give a nearer start",
         r->n_iterations, r->reason);
     if (is_image(p)) {
-        add(v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > 0, SDM_FIT_FAILED, r->evidence, 0,
-            "the image shows no such shape near the start: explaining it without one is better by "
-            "%.3g (log-likelihood of independent voxels); check the start pose, and whether the "
-            "inside is %s than the outside in this image",
-            -r->evidence, darker ? "darker" : "brighter");
+        add(v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > SDM_FIT_PREFERRED, SDM_FIT_FAILED, r->evidence,
+            SDM_FIT_PREFERRED,
+            "the image shows no such shape near the start: explaining it without one is %s by %.3g "
+            "(log-likelihood of independent voxels); check the start pose, and whether the inside "
+            "is %s than the outside in this image",
+            r->evidence < 0 ? "better" : "worse only", fabs(r->evidence),
+            darker ? "darker" : "brighter");
         add(v, SDM_FIT_CHECK_CONTRAST, (in < out) == darker, SDM_FIT_FAILED, in - out, 0,
             "the contrast is the opposite of the start's: inside %.4g, outside %.4g, but the start "
             "says that the inside is %s; give tissue values of this kind of image",
@@ -209,7 +209,7 @@ static void check_tissues(const fit_problem *p, const fit_residuals *s, const sd
             side ? "inside" : "outside", law[side]->sd, s->spread[side]);
     }
     const double off = fabs(law[1]->mean - given->mean) / given->sd;
-    add(v, SDM_FIT_CHECK_GIVEN, off <= GIVEN_MAX, SDM_FIT_DOUBTFUL, off, GIVEN_MAX,
+    add(v, SDM_FIT_CHECK_GIVEN, off <= FIT_GIVEN_MAX, SDM_FIT_DOUBTFUL, off, FIT_GIVEN_MAX,
         "the inside has the mean %.4g, the start %.4g: other values than those of this kind of "
         "image were given",
         law[1]->mean, given->mean);

@@ -18,6 +18,8 @@
 #define BEYOND 4.0
 // smallest sd of the noise, as a share: labels have none, but show shares only to a few per cent
 #define SD_MIN 0.02
+// an outside tissue whose mean lies farther than this share of the way to the inside is another one
+#define BETWEEN_MAX 0.75
 // the spread inside is at most this factor above what the differences of neighbours say
 #define WIDER 1.5
 // largest place along an axis; points farther away, in units of the radius, share a place
@@ -40,32 +42,63 @@ static double predicted_share(const fit_problem *p, double field)
     return 0.5 * erfc(field / p->opts->blur * 0.70710678118654752);
 }
 
-/* The outside tissues at a sample: mean, and variance (that of the tissues and between them) over
- * the variance of the tissue that r->middle[0] and r->spread[0] describe. */
+static double tissue_weight(const fit_problem *p, size_t i, size_t tissue)
+{
+    const float *local = fit_sample_weights(&p->samples, i);
+    return local ? exp((double)local[tissue - p->observation.n_in])
+                 : p->observation.tissue[tissue].weight;
+}
+
+// by how much the mean of all outside tissues at sample i differs from that of the main one
+static double outside_shift(const fit_problem *p, size_t i)
+{
+    const fit_observation *o = &p->observation;
+    double sum = 0;
+    size_t main = o->n_in;
+    for (size_t k = o->n_in; k < o->n_tissues; k++)
+        if (o->tissue[k].weight > o->tissue[main].weight) main = k;
+    for (size_t k = o->n_in; k < o->n_tissues; k++)
+        sum += (o->tissue[k].mean - o->tissue[main].mean) * tissue_weight(p, i, k);
+    return sum;
+}
+
+/* The outside tissues at a sample of a tissue field: mean, and their variance with that between
+ * them, over the variance of the tissue that r->middle[0] and r->spread[0] describe. */
 typedef struct outside_values {
     double mean, variance_ratio;
 } outside_values;
 
+/* A tissue of the field that would excuse material which the shape misses is left out: one beyond
+ * the inside, as air is for fluid in bone, since it and the main tissue together pass for the
+ * inside; and one whose mean has left the values at the start, since it describes the misfit. */
+static bool is_excuse(const fit_problem *p, size_t tissue, double way)
+{
+    const sdm_fit_law *given = &p->opts->appearance.outside[tissue - p->observation.n_in];
+    const double off = p->observation.tissue[tissue].mean - given->mean;
+    return way > BETWEEN_MAX || fabs(off) > FIT_GIVEN_MAX * given->sd;
+}
+
 static outside_values outside_at(const fit_problem *p, const fit_residuals *r, size_t i)
 {
     const fit_observation *o = &p->observation;
-    const float *local = fit_sample_weights(&p->samples, i);
-    size_t main = o->n_in;
+    const double contrast = r->middle[1] - r->middle[0];
+    size_t near = o->n_in;
     for (size_t k = o->n_in; k < o->n_tissues; k++)
-        if (local
-                ? fabs(o->tissue[k].mean - r->middle[0]) < fabs(o->tissue[main].mean - r->middle[0])
-                : o->tissue[k].weight > o->tissue[main].weight)
-            main = k;
-    const sdm_fit_law *reference = &o->tissue[main];
-    double shift = 0, variance = 0;
+        if (fabs(o->tissue[k].mean - r->middle[0]) < fabs(o->tissue[near].mean - r->middle[0]))
+            near = k;
+    const sdm_fit_law *reference = &o->tissue[near];
+    double weight = 0, shift = 0, variance = 0;
     for (size_t k = o->n_in; k < o->n_tissues; k++) {
         const sdm_fit_law *t = &o->tissue[k];
-        const double w = local ? exp((double)local[k - o->n_in]) : t->weight,
-                     d = t->mean - reference->mean;
+        const double w = tissue_weight(p, i, k), d = t->mean - reference->mean;
+        if (k != near && is_excuse(p, k, d / contrast)) continue;
+        weight += w;
         shift += w * d;
         variance += w * (t->sd * t->sd + d * d);
     }
-    variance -= shift * shift;
+    if (!(weight > 0)) return (outside_values){r->middle[0], 1};
+    shift /= weight;
+    variance = variance / weight - shift * shift;
     return (outside_values){r->middle[0] + shift, variance / (reference->sd * reference->sd)};
 }
 
@@ -111,11 +144,12 @@ static void shares_fill(const fit_problem *p, fit_residuals *r, double *list)
     for (size_t i = 0; i < r->n; i++) {
         r->residual[i] = ((double)s->value[i] - r->middle[0]) / contrast - r->expected[i];
         r->sd[i] = 1;
-        // Without a tissue field a voxel outside may hold any of the tissues; inside the surface,
-        // the outside part of a voxel holds all of them.
-        if (s->n_outside || r->expected[i] > 0.5)
-            r->residual[i] -=
-                (1 - r->expected[i]) * (outside_at(p, r, i).mean - r->middle[0]) / contrast;
+        // Inside the surface, the outside part of a voxel holds all tissues. Outside of it, a
+        // tissue field tells which one a voxel holds; without a field it may be any.
+        const double shift = r->expected[i] > 0.5   ? outside_shift(p, i)
+                             : p->samples.n_outside ? outside_at(p, r, i).mean - r->middle[0]
+                                                    : 0;
+        r->residual[i] -= (1 - r->expected[i]) * shift / contrast;
     }
 }
 
@@ -128,7 +162,8 @@ static void noise_fill(const fit_problem *p, fit_residuals *r)
     for (int side = 0; side < 2; side++) sd[side] = fmax(r->spread[side] / contrast, SD_MIN);
     for (size_t i = 0; i < r->n; i++) {
         const double a = r->expected[i], share = r->residual[i] + a,
-                     wider = p->samples.n_outside ? outside_at(p, r, i).variance_ratio : 1,
+                     wider =
+                         a <= 0.5 && p->samples.n_outside ? outside_at(p, r, i).variance_ratio : 1,
                      outside = sd[0] * sqrt(wider);
         r->used[i] = share < 1 + BEYOND * sd[1];
         r->sd[i] = sqrt(a * sd[1] * sd[1] + (1 - a) * outside * outside);

@@ -13,6 +13,9 @@
 /* largest distance of voxels, in steps along an axis, over which noise is correlated */
 enum { FIT_RESIDUAL_LAGS = 10 };
 
+/* the mean of a tissue may differ from that at the start by this number of the sd at the start */
+#define FIT_GIVEN_MAX 3.0
+
 typedef struct fit_residuals {
     /* number of samples */
     size_t n;

@@ -88,7 +88,8 @@ static sdm_status samples_near_choose(fit_problem *p, double wanted, sdm_error *
     bool changed;
     sdm_status s =
         sdm_fit_samples_choose(p->target, o, &region, p->stride, &p->samples, &changed, err);
-    // NaN in every second slice, for example, may meet the stride
+    // If voxels that are NaN repeat with the stride (every second slice, say), most samples are
+    // NaN; a smaller stride finds other voxels.
     while (!s && p->samples.n < p->samples.n_nan && p->stride > 1) {
         p->stride--;
         s = sdm_fit_samples_choose(p->target, o, &region, p->stride, &p->samples, &changed, err);

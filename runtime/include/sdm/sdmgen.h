@@ -9,7 +9,7 @@
  *                         sdm/registry.h        shapes by name; the mesh at given parameters
  *                         sdm/builtin_shapes.h  adds the built-in shapes to a registry
  *   a mesh                sdm/mesh.h            triangles; audit of a mesh
- *                         sdm/meshfile.h        .ply .stl .obj .off files
+ *                         sdm/meshfile.h        .ply .stl .obj .off .vtk .vtp files
  *   a grid                sdm/grid.h            voxels: their places in space and in arrays
  *                         sdm/pose.h            rotation and translation of a shape
  *   an exact map          sdm/exact.h           distances of a mesh, at points and on grids

@@ -42,9 +42,10 @@ typedef struct sdm_training_opts {
     /* Called by any thread. true: the run writes a checkpoint and ends with SDM_E_CANCELLED. May be
      * NULL. */
     bool (*cancelled)(void *user);
-    /* Called in the thread that called the library with a notice of one line. May be NULL. */
+    /* Called with each notice of the training, a text of one line without line feed, in the thread
+     * that called the library. May be NULL. */
     void (*message)(void *user, const char *line);
-    void *user; /* passed to the three */
+    void *user; /* first argument of progress, cancelled and message */
 } sdm_training_opts;
 
 /* Result of a run. */

@@ -2,6 +2,7 @@
  * fsync of the folder. */
 #pragma once
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -30,6 +31,10 @@ SDM_INTERNAL_API sdm_status sdm_outfile_open(const char *path, sdm_outfile **out
 /* Name of the temporary file, for libraries that open files by name; valid until commit or
  * discard. */
 SDM_INTERNAL_API const char *sdm_outfile_temp_path(const sdm_outfile *f);
+
+/* True if `name` is one that the temporary file of an output `of` can have: of.PID.COUNTER.tmp.
+ * Both are without folders. */
+bool sdm_outfile_is_temp(const char *name, const char *of);
 
 /* Appends bytes (buffered). After an error only sdm_outfile_discard() is allowed. SDM_E_IO. */
 SDM_INTERNAL_API sdm_status sdm_outfile_write(sdm_outfile *f, const void *data, size_t size,

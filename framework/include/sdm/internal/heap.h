@@ -14,7 +14,8 @@ SDM_INTERNAL_API sdm_status sdm_mul(size_t a, size_t b, size_t *out, sdm_error *
 
 /* As sdm_alloc(), but without zeroing, for blocks that are completely written before they are read:
  * zeroing costs as much as writing. [any thread] */
-sdm_status sdm_alloc_unset(void **out, size_t count, size_t size, const char *what, sdm_error *err);
+SDM_INTERNAL_API sdm_status sdm_alloc_unset(void **out, size_t count, size_t size, const char *what,
+                                            sdm_error *err);
 
 /* Changes the size of *block from old_count to new_count elements; new elements are zero. *block
  * may be NULL. The elements are copied, so the caller should choose new_count for geometric growth.

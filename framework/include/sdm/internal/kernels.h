@@ -45,6 +45,12 @@ static inline size_t sdm_panel_count(size_t outputs, size_t k)
     return sdm_panel_outputs(outputs) * k;
 }
 
+/* Index of the weight between `input` and `output` in panels of floats or halves. */
+static inline size_t sdm_panel_index(size_t k, size_t output, size_t input)
+{
+    return (output / SDM_PANEL * k + input) * SDM_PANEL + output % SDM_PANEL;
+}
+
 /* panels[sdm_panel_count(outputs, k)] = the outputs x k matrix w. */
 void sdm_panel_pack_f32(size_t outputs, size_t k, sdm_view w, float *panels);
 void sdm_panel_pack_f16(size_t outputs, size_t k, sdm_view w, uint16_t *panels);
@@ -150,6 +156,12 @@ void sdm_panel_back_i8(size_t outputs, size_t n_wide, size_t k, const int8_t *w,
    infinite, NaN stays NaN. */
 uint16_t sdm_half_from_float(float v);
 float sdm_half_to_float(uint16_t h);
+
+/* Element `i` of an array of weights, which are halves or floats. */
+static inline float sdm_weight_at(const void *weights, bool half, size_t i)
+{
+    return half ? sdm_half_to_float(((const uint16_t *)weights)[i]) : ((const float *)weights)[i];
+}
 
 /* to[n] = y[n], without overlap. stream: the stores bypass the caches, for data that are larger
    than the caches and not read soon. After streaming, the same thread calls sdm_copy_end() before

@@ -1,0 +1,57 @@
+/* A page reads and writes no files. The functions of this file take the place of the library's,
+ * which would make every page 20 kB larger. */
+#include "model/model_kind.h"
+#include "pod/pod_internal.h"
+#include "point/point_internal.h"
+#include "sdm/image.h"
+#include "sdm/internal/ssm.h"
+#include "sdm/meshfile.h"
+#include "sdmnn/sdmnn_model.h"
+#include "template/template_internal.h"
+
+static sdm_status no_files(const char *path, sdm_error *err)
+{
+    return sdm_fail(err, SDM_E_IO, "%s: a page has no files", path);
+}
+
+sdm_status sdm_mesh_read(const char *path, sdm_mesh *out, sdm_error *err)
+{
+    (void)out;
+    return no_files(path, err);
+}
+
+sdm_status sdm_npy_read(const char *path, double **read, size_t size[4], int *n_dim, sdm_error *err)
+{
+    (void)read, (void)size, (void)n_dim;
+    return no_files(path, err);
+}
+
+sdm_status sdm_ssm_parse(const char *path, const uint8_t *bytes, size_t size, sdm_ssm *out,
+                         sdm_error *err)
+{
+    (void)bytes, (void)size, (void)out;
+    return no_files(path, err);
+}
+
+void sdm_ssm_dispose(sdm_ssm *model) { (void)model; }
+
+sdm_onnx_value sdm_point_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x)
+{
+    (void)m, (void)g;
+    return x;
+}
+
+sdm_onnx_value sdm_pod_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x)
+{
+    return sdm_point_onnx(m, g, x);
+}
+
+sdm_onnx_value sdm_sdmnn_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x)
+{
+    return sdm_point_onnx(m, g, x);
+}
+
+sdm_onnx_value sdm_template_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x)
+{
+    return sdm_point_onnx(m, g, x);
+}

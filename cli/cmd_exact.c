@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/grid_cut.h"
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "report/exact_layers.h"
@@ -19,6 +20,7 @@
 #include "sdm/internal/clock.h"
 #include "sdm/internal/methods.h"
 #include "sdm/internal/threads.h"
+#include "sdm/map.h"
 #include "sdm/memory.h"
 #include "slicer/results_file.h"
 
@@ -71,6 +73,10 @@ static sdm_status open_mesh(job *j, sdm_error *err)
     if (args->tolerance > 0 && strcmp(args->method, "octree"))
         return sdm_fail(err, SDM_E_ARG, "exact: --tolerance belongs to --method octree, not %s",
                         args->method);
+    if (strcmp(args->sign, "auto") && !strcmp(args->method, "naive"))
+        return sdm_fail(err, SDM_E_ARG,
+                        "exact: --sign does nothing with --method naive, which computes winding "
+                        "numbers");
     if (args->columns && !args->points)
         return sdm_fail(err, SDM_E_ARG, "exact: --columns belongs to --points FILE");
     sdm_status s = cli_check_vdb_options(args, err);
@@ -226,6 +232,9 @@ static void notice_mesh(const job *j)
     if (j->report.parts_turned)
         cli_notice("%zu parts were inside out; their orientation has been reversed",
                    j->report.parts_turned);
+    if (inside && !j->args->points)
+        cli_warn_cut_shape(&j->grid, j->mesh.vert, j->mesh.n_vert,
+                           "a larger grid (--size, --spacing, --origin) holds it");
     cli_warn_audit(a);
     // a single part that meets no other cannot be inside out after the engine has turned it
     if (a->components > 1) cli_warn_parts(&j->mesh, j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
@@ -279,7 +288,10 @@ static sdm_status print_json(const job *j, sdm_error *err)
 {
     float min, max;
     int64_t inside;
+    double volume = NAN;
     find_range(j, &min, &max, &inside);
+    const sdm_status s = sdm_map_volume(&j->grid, j->values, (int)j->args->threads, &volume, err);
+    if (s) return s;
     const size_t voxels = sdm_grid_count(&j->grid);
     char hash[32];
     snprintf(hash, sizeof hash, "%016llx",
@@ -312,6 +324,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_real(&json, "min_mm", (double)min);
     sdm_json_real(&json, "max_mm", (double)max);
     sdm_json_int(&json, "inside_voxels", inside);
+    sdm_json_real(&json, "volume_mm3", volume);
     if (j->certificate.checked) {
         const sdm_sign_certificate *c = &j->certificate;
         sdm_json_text(&json, "sign_compared", c->compared);

@@ -89,6 +89,8 @@ static sdm_status fit_shape(cli_fit *f, sdm_error *err)
     if (!f->doubt.status || f->doubt.status == SDM_E_QUALITY) s = cli_fit_mirror(f, err);
     cli_progress_end(&w.bar, !s && (!f->doubt.status || f->doubt.status == SDM_E_QUALITY));
     f->found = f->result.objective && f->result.params;
+    for (size_t i = 0; i < f->result.verdict.n_findings; i++)
+        cli_name_options(f->result.verdict.findings[i].text);
     if (s || !f->doubt.status || f->doubt.status == SDM_E_QUALITY) return s;
     return sdm_fail(err, f->doubt.status, "%s: %s", f->path, f->doubt.text);
 }
@@ -100,7 +102,7 @@ static void print_notices(const cli_fit *f)
         cli_notice("%s=%s fits better than its mirror image, by %.3g (log-likelihood); -O %s=... "
                    "states the side",
                    f->mirror, f->side, f->better, f->mirror);
-    if (f->start_clamped || r->start_clamped)
+    if (r->start_clamped && !f->start_clamped)
         cli_notice("the start parameters were clamped to their range");
     if (r->n_exact_outside)
         cli_notice("%zu maps outside of the trained range were made by the exact engine",
@@ -156,6 +158,7 @@ sdm_status cmd_fit(const cli_args *args, sdm_error *err)
     if (!s) cli_fit_default_lengths(&f);
     if (!s) s = cli_fit_read_reference(&f, err);
     if (!s) s = cli_fit_read_start(&f, err);
+    if (!s) s = cli_fit_warn_size(&f, err);
     if (!s) s = fit_shape(&f, err);
     if (!s) s = show_result(&f, err);
     cli_fit_dispose(&f);

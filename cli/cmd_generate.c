@@ -4,6 +4,8 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/grid_cut.h"
+#include "inputs/model_grade.h"
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "report/generate_files.h"
@@ -32,6 +34,7 @@ typedef struct job {
     const sdm_model_info *info;
     sdm_param *params;
     double *rows; /* [n_rows][n_params] */
+    int *lines;   /* [n_rows] lines of the rows in the table of --params; NULL: no table */
     size_t n_rows;
     sdm_grid grid;             /* of all maps */
     bool own;                  /* the grid is that of the model */
@@ -47,6 +50,7 @@ typedef struct job {
     size_t n_checked;
     sdm_check check; /* over checked rows: means of mean, bias and square; largest q95 and max */
     uint64_t hash;   /* CRC-64 of all maps */
+    double volume;   /* of the last map, mm^3; NaN: of a band */
 } job;
 
 /* The statistic of --error-of. */
@@ -65,6 +69,7 @@ static void job_dispose(job *j)
     sdm_free(j->jacobian);
     sdm_free(j->gradient);
     sdm_free(j->values);
+    sdm_free(j->lines);
     sdm_free(j->rows);
     sdm_free(j->params);
     sdm_model_free(j->model);
@@ -79,10 +84,18 @@ static sdm_status check_row(const job *j, const double *p, sdm_error *err)
     const sdm_range_policy policy = cli_policy(j->args);
     bool finite = true;
     for (size_t i = 0; i < n; i++) finite = finite && isfinite(p[i]);
-    if (policy == SDM_RANGE_REFUSE || !finite) return cli_check_trained(j->params, n, p, err);
+    if (policy == SDM_RANGE_REFUSE || !finite)
+        return cli_check_trained(j->args, j->model, j->params, p, err);
     if (policy == SDM_RANGE_EXACT && cli_check_range(j->params, n, p, NULL))
         return sdm_instance_check(j->shape, p, err);
     return SDM_OK;
+}
+
+/* Puts the place of the row in the table before the message. */
+static sdm_status fail_row(const job *j, size_t row, sdm_status s, sdm_error *err)
+{
+    return j->lines ? sdm_fail_in(err, s, "%s:%d: row %zu", j->args->rows, j->lines[row], row + 1)
+                    : s;
 }
 
 /* Checks every row before the first map is made, so that a mistake in any row stops the command at
@@ -91,7 +104,7 @@ static sdm_status check_rows(const job *j, sdm_error *err)
 {
     for (size_t i = 0; i < j->n_rows; i++) {
         const sdm_status s = check_row(j, j->rows + i * j->info->n_params, err);
-        if (s) return j->args->rows ? sdm_fail_in(err, s, "%s: row %zu", j->args->rows, i + 1) : s;
+        if (s) return fail_row(j, i, s, err);
     }
     return SDM_OK;
 }
@@ -104,7 +117,7 @@ static sdm_status read_rows(job *j, sdm_error *err)
     sdm_status s = SDM_ALLOC(&base, n, "parameters", err);
     if (!s) s = cli_read_params(j->params, n, &j->args->params, base, err);
     if (!s && j->args->rows)
-        s = cli_read_rows(j->args->rows, j->params, n, base, &j->rows, &j->n_rows, err);
+        s = cli_read_rows(j->args->rows, j->params, n, base, &j->rows, &j->lines, &j->n_rows, err);
     else if (!s) {
         j->rows = base;
         base = NULL;
@@ -164,6 +177,7 @@ static sdm_status open_model(job *j, sdm_error *err)
     const sdm_status s = cli_open_model(j->args, j->args->files.items[0], &j->model, err);
     if (s) return s;
     j->info = sdm_model_get_info(j->model);
+    cli_warn_quality(j->args->files.items[0], j->info);
     return cli_model_params(j->info, &j->params, err);
 }
 
@@ -259,13 +273,40 @@ static void add_check(job *j, const sdm_check *c)
     all->outside += c->outside;
 }
 
-/* Prints notices about clamped parameters, a map by the exact engine and, with --check, the errors
- * of the map. */
+/* where = "row 2 (line 3): ", or "" without a table. */
+static void name_row(const job *j, size_t row, char where[48])
+{
+    where[0] = 0;
+    if (j->lines) snprintf(where, 48, "row %zu (line %d): ", row + 1, j->lines[row]);
+}
+
+/* Moves the parameters of the row into the trained range, with a notice. */
+static void notice_clamped(const job *j, size_t row)
+{
+    char where[48], begin[128];
+    name_row(j, row, where);
+    snprintf(begin, sizeof begin,
+             "%sparameters outside the trained range were clamped to it: ", where);
+    cli_clamp(begin, j->params, j->info->n_params, j->rows + row * j->info->n_params);
+}
+
+/* Warns if the grid cuts the shape of the row. */
+static void warn_cut(const job *j, size_t row)
+{
+    char where[48];
+    name_row(j, row, where);
+    if (j->values && !j->band.tile)
+        cli_warn_cut_map(where, &j->grid, j->values,
+                         j->own ? "train with grid: auto, or give --size or --spacing and "
+                                  "--outside exact"
+                                : "a larger grid (--size, --spacing, --origin) holds it");
+}
+
+/* Prints notices about a map by the exact engine and, with --check, the errors of the map. */
 static void notice_row(const job *j, size_t row, const sdm_result *r)
 {
-    char where[32] = "";
-    if (j->args->rows) snprintf(where, sizeof where, "row %zu: ", row + 1);
-    if (r->clamped) cli_notice("%sparameters outside the trained range were clamped to it", where);
+    char where[48];
+    name_row(j, row, where);
     if (r->reason == SDM_REASON_RANGE)
         cli_notice("%sparameters outside the trained range, computed by the exact engine", where);
     if (r->reason == SDM_REASON_ERROR)
@@ -336,17 +377,21 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
     double *p = j->rows + row * j->info->n_params;
     sdm_result result = {0};
     const double start = sdm_clock();
-    const sdm_status s = make_map(j, p, &opts, &result, err);
-    if (s) return args->rows ? sdm_fail_in(err, s, "%s: row %zu", args->rows, row + 1) : s;
+    sdm_status s = make_map(j, p, &opts, &result, err);
+    if (s) return fail_row(j, row, s, err);
     j->ms += 1e3 * (sdm_clock() - start);
     // the metadata must hold the clamped parameters
-    for (size_t i = 0; i < j->info->n_params && result.clamped; i++)
-        p[i] = fmin(fmax(p[i], j->params[i].min), j->params[i].max);
+    if (result.clamped) notice_clamped(j, row);
     j->n_clamped += result.clamped;
     j->n_exact += result.source == SDM_SOURCE_EXACT;
     j->n_exact_error += result.reason == SDM_REASON_ERROR;
     if (result.checked) add_check(j, &result.check);
     notice_row(j, row, &result);
+    warn_cut(j, row);
+    j->volume = NAN;
+    if (args->json && !j->band.tile &&
+        (s = sdm_map_volume(&j->grid, j->values, (int)args->threads, &j->volume, err)))
+        return s;
     return write_row(j, row, &result, err);
 }
 
@@ -382,6 +427,8 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_int(&json, "exact_by_error", (int64_t)j->n_exact_error);
     if (j->shape && (j->args->check || j->args->max_error > 0)) add_check_json(j, &json);
     sdm_json_real(&json, "error_rmse_mm", j->info->accuracy.rmse_mm);
+    sdm_json_real(&json, "error_between_mm", j->own ? 0 : j->info->quality.between_mm);
+    if (j->n_rows == 1) sdm_json_real(&json, "volume_mm3", j->volume);
     sdm_json_text(&json, "values_crc64", hash);
     sdm_json_grid(&json, "grid", &j->grid, false);
     if (j->n_rows == 1) cli_json_params(&json, "parameters", j->params, j->info->n_params, j->rows);
@@ -456,6 +503,7 @@ static sdm_status run_points(job *j, sdm_error *err)
     if (!s) s = check_rows(j, err);
     if (!s) s = cli_read_points(j->args->points, &a.x, &a.n, err);
     if (!s) s = compute_points(j, &a, &result, err);
+    if (!s && result.clamped) notice_clamped(j, 0);
     if (!s) notice_row(j, 0, &result);
     if (!s) s = write_points(j, &a, &table, err);
     cli_points_dispose(&table);
@@ -464,6 +512,30 @@ static sdm_status run_points(job *j, sdm_error *err)
     sdm_free(a.values);
     sdm_free(a.x);
     return s;
+}
+
+/* Longest edge of a voxel of the model's own grid, mm. */
+static double own_voxel(const job *j)
+{
+    const double *h = j->info->grid.spacing;
+    return fmax(h[0], fmax(h[1], h[2]));
+}
+
+/* On another grid, unless the errors there are measured: what the stated error leaves out. */
+static void notice_between(const job *j)
+{
+    if (j->own || j->args->check || j->args->max_error > 0 || j->n_exact == j->n_rows) return;
+    const double between = j->info->quality.between_mm, rmse = j->info->accuracy.rmse_mm;
+    if (isnan(between))
+        cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
+                   "interpolation between them adds to it, at creases up to sqrt(3)/2 of their "
+                   "edge, %.2g mm; --check measures this map",
+                   rmse, 0.866 * own_voxel(j));
+    else
+        cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
+                   "between them linear interpolation of exact maps misses the surface by %.2g mm "
+                   "RMS; --check measures this map",
+                   rmse, between);
 }
 
 static sdm_status run_maps(job *j, sdm_error *err)
@@ -477,6 +549,7 @@ static sdm_status run_maps(job *j, sdm_error *err)
         cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j->n_rows, NULL);
     }
     cli_progress_end(&progress, !s);
+    if (!s && !j->args->json) notice_between(j);
     if (!s && j->args->json) s = print_json(j, err);
     return s ? s : write_results(j, err);
 }

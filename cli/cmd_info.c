@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/model_grade.h"
 #include "inputs/setup.h"
 #include "inputs/vdb_child.h"
 #include "report/files.h"
@@ -48,12 +49,23 @@ static void print_model(const char *path, const sdm_model *model)
         "             RMSE of single maps: 50 %% below %.5f mm, 90 %% below %.5f mm, 99 %% below "
         "%.5f mm\n",
         a->q50_mm, a->q90_mm, a->q99_mm);
+    cli_print_quality(&m->quality);
     cli_print("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
               (long long)m->train_samples, (unsigned long long)m->seed, m->version);
     if (m->fine_width) cli_print("fine level   %zu units a layer (docs/grids.md)\n", m->fine_width);
     cli_print("file         %zu bytes, weights %zu bytes, checksum %016llx\n", m->file_bytes,
               m->weight_bytes, (unsigned long long)m->checksum);
     cli_print("SHA-256      %s\n", sdm_model_sha256(model, hash));
+}
+
+/* Adds the verdict of the training. */
+static void json_quality(sdm_json *j, const sdm_model_quality *q)
+{
+    sdm_json_open(j, "quality", '{');
+    sdm_json_text(j, "grade", q->grade);
+    sdm_json_real(j, "cut", q->cut);
+    sdm_json_real(j, "between_mm", q->between_mm);
+    sdm_json_close(j, '}');
 }
 
 static sdm_status json_model(const char *path, const sdm_model *model, sdm_error *err)
@@ -76,6 +88,7 @@ static sdm_status json_model(const char *path, const sdm_model *model, sdm_error
     sdm_json_real(&j, "mse_mm2", m->accuracy.mse_mm2);
     cli_json_accuracy(&j, &m->accuracy);
     sdm_json_close(&j, '}');
+    json_quality(&j, &m->quality);
     sdm_json_uint(&j, "seed", m->seed);
     sdm_json_real(&j, "train_seconds", m->train_seconds);
     sdm_json_int(&j, "train_samples", m->train_samples);

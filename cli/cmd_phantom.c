@@ -103,7 +103,8 @@ static sdm_status make_image(const cli_phantom *p, sdm_error *err)
     if (!s) s = cli_check_interrupt(err);
     for (size_t i = 0; i < n && !s; i++) inside += label[i];
     if (!s && !inside) cli_warn("no voxel is inside the shape: does the grid cover it?");
-    if (!s && p->cut) cli_notice("the shape leaves the field of view");
+    if (!s && p->cut && !isnan(args->phantom.crop[0]))
+        cli_notice("the shape leaves the field of view");
     if (!s && values) s = write_images(p, values, text, err);
     if (!s && args->phantom.label)
         s = sdm_volume_write(args->phantom.label, &p->grid, label, SDM_VOXEL_UINT8, text, err);

@@ -167,6 +167,34 @@ static void json_options(sdm_json *j, const sdm_shape *shape)
     sdm_json_close(j, ']');
 }
 
+typedef sdm_status (*command_function)(const cli_args *args, sdm_error *err);
+
+static const struct {
+    const char *word;
+    command_function run;
+} subcommands[] = {{"new", cli_shapes_new}, {"check", cli_shapes_check}};
+enum { N_SUBCOMMANDS = sizeof subcommands / sizeof *subcommands };
+
+/* The subcommand that the first word names; NULL: none. */
+static command_function find_subcommand(const cli_args *args)
+{
+    for (size_t i = 0; i < N_SUBCOMMANDS && args->files.n > 0; i++)
+        if (!strcmp(args->files.items[0], subcommands[i].word)) return subcommands[i].run;
+    return NULL;
+}
+
+/* Fails with the subcommand that the first word is nearly; SDM_OK: it is none. */
+static sdm_status suggest_subcommand(const cli_args *args, sdm_error *err)
+{
+    const char *names[N_SUBCOMMANDS], *word = args->files.items[0];
+    for (size_t i = 0; i < N_SUBCOMMANDS; i++) names[i] = subcommands[i].word;
+    const char *near = sdm_nearest_name(word, names, N_SUBCOMMANDS);
+    return near ? sdm_fail(err, SDM_E_ARG,
+                           "shapes: no shape and no subcommand '%.100s'; did you mean 'shapes %s'?",
+                           word, near)
+                : SDM_OK;
+}
+
 /* Prints the parameters and options of one shape. With -O the parameters are those of an instance
  * with these options: the parameters of some shapes depend on them. The distributions are those of
  * an instance, too; a shape that cannot be made without options is printed without them. */
@@ -174,6 +202,7 @@ static sdm_status print_shape(const cli_args *args, const sdm_registry *registry
 {
     // the shape
     const char *name = args->files.items[0];
+    if (!sdm_registry_find(registry, name, NULL) && suggest_subcommand(args, err)) return SDM_E_ARG;
     const sdm_shape *shape = cli_find_shape(registry, name, err);
     if (!shape) return SDM_E_ARG;
     sdm_instance *instance = NULL;
@@ -235,28 +264,18 @@ static sdm_status print_list(const cli_args *args, const sdm_registry *registry,
     return cli_print_json(&json, err);
 }
 
-typedef sdm_status (*command_function)(const cli_args *args, sdm_error *err);
-
-/* The subcommand that the first word names; NULL: none. */
-static command_function find_subcommand(const cli_args *args)
-{
-    static const struct {
-        const char *word;
-        command_function run;
-    } subcommands[] = {{"new", cli_shapes_new}, {"check", cli_shapes_check}};
-    for (size_t i = 0; i < sizeof subcommands / sizeof *subcommands && args->files.n > 0; i++)
-        if (!strcmp(args->files.items[0], subcommands[i].word)) return subcommands[i].run;
-    return NULL;
-}
-
 /* The command line without a subcommand: `sdmgen shapes [NAME]`. */
 static sdm_status check_arguments(const cli_args *args, sdm_error *err)
 {
+    if (args->files.n > 1 && suggest_subcommand(args, err)) return SDM_E_ARG;
     if (args->files.n > 1)
         return sdm_fail(err, SDM_E_ARG, "shapes: unexpected argument '%s'; usage: sdmgen shapes %s",
                         args->files.items[1], args->command->synopsis);
     if (args->out) return sdm_fail(err, SDM_E_ARG, "shapes: --out needs `shapes new`");
     if (args->outputs.n > 0) return sdm_fail(err, SDM_E_ARG, "shapes: -o needs `shapes check`");
+    if (args->samples >= 0 || args->seed >= 0)
+        return sdm_fail(err, SDM_E_ARG, "shapes: --%s needs `shapes check`",
+                        args->samples >= 0 ? "samples" : "seed");
     if (args->files.n == 0 && args->options.n > 0)
         return sdm_fail(err, SDM_E_ARG, "shapes: -O needs the NAME of a shape");
     return SDM_OK;

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "commands.h"
+#include "inputs/model_grade.h"
 #include "inputs/setup.h"
 #include "inputs/vdb_child.h"
 #include "report/files.h"
@@ -117,6 +118,7 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
     sdm_status s = cli_open_registry(args, &registry, err);
     if (!s) s = cli_open_unknown(args, path, &model, err); // verifies every checksum
     const sdm_model_info *info = s ? NULL : sdm_model_get_info(model);
+    if (!s) cli_warn_quality(path, info);
     const bool known = !s && sdm_registry_find(registry, info->shape, NULL);
     if (!s && known) s = sdm_runtime_instance(model, registry, &shape, err);
     if (!s && known)
@@ -139,6 +141,10 @@ sdm_status cmd_verify(const cli_args *args, sdm_error *err)
 {
     const char *path = args->files.items[0];
     const bool vdb = cli_ends_with(path, ".vdb"), image = sdm_volume_knows(path);
+    if ((vdb || image) && (args->samples >= 0 || args->seed >= 0))
+        return sdm_fail(err, SDM_E_ARG,
+                        "verify: --%s does nothing for %s: it is for the random shapes of a model",
+                        args->samples >= 0 ? "samples" : "seed", path);
     const sdm_status s = vdb || image ? cli_expect_model(args, err) : SDM_OK;
     if (s) return s;
     if (vdb) return verify_vdb(args, path, err);

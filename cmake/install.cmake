@@ -133,12 +133,20 @@ if(TARGET sdmgen_training)
   sdm_pkgconfig(sdmgen-training sdmgen_training "Training of networks for signed distance maps" sdmgen)
 endif()
 
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/configs ${PROJECT_SOURCE_DIR}/examples
-  DESTINATION ${CMAKE_INSTALL_DATADIR}/sdmgen OPTIONAL)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL)
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md
-  ${PROJECT_SOURCE_DIR}/CHANGELOG.md
-        DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL)
+# the documentation and the examples, whose links lead to installed files
+file(RELATIVE_PATH SDM_DOC_TO_DATA ${CMAKE_INSTALL_FULL_DOCDIR} ${CMAKE_INSTALL_FULL_DATADIR}/sdmgen)
+file(RELATIVE_PATH SDM_DATA_TO_DOC ${CMAKE_INSTALL_FULL_DATADIR}/sdmgen ${CMAKE_INSTALL_FULL_DOCDIR})
+file(RELATIVE_PATH SDM_DOC_TO_INCLUDE ${CMAKE_INSTALL_FULL_DOCDIR} ${CMAKE_INSTALL_FULL_INCLUDEDIR})
+install(CODE "set(SOURCE \"${PROJECT_SOURCE_DIR}\")
+set(TO \"${PROJECT_BINARY_DIR}/installed_docs\")
+set(TO_EXAMPLES \"${PROJECT_BINARY_DIR}/installed_examples\")
+set(DOCS \"${SDM_DATA_TO_DOC}\")
+set(EXAMPLES \"${SDM_DOC_TO_DATA}\")
+set(INCLUDE \"${SDM_DOC_TO_INCLUDE}\")
+include(\"${PROJECT_SOURCE_DIR}/cmake/installed_docs.cmake\")")
+install(DIRECTORY ${PROJECT_BINARY_DIR}/installed_docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY ${PROJECT_BINARY_DIR}/installed_examples/ DESTINATION ${CMAKE_INSTALL_DATADIR}/sdmgen)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 # bill of materials in SPDX 2.3; its time is SOURCE_DATE_EPOCH where that is set
 string(TIMESTAMP SDM_SPDX_TIME "%Y-%m-%dT%H:%M:%SZ" UTC)

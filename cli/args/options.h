@@ -197,5 +197,9 @@ void cli_args_dispose(cli_args *args);
  * mean". */
 const cli_command *cli_find_command(const char *name, sdm_error *err);
 
+/* Replaces options of C by those of the command line: "sdm_fit_opts.max_iterations" becomes
+ * "--max-iterations". The text gets shorter. */
+void cli_name_options(char *text);
+
 /* True when `command` (an index into cli_commands) has the option. */
 bool cli_option_fits(const cli_option *option, size_t command);

@@ -28,6 +28,9 @@ sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err)
 {
     const cli_fit_args *a = &f->args->fit;
     const bool labelled = !strcmp(a->image_model, "labels");
+    // images state their frame; --ras is about coordinates of the command line and of points
+    const bool places =
+        !isnan(a->start_centre[0]) || !isnan(a->start_axis[0]) || !isnan(a->region[0]);
     // the table of docs/fitting.md says the same
     const struct {
         const char *option;
@@ -47,7 +50,9 @@ sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err)
                 {"--keep blur", IMAGE | LABELS, keeps(a, "blur")},
                 {"--l-ref", IMAGE_LABELLED | LABELS_LABELLED, !isnan(a->l_ref)},
                 {"--keep appearance", IMAGES | POINTS, keeps(a, "appearance")},
-                {"--point-sd", POINTS, !isnan(a->point_sd)}};
+                {"--point-sd", POINTS, !isnan(a->point_sd)},
+                {"--ras without --start-centre, --start-axis or --region",
+                 places ? POINTS | VOLUMES : POINTS, a->ras}};
     const size_t n = sizeof rows / sizeof *rows;
     const bool points = f->target.kind == SDM_FIT_POINTS, image = f->target.kind == SDM_FIT_IMAGE;
     const unsigned kind = points     ? POINTS
@@ -58,7 +63,7 @@ sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err)
         if (!rows[i].given || (rows[i].kinds & kind)) continue;
         char list[256] = "";
         for (size_t k = 0; k < n; k++)
-            if (rows[k].kinds & kind)
+            if ((rows[k].kinds & kind) && !strchr(rows[k].option, ','))
                 snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", *list ? ", " : "",
                          rows[k].option);
         return sdm_fail(err, SDM_E_ARG,

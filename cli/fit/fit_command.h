@@ -87,6 +87,10 @@ void cli_fit_default_lengths(cli_fit *f);
  * with the options that apply. */
 sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err);
 
+/* Warns if labels or points are more than five times as large as the start shape, or as small, and
+ * names the unit that would explain it. Errors of making the shape. */
+sdm_status cli_fit_warn_size(const cli_fit *f, sdm_error *err);
+
 /* Sets the start pose and the rotations to try. SDM_E_ARG; SDM_E_FORMAT: a bad file of points. */
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);
 

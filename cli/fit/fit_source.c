@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "fit_command.h"
+#include "inputs/model_grade.h"
 #include "inputs/setup.h"
 #include "report/report_audit.h"
 #include "sdm/memory.h"
@@ -15,6 +16,7 @@ static sdm_status open_model(cli_fit *f, sdm_error *err)
     sdm_status s = cli_open_model(args, f->model_path, &f->model, err);
     if (s) return s;
     const sdm_model_info *info = sdm_model_get_info(f->model);
+    if (!args->fit.exact) cli_warn_quality(f->model_path, info);
     f->shape_name = info->shape;
     if (args->fit.exact || args->fit.polish || f->source.policy == SDM_RANGE_EXACT) {
         s = cli_open_registry(args, &f->registry, err);
@@ -102,14 +104,11 @@ static sdm_status check_start(cli_fit *f, sdm_error *err)
     bool finite = true;
     for (size_t i = 0; i < f->n_params; i++) finite = finite && isfinite(f->start[i]);
     if (f->source.policy == SDM_RANGE_REFUSE || !finite)
-        return f->source.model ? cli_check_trained(f->params, f->n_params, f->start, err)
+        return f->source.model ? cli_check_trained(f->args, f->model, f->params, f->start, err)
                                : cli_check_range(f->params, f->n_params, f->start, err);
     if (f->source.policy == SDM_RANGE_EXACT) return sdm_instance_check(f->shape, f->start, err);
-    for (size_t i = 0; i < f->n_params; i++) {
-        const double given = f->start[i];
-        f->start[i] = fmin(fmax(given, f->params[i].min), f->params[i].max);
-        f->start_clamped = f->start_clamped || f->start[i] != given;
-    }
+    f->start_clamped = cli_clamp("the start parameters were clamped to their range: ", f->params,
+                                 f->n_params, f->start);
     return SDM_OK;
 }
 

@@ -112,7 +112,7 @@ static size_t count_lines(const char *text)
 }
 
 sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, const double *base,
-                         double **values, size_t *n_rows, sdm_error *err)
+                         double **values, int **lines, size_t *n_rows, sdm_error *err)
 {
     if (n > MAX_COLUMNS)
         return sdm_fail(err, SDM_E_ARG, "%zu parameters, a table has at most %d", n, MAX_COLUMNS);
@@ -127,18 +127,24 @@ sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, co
         s = sdm_fail(err, SDM_E_FORMAT, "%s: not a text file (a zero byte)", path);
     if (!s) s = sdm_mul(count_lines(t.at), n, &total, err);
     if (!s) s = SDM_ALLOC(values, total, "table of parameters", err);
+    if (!s && lines) s = SDM_ALLOC(lines, count_lines(t.at), "table of parameters", err);
     if (!s) s = read_header(&t, params, n, err);
     // the rows
     *n_rows = 0;
     for (char *line; !s && (line = next_line(&t)); (*n_rows)++) {
         double *row = *values + *n_rows * n;
         memcpy(row, base, n * sizeof *row);
+        if (lines) (*lines)[*n_rows] = t.line;
         s = read_row(&t, line, row, err);
     }
     if (!s && *n_rows == 0) s = sdm_fail(err, SDM_E_FORMAT, "%s: no row after the header", path);
     if (s) {
         sdm_free(*values);
         *values = NULL;
+        if (lines) {
+            sdm_free(*lines);
+            *lines = NULL;
+        }
     }
     sdm_free(data);
     return s;

@@ -250,16 +250,54 @@ sdm_status cli_check_range(const sdm_param *params, size_t n, const double *valu
     return SDM_OK;
 }
 
-sdm_status cli_check_trained(const sdm_param *params, size_t n, const double *values,
-                             sdm_error *err)
+/* Whether the exact shape of the model is known here and allows these values. */
+static bool exact_allows(const cli_args *args, const sdm_model *m, const double *values,
+                         bool *known)
 {
+    sdm_registry *registry = NULL;
+    sdm_instance *shape = NULL;
+    *known = !cli_open_registry(args, &registry, NULL) &&
+             !sdm_runtime_instance(m, registry, &shape, NULL);
+    const bool allows = *known && !sdm_instance_check(shape, values, NULL);
+    sdm_instance_free(shape);
+    sdm_registry_free(registry);
+    return allows;
+}
+
+sdm_status cli_check_trained(const cli_args *args, const sdm_model *m, const sdm_param *params,
+                             const double *values, sdm_error *err)
+{
+    const size_t n = sdm_model_get_info(m)->n_params;
     const sdm_status s = cli_check_range(params, n, values, err);
+    bool known;
     for (size_t i = 0; i < n && s; i++)
         if (!isfinite(values[i])) return s; // no policy accepts it
-    if (s && err)
-        snprintf(err->text + strlen(err->text), sizeof err->text - strlen(err->text),
-                 "; --policy clamp moves it into the range, --policy exact computes exact maps");
+    if (!s || !err) return s;
+    const char *exact = exact_allows(args, m, values, &known)
+                            ? ", --policy exact computes exact maps"
+                        : known ? "; the range of the shape itself does not hold it either"
+                                : ", --policy exact computes exact maps if the shape is loaded "
+                                  "(--plugin FILE)";
+    snprintf(err->text + strlen(err->text), sizeof err->text - strlen(err->text),
+             "; --policy clamp moves it into the range%s", exact);
     return s;
+}
+
+bool cli_clamp(const char *begin, const sdm_param *params, size_t n, double *values)
+{
+    sdm_text moved = {0};
+    char from[32], to[32];
+    for (size_t i = 0; i < n; i++) {
+        const double given = values[i];
+        values[i] = fmin(fmax(given, params[i].min), params[i].max);
+        if (values[i] != given)
+            sdm_text_add(&moved, "%s%s from %s to %s", moved.size ? ", " : "", params[i].name,
+                         sdm_format_real(given, from), sdm_format_real(values[i], to));
+    }
+    const bool any = moved.size > 0;
+    if (any && !moved.failed) cli_notice("%s%s", begin, moved.data);
+    sdm_text_dispose(&moved);
+    return any;
 }
 
 void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out)

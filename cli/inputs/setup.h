@@ -66,18 +66,23 @@ sdm_status cli_read_params(const sdm_param *params, size_t n, const cli_list *gi
                            sdm_error *err);
 
 /* Reads a CSV table of parameters: a header line of names, then a line of numbers for each row.
- * Parameters without a column have the values base[n]. *values[*n_rows][n] is freed with
- * sdm_free(). SDM_E_ARG: too many parameters; SDM_E_IO; SDM_E_FORMAT with file and line. */
+ * Parameters without a column have the values base[n]. *values[*n_rows][n] and, unless lines is
+ * NULL, *lines[*n_rows], the number of the line of each row, are freed with sdm_free(). SDM_E_ARG:
+ * too many parameters; SDM_E_IO; SDM_E_FORMAT with file and line. */
 sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, const double *base,
-                         double **values, size_t *n_rows, sdm_error *err);
+                         double **values, int **lines, size_t *n_rows, sdm_error *err);
 
 /* SDM_E_RANGE with the name of the first parameter that is not finite or outside of its range. */
 sdm_status cli_check_range(const sdm_param *params, size_t n, const double *values, sdm_error *err);
 
 /* As cli_check_range() for the parameters of a model, with the values of --policy that accept
- * others. */
-sdm_status cli_check_trained(const sdm_param *params, size_t n, const double *values,
-                             sdm_error *err);
+ * others: --policy exact only where the shape is known and its own range holds the values. */
+sdm_status cli_check_trained(const cli_args *args, const sdm_model *m, const sdm_param *params,
+                             const double *values, sdm_error *err);
+
+/* Moves values[n] into the ranges of the parameters; a notice that begins with `begin` names each
+ * one that was moved. Returns whether one was. */
+bool cli_clamp(const char *begin, const sdm_param *params, size_t n, double *values);
 
 /* Appends the values as "a=4.4 alpha=0.5". */
 void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out);

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "inputs/grid_cut.h"
 #include "phantom_command.h"
 #include "report/report_audit.h"
 #include "report/terminal.h"
@@ -131,6 +132,13 @@ static sdm_status grid_crop(const cli_phantom *p, const double min[3], const dou
     return SDM_OK;
 }
 
+/* Warns if the box of the shape leaves the grid, both in the frame of the image. */
+static void warn_cut(const sdm_grid *g, const double min[3], const double max[3])
+{
+    const double ends[6] = {min[0], min[1], min[2], max[0], max[1], max[2]};
+    cli_warn_cut_shape(g, ends, 2, "a larger field of view (--size, --spacing, --origin) holds it");
+}
+
 /* Makes the grid: fits it to the shape in the frame of the image, crops it, then moves it to the
  * world. */
 static sdm_status grid_make(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
@@ -151,6 +159,7 @@ static sdm_status grid_make(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
     if (placed) // --origin is in the world, the grid still in the frame of the image
         sdm_pose_apply_inverse(&frame, p->grid.origin, p->grid.origin);
     s = grid_crop(p, min, max, &p->grid, err);
+    if (!s && isnan(args->phantom.crop[0])) warn_cut(&p->grid, min, max);
     for (int i = 0; i < 3; i++) {
         const double end = p->grid.origin[i] + (double)(p->grid.n[i] - 1) * p->grid.spacing[i];
         p->cut |= min[i] < p->grid.origin[i] || max[i] > end;
@@ -160,9 +169,23 @@ static sdm_status grid_make(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
     return s;
 }
 
+/* Refuses options that would do nothing. */
+static sdm_status check_options(const cli_args *args, sdm_error *err)
+{
+    const cli_phantom_args *a = &args->phantom;
+    if (!isnan(a->air[0]) && isnan(a->air_cells[0]))
+        return sdm_fail(err, SDM_E_ARG,
+                        "phantom: --air does nothing without --air-cells SHARE,MM,CLEAR");
+    if (a->white_noise && a->noise <= 0)
+        return sdm_fail(err, SDM_E_ARG, "phantom: --white-noise does nothing with --noise 0");
+    return SDM_OK;
+}
+
 sdm_status cli_phantom_setup(cli_phantom *p, sdm_error *err)
 {
     sdm_mesh mesh = {0};
+    const sdm_status useless = check_options(p->args, err);
+    if (useless) return useless;
     read_options(p);
     sdm_status s = cli_shape_open(p->args, p->args->shape, &p->args->options, &p->shape, err);
     if (!s) s = draw_params(p, err);

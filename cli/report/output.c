@@ -168,9 +168,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
         cli_notice("%s: %lld voxels at creases were adjusted by at most %.2g mm to make a valid "
                    "level set; no sign changed",
                    path, (long long)report.adjusted_voxels, report.adjusted_mm);
-    if (!s && report.cut)
-        cli_warn("%s: the surface leaves the grid and is cut at its border", path);
-    else if (!s && report.estimated_voxels > 0)
+    if (!s && !report.cut && report.estimated_voxels > 0)
         cli_notice("%s: the band leaves the grid; the distances of %lld voxels beyond it are "
                    "estimated from those at its border: a larger grid or a narrower --band avoids "
                    "this",
@@ -186,15 +184,13 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
 static sdm_status write_surface(const char *path, const cli_map *map, sdm_error *err)
 {
     sdm_mesh surface = {0};
-    bool cut = false;
-    sdm_status s = sdm_isosurface(map->grid, map->values, 0.0f, &surface, &cut, err);
+    sdm_status s = sdm_isosurface(map->grid, map->values, 0.0f, &surface, NULL, err);
     if (!s && surface.n_tri == 0)
         s = sdm_fail(err, SDM_E_MESH,
                      "%s: the map has no zero surface: all voxels are %s the shape; does the grid "
                      "cover it?",
                      path, map->values[0] < 0 ? "inside" : "outside");
     if (!s) s = sdm_mesh_write(path, &surface, err);
-    if (!s && cut) cli_warn("%s: the surface leaves the grid and is open at its border", path);
     sdm_mesh_dispose(&surface);
     return s;
 }

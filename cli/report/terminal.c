@@ -9,6 +9,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "args/options.h"
 #include "sdm/internal/utf8.h"
 
 static bool quiet_wanted;
@@ -98,7 +99,10 @@ static bool has_place(const char *line, size_t length)
 int cli_report(const sdm_error *err)
 {
     const bool colour = wants_colour();
-    const char *text = err->text[0] ? err->text : sdm_status_name(err->status);
+    char named[SDM_ERROR_TEXT_MAX];
+    snprintf(named, sizeof named, "%s", err->text[0] ? err->text : sdm_status_name(err->status));
+    cli_name_options(named);
+    const char *text = named;
     sdm_text shown = {0};
     if (form == CLI_FORM_JSON) {
         print_json_message("error", text);

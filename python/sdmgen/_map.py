@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ctypes import byref, c_bool
+from ctypes import byref, c_bool, c_double
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Optional, cast
 
@@ -184,6 +184,14 @@ class Map(Image):
         n = whole(threads, "threads", 0)
         call("sdm_map_gradient", self.grid, address(self.values), n, address(result))
         return result
+
+    @property
+    def volume(self) -> float:
+        """the volume of the shape, mm^3, from the distances near the surface (`sdm_map_volume` in
+        sdm/map.h tells the method)"""
+        result = c_double()
+        call("sdm_map_volume", self.grid, address(self.values), 0, byref(result))
+        return result.value
 
 
 def surface(map: Image, level: float = 0.0) -> Surface:

@@ -158,6 +158,7 @@ sdm_status sdm_field_refuse(const sdm_field *f, const char *what, sdm_error *err
     sdm_grid_world(g, last, end);
     return sdm_fail(err, SDM_E_RANGE,
                     "%s the box in which the network knows the distance, from (%.6g, %.6g, %.6g) "
-                    "to (%.6g, %.6g, %.6g) mm; other ways for points outside: bound, exact",
+                    "to (%.6g, %.6g, %.6g) mm; other points need sdm_generate_opts.outside "
+                    "bound or exact",
                     what, g->origin[0], g->origin[1], g->origin[2], end[0], end[1], end[2]);
 }

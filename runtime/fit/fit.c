@@ -379,8 +379,15 @@ static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         s = maximise_with_maps(p, &newton, &end, err);
     }
     out->converged = !s && end.converged;
-    snprintf(out->reason, sizeof out->reason, "%s%s: last step %.2g, %sbelow %g", what,
-             out->converged ? "" : " stopped", end.step, out->converged ? "" : "not ", newton.eps);
+    if (out->converged || end.step > newton.eps)
+        snprintf(out->reason, sizeof out->reason, "%s%s: last step %.2g, %sbelow %g", what,
+                 out->converged ? "" : " stopped", end.step, out->converged ? "" : "not ",
+                 newton.eps);
+    else
+        snprintf(out->reason, sizeof out->reason,
+                 "%s stopped: the last step, %.2g, was small, but the iterations were over before "
+                 "the fit settled",
+                 what, end.step);
     return s;
 }
 

@@ -32,7 +32,8 @@ sdm_status sdm_check_result(const sdm_grid *grid, const double *p, const sdm_gen
                 "error near the surface (%s of %zu voxels) %.3g mm, demanded at most %.3g mm%s",
                 sdm_check_stat_name(o->max_error_of), result->check.used,
                 sdm_check_get(&result->check, o->max_error_of), o->max_error_mm,
-                result->clamped ? "" : "; the policy exact computes such maps exactly");
+                result->clamped ? ""
+                                : "; sdm_generate_opts.policy exact computes such maps exactly");
     }
     sdm_exact_free(engine);
     sdm_mesh_dispose(&mesh);

@@ -70,7 +70,8 @@ static sdm_status refuse_param(const sdm_model_param *p, double value, sdm_error
     sdm_fail_range(p->name, value, p->min, p->max, p->unit, err);
     if (!isfinite(value)) return SDM_E_RANGE; // no policy accepts it
     return sdm_fail_in(err, SDM_E_RANGE,
-                       "outside the trained range (see the policies clamp, exact)");
+                       "outside the trained range; sdm_generate_opts.policy clamp moves it into "
+                       "the range, exact computes exact maps where the shape allows them");
 }
 
 sdm_status sdm_generate_check_params(const sdm_model *m, const double *params,

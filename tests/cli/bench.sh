@@ -37,9 +37,9 @@ near "$(row naive share)" 0.1 0.03
 near "$(row naive max_error_mm)" 0 1e-5
 
 # Other programs: their arguments and the checks of their answers. The naive method gives the correct values.
-expect 0 - sdmgen exact "${box[@]}" --method naive --quiet -o right.npy
-expect 0 - sdmgen exact --shape torus --size '14,12,10' --spacing 0.6 --origin '-3.9,-3.5,-2.8' --quiet -o shifted.npy
-expect 0 - sdmgen exact --shape torus --size '5,5,5' --spacing 1 --quiet -o small.npy
+expect 0 'leaves the grid' sdmgen exact "${box[@]}" --method naive --quiet -o right.npy
+expect 0 'leaves the grid' sdmgen exact --shape torus --size '14,12,10' --spacing 0.6 --origin '-3.9,-3.5,-2.8' --quiet -o shifted.npy
+expect 0 'leaves the grid' sdmgen exact --shape torus --size '5,5,5' --spacing 1 --quiet -o small.npy
 floats() { od -An -v -t f4 -w4 -j $header "$1"; }
 header=$(($(wc -c <right.npy) - 1680 * 4))
 {

@@ -49,8 +49,8 @@ absent never.npy
 # Several rows of parameters: each is judged by its own error, and the summary counts all.
 printf 'a\n3\n4.4\n' >rows.csv
 expect 0 - sdmgen generate $model --params rows.csv --check
-has '^row 1: error near the surface: max'
-has '^row 2: error near the surface: max'
+has '^row 1 \(line 2\): error near the surface: max'
+has '^row 2 \(line 3\): error near the surface: max'
 expect 0 - sdmgen generate $model --params rows.csv --check --json
 has '"check": \{"maps": 2'
 near "$(json points)" 2000 0

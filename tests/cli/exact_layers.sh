@@ -48,15 +48,15 @@ expect 0 - sdmgen exact --mesh two.off --size 1,1,1 --spacing 1 --origin '3,0.1,
 [ "$(numbers t.npy 1 u4)" = 9 ] || bad "triangle of the second pyramid: $(numbers t.npy 1 u4)"
 
 # Torus: d = hypot(r - major, z) - minor.
-expect 0 - sdmgen exact --shape torus -O edge=0.05 --size 9,8,7 --spacing 1 --quiet --json --jacobian j.npy
+expect 0 'leaves the grid' sdmgen exact --shape torus -O edge=0.05 --size 9,8,7 --spacing 1 --quiet --json --jacobian j.npy
 [ "$(header j.npy)" = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 7, 8, 9), }" ] || bad "j.npy: $(header j.npy)"
 numbers j.npy 1008 f4 | awk 'NR > 504 && ($1 < -1.001 || $1 > -0.999) || $1 < -1.001 || $1 > 1.001 { print NR, $1; exit 1 }' ||
     bad 'derivatives of the torus'
 one=$(json values_crc64)
-expect 0 - sdmgen exact --shape torus -O edge=0.05 --size 9,8,7 --spacing 1 --quiet --json
+expect 0 'leaves the grid' sdmgen exact --shape torus -O edge=0.05 --size 9,8,7 --spacing 1 --quiet --json
 [ "$one" = "$(json values_crc64)" ] || bad 'the map differs when layers are written with it'
 cp j.npy kept.npy
-expect 0 - sdmgen exact --shape torus -O edge=0.05 --size 9,8,7 --spacing 1 --quiet --jacobian j.npy --threads 3
+expect 0 'leaves the grid' sdmgen exact --shape torus -O edge=0.05 --size 9,8,7 --spacing 1 --quiet --jacobian j.npy --threads 3
 cmp -s j.npy kept.npy || bad 'the derivatives depend on the number of threads'
 
 # Mistakes: one line on stderr, the right exit code, no file.

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: which options apply to which kind of target, against the table in docs/fitting.md.
-# Tests: fit_applies.c
+# Tests: fit_applies.c fit_size.c option_names.c
 . "$(dirname "$0")/common.sh"
 shape='--shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2'
 expect 0 - sdmgen phantom $shape --spacing 0.8 -o image.nii --label labels.nii --quiet
@@ -32,4 +32,20 @@ while IFS='|' read -r _ options yes_no; do
 done < <(sed -n '/^| option | image |/,/^$/p' "$source_folder/docs/fitting.md" | tail -n +3 | grep '^|')
 [ "$rows" -eq "${#value[@]}" ] || bad "$rows options in docs/fitting.md, ${#value[@]} here"
 expect 2 'these apply: --keep appearance, --point-sd$' sdmgen fit $shape points.csv --cavity 2
+# --ras is about points and about coordinates of the command line
+expect 2 '--ras .*does nothing in a fit to image' sdmgen fit $shape image.nii --ras --start-points missing.csv
+expect 1 'missing.csv: ' sdmgen fit $shape points.csv --ras --start-points missing.csv
+
+# a mesh in metres or micrometres
+sed 's/\([0-9.-]\{1,\}\)/\1e-3/g; 1s/.*/x,y,z/' points.csv >metres.csv
+sed 's/\([0-9.-]\{1,\}\)/\1e3/g; 1s/.*/x,y,z/' points.csv >micro.csv
+sdmgen fit $shape metres.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
+grep -q 'warning: metres.csv: the points measure 0.00[0-9]* mm across, the start shape [0-9.]* mm: are they in m? lengths are mm' err || bad "metres: $(cat err)"
+sdmgen fit $shape micro.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
+grep -q 'are they in um?' err || bad "micrometres: $(cat err)"
+sdmgen fit $shape points.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
+grep -q 'lengths are mm' err && bad "millimetres: $(cat err)"
+# options have the names of the command line
+grep -q -- '(--max-iterations)' err || bad "no option in: $(cat err)"
+grep -q 'sdm_fit_opts' out err && bad "names of C: $(cat out err)"
 finish

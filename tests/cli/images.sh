@@ -48,4 +48,6 @@ expect 0 - sdmgen exact --shape torus -o map.npy
 for command in info verify; do
     expect 3 'map\.npy: not a model file .*; its name is neither that of a level set \(\.vdb\) nor of an image \(\.nii ' sdmgen $command map.npy
 done
+expect 0 - sdmgen exact --shape torus --size 12,10,8 --quiet -o plain.nii
+expect 2 '--samples does nothing for plain.nii' sdmgen verify plain.nii --samples 5
 finish

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen generate, info, eval and verify on a trained model: outputs, parameters, tables of parameters, damaged files.
-# Tests: cmd_eval.c cmd_generate.c cmd_info.c cmd_verify.c evaluate.c evaluate_time.c param_rows.c
+# Tests: cmd_eval.c cmd_generate.c cmd_info.c cmd_verify.c evaluate.c evaluate_time.c model_grade.c param_rows.c
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm
 present $model
@@ -8,7 +8,9 @@ present $model
 expect 0 - sdmgen info $model
 has "of shape 'cochlea'"
 has '^parameters +a +2 \.\. 5 mm, default [0-9.]+, uniform$'
+has '^verdict +(good|usable|poor); the grid cuts [0-9.]+ % of the held-out shapes$'
 expect 0 - sdmgen info $model --json
+has '"quality": *\{"grade": *"(good|usable|poor)", "cut": [0-9.]+, "between_mm": [0-9.e-]+\}'
 for key in checksum train_seconds rmse_mm q99_mm weight_bytes; do [ -n "$(json $key)" ] || bad "info: no $key"; done
 
 has '"name": "a", .*"distribution": "uniform"\}'
@@ -39,7 +41,7 @@ if sdmgen generate $model -o m.vdb --quiet 2>err; then
 fi
 
 # Parameters: given by name, in range or treated by the chosen policy, and always reported.
-expect 5 "parameter 'a' = 7 mm, allowed .*; --policy clamp moves it into the range, --policy exact computes exact maps\$" sdmgen generate $model -p a=7 -o x.npy
+expect 5 "parameter 'a' = 7 mm, allowed .*; --policy clamp moves it into the range; the range of the shape itself does not hold it either\$" sdmgen generate $model -p a=7 -o x.npy
 expect 5 'nan' sdmgen generate $model -p a=nan -o x.npy
 expect 5 'inf' sdmgen generate $model -p a=1e999 --policy clamp -o x.npy
 expect 5 'a' sdmgen generate $model -p a=5.000000000000001 -o x.npy
@@ -50,7 +52,7 @@ expect 2 'its name must end in' sdmgen generate $model -o x.txt
 expect 1 'nowhere' sdmgen generate $model -o nowhere/x.npy
 expect 1 'missing\.sdm' sdmgen generate missing.sdm -o x.npy
 absent x.npy x.txt nowhere
-expect 0 'clamped to it' sdmgen generate $model -p a=7 --policy clamp -o c.npy --json
+expect 0 'clamped to it: a from 7 to 5$' sdmgen generate $model -p a=7 --policy clamp -o c.npy --json
 near "$(json clamped)" 1 0
 near "$(json a)" 5 0 # the clamped value, not the requested one
 expect 0 - sdmgen generate $model -p a=5 -o five.npy
@@ -64,12 +66,12 @@ near "$(json maps)" 2 0
 expect 0 - sdmgen generate $model -p a=4.5 -p alpha=0.7 -p b=0.1 -o one.npy
 cmp -s one.npy row02.npy || bad 'row 2 differs from the same parameters one by one'
 printf 'alpha,a\n0.5,3\n0.7,9\n' >range.csv
-expect 5 'range\.csv: row 2: .*a.* 9' sdmgen generate $model --params range.csv -o 'x%d.npy'
+expect 5 'range\.csv:3: row 2: .*a.* 9' sdmgen generate $model --params range.csv -o 'x%d.npy'
 printf 'alpha,aa\n' >header.csv
 
 # All or nothing with every policy; names of columns must differ; a byte order mark is skipped.
 printf 'a\n3\nnan\n' >nan.csv
-expect 5 'nan\.csv: row 2: ' sdmgen generate $model --params nan.csv --policy clamp -o 'n%d.npy'
+expect 5 'nan\.csv:3: row 2: ' sdmgen generate $model --params nan.csv --policy clamp -o 'n%d.npy'
 absent n1.npy n2.npy
 expect 2 'given twice' sdmgen generate $model --params rows.csv -o 'same%d.npy' -o 'same%d.npy'
 absent same1.npy

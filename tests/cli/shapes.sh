@@ -79,4 +79,8 @@ printf '        ' >>path/copy.so # another file; --plugin comes before the path
 SDMGEN_PLUGIN_PATH=$good expect 0 "octahedron\.so: shape 'octahedron' is there already \(.*/copy\.so\)" sdmgen shapes octahedron --plugin path/copy.so
 SDMGEN_PLUGIN_PATH=$PWD/none expect 3 'plug-in folder .*/none: No such file' sdmgen shapes
 unset SDMGEN_PLUGIN_PATH
+expect 2 "no subcommand 'chek'; did you mean 'shapes check'" sdmgen shapes chek
+expect 2 "no subcommand 'chek'; did you mean 'shapes check'" sdmgen shapes chek torus
+expect 2 '--samples needs' sdmgen shapes torus --samples 5
+expect 2 '--seed needs' sdmgen shapes --seed 5
 finish

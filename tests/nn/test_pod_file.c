@@ -1,6 +1,6 @@
 /* Files of the pod network: what they keep, the survey of the weights that rounds them, damaged
  * files, and allocations that fail.
- * Tests: container.c model_file.c model_open.c pod_build.c pod_open.c pod_quantise.c pod_survey.c
+ * Tests: container.c model_file.c model_open.c model_quality.c pod_build.c pod_open.c pod_quantise.c pod_survey.c
  */
 #include <math.h>
 #include <setjmp.h>
@@ -250,12 +250,45 @@ static void every_allocation_may_fail(void **state)
     }
 }
 
+// The verdict of the training is kept; without one the file has no section for it, as the files of
+// earlier versions.
+static void quality_is_kept(void **state)
+{
+    (void)state;
+    toy t;
+    toy_make(&t, SDM_POD_F32, 0);
+    sdm_model *m = toy_open(&t);
+    const sdm_model_quality *q = &sdm_model_get_info(m)->quality;
+    const size_t without = sdm_model_get_info(m)->file_bytes;
+    assert_true(!*q->grade && isnan(q->cut) && isnan(q->between_mm));
+    sdm_model_free(m);
+    t.info.quality = (sdm_model_quality){"poor", 0.25, NAN};
+    m = toy_open(&t);
+    q = &sdm_model_get_info(m)->quality;
+    assert_string_equal(q->grade, "poor");
+    assert_true(q->cut == 0.25 && isnan(q->between_mm));
+    assert_true(sdm_model_get_info(m)->file_bytes > without);
+    sdm_model_free(m);
+    // an unknown grade and an impossible share are damage
+    const sdm_model_quality wrong[] = {{"fine", 0, 0}, {"good", 1.5, 0}, {"good", 0, -1}};
+    for (size_t i = 0; i < 3; i++) {
+        uint8_t *bytes;
+        size_t size;
+        t.info.quality = wrong[i];
+        assert_int_equal(sdm_pod_build(&t.spec, &bytes, &size, NULL), SDM_OK);
+        assert_int_equal(sdm_model_open_memory("toy", bytes, size, &m, NULL), SDM_E_FORMAT);
+        sdm_free(bytes);
+    }
+    sdm_free(t.memory);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(weights_must_be_finite),
         cmocka_unit_test(file_keeps_everything),
         cmocka_unit_test(distributions_are_kept),
+        cmocka_unit_test(quality_is_kept),
         cmocka_unit_test(survey_follows_the_distributions),
         cmocka_unit_test(damage_is_refused),
         cmocka_unit_test(hostile_sections),

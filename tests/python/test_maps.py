@@ -68,6 +68,8 @@ def test_derivatives(run, model, model_file, tmp_path):
     same(both.values, slopes)
     same(both.map.values, out)
     same(both.map.gradient(), tmp_path / "gradient.npy")
+    counted = (both.map.values < 0).sum() * both.map.spacing.prod()
+    assert 0.8 * counted < both.map.volume < 1.2 * counted
     rng = np.random.default_rng(1)
     v, w = rng.normal(size=4), rng.normal(size=model.grid.shape).astype(np.float32)
     along = np.tensordot(v, both.values.astype(float), 1)

@@ -255,6 +255,32 @@ static void test_strays_are_refused_if_many(void **state)
     sdm_instance_free(round);
 }
 
+// The grid of the maps is narrower than the shape: refused for this reason, whatever else is wrong.
+static void test_a_grid_that_cuts_is_refused(void **state)
+{
+    (void)state;
+    size_t n;
+    double *x = points_with_strays(SIZE_MAX, &n);
+    sdm_instance *round = shape_of("ellipsoid");
+    const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = x, .n_points = n};
+    sdm_fit_source source = {
+        .shape = round,
+        .grid = sdm_grid_centred((int64_t[3]){8, 34, 34}, 0.35, (double[3]){0, 0, 0})};
+    sdm_fit_opts o = sdm_fit_defaults();
+    o.start_pose = POSE;
+    o.max_iterations = 2;
+    sdm_fit_result r;
+    sdm_error err = {0};
+    assert_int_equal(sdm_fit(&source, &t, &o, &r, &err), SDM_E_QUALITY);
+    const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_GRID);
+    assert_true(f && f->grade == SDM_FIT_FAILED && f->figure > f->limit);
+    assert_non_null(strstr(err.text, "cuts the fitted shape"));
+    assert_null(finding(&r, SDM_FIT_CHECK_NETWORK)); // there is none
+    sdm_fit_dispose(&r);
+    sdm_instance_free(round);
+    free(x);
+}
+
 // An ellipsoid is its own mirror image: both fits reach the same evidence and parameters.
 static void test_mirror_of_an_ellipsoid(void **state)
 {
@@ -286,6 +312,7 @@ int main(void)
         cmocka_unit_test(test_wrong_shapes_are_refused),
         cmocka_unit_test(test_points_of_another_shape_are_refused),
         cmocka_unit_test(test_strays_are_refused_if_many),
+        cmocka_unit_test(test_a_grid_that_cuts_is_refused),
         cmocka_unit_test(test_mirror_of_an_ellipsoid),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -186,6 +186,24 @@ static void grades(void **state)
 }
 
 // Shapes that leave the grid come first in the sentence; what limits the others follows.
+// Inside-out parts are the cause, whatever the parts of the error say.
+static void inside_out_is_the_cause(void **state)
+{
+    (void)state;
+    const sdm_config c = config_of(NULL, 0);
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .asked = true};
+    for (int good = 0; good < 2; good++) {
+        sdm_verdict v = figures();
+        v.inside_out = 1;
+        v.part_mm2[SDM_CAUSE_MAPS] = 8e-5;
+        if (!good) v.dice = 0.5;
+        trainer_verdict_decide(&in, &v);
+        assert_int_equal(strstr(v.sentence, "inside out") != NULL, !good);
+        assert_int_equal(v.limited, good);
+        assert_int_equal(v.key[0] == 0, !good);
+    }
+}
+
 static void grid_cuts(void **state)
 {
     (void)state;
@@ -423,6 +441,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(grid_limits),
         cmocka_unit_test(grades),
         cmocka_unit_test(grid_cuts),
+        cmocka_unit_test(inside_out_is_the_cause),
         cmocka_unit_test(error_falls_in_the_last_third),
         cmocka_unit_test(evaluations_are_due),
         cmocka_unit_test(surface_of_a_sphere),

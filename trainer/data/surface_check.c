@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "sdm/exact.h"
+#include "sdm/internal/part_audit.h"
 #include "sdm/internal/rng.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/vec3.h"
@@ -102,6 +103,16 @@ static bool is_cut(const sdm_mesh *m, const sdm_grid *g)
     return false;
 }
 
+/* Adds 1 to *n if parts of the mesh are inside out and stay so. */
+static sdm_status count_inside_out(const sdm_mesh *m, size_t *n, sdm_error *err)
+{
+    sdm_part_audit audit = {0};
+    const sdm_status s = sdm_part_audit_make(m, false, &audit, err);
+    *n += !s && audit.inside_out;
+    sdm_part_audit_dispose(&audit);
+    return s;
+}
+
 sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check *out,
                                  sdm_error *err)
 {
@@ -109,14 +120,16 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
     surface_sums sums = {0};
     sdm_mesh mesh = {0};
     float *map = NULL;
-    size_t cut = 0;
+    size_t cut = 0, compared = 0, inside_out = 0;
     sdm_status s = SDM_ALLOC(&map, sdm_grid_count(d->grid), "surface", err);
     for (size_t i = 0; i < d->n_holdout && !s; i++) {
         sdm_exact *e = NULL;
         s = sdm_instance_mesh(d->shape, d->holdout_params + i * d->n_params, &mesh, err);
         if (!s) cut += is_cut(&mesh, d->grid);
         if (s || i >= SHAPES) continue;
-        s = sdm_exact_create(&mesh, &opts, &e, err);
+        s = count_inside_out(&mesh, &inside_out, err);
+        compared++;
+        if (!s) s = sdm_exact_create(&mesh, &opts, &e, err);
         if (!s) s = check_surface(d, e, i, map, &sums, err);
         sdm_exact_free(e);
     }
@@ -124,6 +137,7 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
     sdm_free(map);
     *out = (surface_check){.rms_mm = sums.n > 0 ? sqrt(sums.square / sums.n) : NAN,
                            .thin = sums.n > 0 ? sums.thin / sums.n : NAN,
-                           .cut = d->n_holdout ? (double)cut / (double)d->n_holdout : 0};
+                           .cut = d->n_holdout ? (double)cut / (double)d->n_holdout : 0,
+                           .inside_out = compared ? (double)inside_out / (double)compared : 0};
     return s;
 }

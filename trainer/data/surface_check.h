@@ -14,6 +14,9 @@ typedef struct surface_check {
     /* Fraction of all held-out shapes with vertices beyond the outer voxel centres: their surfaces
        end open at the border of the grid. */
     double cut;
+    /* Fraction of the compared shapes with parts that are inside out and that the engine does not
+       turn: they take away from the parts that they overlap. */
+    double inside_out;
 } surface_check;
 
 /* Compares a few held-out shapes at random points of their surfaces that lie inside the grid;

@@ -328,6 +328,13 @@ void trainer_export_path(const trainer *t, char path[SDM_PATH_TEXT_MAX])
     snprintf(path, SDM_PATH_TEXT_MAX, "%.*s/model.sdm", SDM_PATH_TEXT_MAX - 16, t->folder);
 }
 
+/* What the model file keeps of the verdict. */
+static void set_quality(const sdm_verdict *v, sdm_model_quality *q)
+{
+    *q = (sdm_model_quality){"", v->cut, sqrt(v->part_mm2[SDM_CAUSE_GRID])};
+    snprintf(q->grade, sizeof q->grade, "%s", sdm_grade_name(v->grade));
+}
+
 sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error *err)
 {
     description *d = NULL;
@@ -349,6 +356,7 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
         s = trainer_metric(t, 0, err);
         if (!s) s = trainer_verdict_make(t, &more, &report->verdict, err);
         if (!s) s = trainer_metric_verdict(t, &report->verdict, err);
+        if (!s) set_quality(&report->verdict, &t->quality);
         report->accuracy = t->accuracy;
         report->steps = t->step;
         report->samples = d->info.train_samples;
@@ -367,6 +375,7 @@ sdm_status trainer_export_model(const trainer *t, sdm_error *err)
     sdm_status s = description_create(t, &d, err);
     if (!s) {
         d->info.accuracy = t->accuracy;
+        d->info.quality = t->quality;
         s = t->kind->build(t, &d->info, &bytes, &size, err);
     }
     if (!s) s = sdm_container_write(path, bytes, size, err);

@@ -216,11 +216,27 @@ static void tell_cut(sdm_verdict *v)
              share, rest);
 }
 
+/* Parts that are inside out make the maps jump where they begin to overlap others: no network
+ * learns that, and what it leaves says nothing about network or maps. */
+static void tell_inside_out(sdm_verdict *v)
+{
+    v->limited = false;
+    v->key[0] = 0;
+    v->at_best_mm = NAN;
+    snprintf(v->sentence, sizeof v->sentence,
+             "Parts of the meshes are inside out and vanish where they overlap others: reverse the "
+             "vertices of their triangles in mesh() of the shape (sdmgen shapes check names the "
+             "parts).");
+}
+
 void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
 {
     v->grade = grade_of(v);
     decide_limit(in, v);
-    if (v->cut > 0) tell_cut(v);
+    if (v->inside_out > 0 && v->grade != SDM_GRADE_GOOD)
+        tell_inside_out(v);
+    else if (v->cut > 0)
+        tell_cut(v);
 }
 
 /* Distributes the error of the model over its causes. A bound errs towards the surface alone, all
@@ -256,7 +272,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
 {
     error_measures m = {
         .network = {NAN, NAN}, .bases = {NAN, NAN}, .modes = NAN, .motion_mm = NAN, .warp_mm = NAN};
-    surface_check surface = {NAN, NAN, 0};
+    surface_check surface = {NAN, NAN, 0, 0};
     history h = {0};
     const dataset *d = &t->data;
     sdm_status s = t->kind->parts(t, &m, err);
@@ -274,6 +290,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                          .warp_mm = m.warp_mm,
                          .thin = surface.thin,
                          .cut = surface.cut,
+                         .inside_out = surface.inside_out,
                          .saved_seconds = t->saved_seconds,
                          .fall = fmax(trainer_history_fall(&h, SDM_PHASE_MODE_FIT, floor),
                                       trainer_history_fall(&h, SDM_PHASE_REFINE, floor))};

@@ -50,9 +50,10 @@ typedef struct trainer {
     double evaluation_seconds; /* duration of the last evaluation */
     int64_t evaluated_step;    /* step of the last evaluation; -1: none yet */
     trainer_pace pace;
-    double loss, heldout_mse; /* mm^2 */
-    struct sdm_text *metrics; /* all lines of metrics.jsonl */
-    double prepared_seconds;  /* trainer_seconds() before the first step */
-    double saved_seconds;     /* by train.patience */
-    sdm_accuracy accuracy;    /* accuracy of the finished model */
+    double loss, heldout_mse;  /* mm^2 */
+    struct sdm_text *metrics;  /* all lines of metrics.jsonl */
+    double prepared_seconds;   /* trainer_seconds() before the first step */
+    double saved_seconds;      /* by train.patience */
+    sdm_accuracy accuracy;     /* accuracy of the finished model */
+    sdm_model_quality quality; /* the verdict on it, for its file */
 } trainer;

@@ -55,6 +55,7 @@ void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
     sdm_json_real(j, "warp_mm", v->warp_mm);
     sdm_json_real(j, "thin", v->thin);
     sdm_json_real(j, "cut", v->cut);
+    sdm_json_real(j, "inside_out", v->inside_out);
     sdm_json_real(j, "fall", v->fall);
     sdm_json_text(j, "limit", v->limited ? sdm_cause_name(v->limit) : "none");
     sdm_json_text(j, "key", v->key);

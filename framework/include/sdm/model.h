@@ -32,6 +32,15 @@ typedef struct sdm_accuracy {
     double near_mm; /* two voxels (their shortest edge); 0.4 mm in models of earlier versions */
 } sdm_accuracy;
 
+/* The verdict of the training on the model. Earlier versions stored none: grade "", numbers NaN. */
+typedef struct sdm_model_quality {
+    char grade[16]; /* "good", "usable" or "poor" */
+    double cut;     /* fraction of the held-out shapes whose surfaces leave the grid */
+    /* Between the voxels: how far exact maps, interpolated linearly, miss the surface of held-out
+       shapes, root mean square, mm. sdm_accuracy holds errors at the voxels only. */
+    double between_mm;
+} sdm_model_quality;
+
 /* Description of a model. All pointers stay valid until sdm_model_free(); texts are
    NUL-terminated. */
 typedef struct sdm_model_info {
@@ -55,6 +64,7 @@ typedef struct sdm_model_info {
     const char *config; /* configuration of the training with all defaults filled in, YAML */
     const char *folder; /* folder of the file with a final '/'; NULL: opened from memory */
     size_t fine_width;  /* units of a layer of the fine level (sdm/field.h); 0: none */
+    sdm_model_quality quality;
 } sdm_model_info;
 
 /* Immutable after opening: any number of threads may use one model at the same time. */

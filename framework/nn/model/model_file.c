@@ -54,17 +54,23 @@ sdm_status sdm_model_pack(const sdm_model_info *info, const sdm_text *descriptio
                           const sdm_section *sections, size_t n, uint8_t **bytes, size_t *size,
                           sdm_error *err)
 {
-    enum { COMMON = 2 };
+    enum { COMMON = 3 };
     const char *config = info->config ? info->config : "";
     sdm_section all[SDM_CONTAINER_MAX_SECTIONS] = {{"meta", description->data, description->size},
                                                    {"config", config, strlen(config)}};
-    if (description->failed)
-        return sdm_fail(err, SDM_E_NOMEM, "no memory for the model's description");
     if (n > SDM_CONTAINER_MAX_SECTIONS - COMMON)
         return sdm_fail(err, SDM_E_INTERNAL, "%zu sections of a network, at most %d", n,
                         SDM_CONTAINER_MAX_SECTIONS - COMMON);
-    memcpy(all + COMMON, sections, n * sizeof *sections);
-    return sdm_container_build(all, COMMON + n, bytes, size, err);
+    sdm_text quality = {0};
+    sdm_quality_describe(&info->quality, &quality);
+    memcpy(all + 2, sections, n * sizeof *sections);
+    n += 2;
+    if (quality.size) all[n++] = (sdm_section){"quality", quality.data, quality.size};
+    const sdm_status s = description->failed || quality.failed
+                             ? sdm_fail(err, SDM_E_NOMEM, "no memory for the model's description")
+                             : sdm_container_build(all, n, bytes, size, err);
+    sdm_text_dispose(&quality);
+    return s;
 }
 
 const sdm_section *sdm_section_find(const sdm_section *sections, size_t n, const char *name)

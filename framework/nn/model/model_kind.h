@@ -75,6 +75,12 @@ const void *sdm_model_weights(sdm_model *m, const sdm_section *sections, size_t 
    file. SDM_E_FORMAT. */
 sdm_status sdm_fine_open(sdm_model *m, const sdm_section *sections, size_t n, sdm_error *err);
 
+/* Appends the content of the section "quality" to *t; nothing without a grade. */
+void sdm_quality_describe(const sdm_model_quality *q, sdm_text *t);
+
+/* *q = the content of the section "quality"; NULL: no quality. SDM_E_FORMAT. */
+sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sdm_error *err);
+
 /* The section `name` among sections[n], or NULL. */
 const sdm_section *sdm_section_find(const sdm_section *sections, size_t n, const char *name);
 

@@ -166,6 +166,7 @@ sdm_status sdm_model_read(uint8_t *bytes, size_t size, const sdm_model_kind *con
     m->info.config = m->config;
     if (!s) s = m->kind->open(m, &lines, sections, n, err);
     if (!s) s = sdm_fine_open(m, sections, n, err);
+    if (!s) s = sdm_quality_read(sdm_section_find(sections, n, "quality"), &m->info.quality, err);
     if (s)
         sdm_model_free(m);
     else

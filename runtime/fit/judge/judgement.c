@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "blob.h"
 #include "misfit.h"
@@ -22,20 +23,33 @@
 #define COARSE 0.5
 // largest share of points that may belong to another surface
 #define STRAY_MAX 0.35
+// part of a voxel by which the border of the maps may be inside the shape
+#define BORDER_MAX 0.1
+// largest fraction of the shapes of its family that a good network's grid cuts
+#define CUT_MAX 0.05
 // A shape that has this Dice coefficient with its blob cannot be told from one: no comparison.
 #define BLOB_ALIKE 0.9
 
 const char *sdm_fit_check_name(sdm_fit_check_kind kind)
 {
-    static const char *const names[SDM_FIT_N_CHECKS] = {
-        [SDM_FIT_CHECK_CONVERGED] = "convergence", [SDM_FIT_CHECK_NO_SHAPE] = "no shape",
-        [SDM_FIT_CHECK_CONTRAST] = "contrast",     [SDM_FIT_CHECK_CAVITY] = "cavity",
-        [SDM_FIT_CHECK_IN_IMAGE] = "in the image", [SDM_FIT_CHECK_RESIDUALS] = "residuals",
-        [SDM_FIT_CHECK_BESIDE] = "beside",         [SDM_FIT_CHECK_EMPTY] = "empty",
-        [SDM_FIT_CHECK_MISSING] = "missing",       [SDM_FIT_CHECK_INSIDE] = "inside",
-        [SDM_FIT_CHECK_OUTSIDE] = "outside",       [SDM_FIT_CHECK_GIVEN] = "given values",
-        [SDM_FIT_CHECK_BOUNDS] = "bounds",         [SDM_FIT_CHECK_BLOB] = "blob",
-        [SDM_FIT_CHECK_KEPT_POSE] = "kept pose",   [SDM_FIT_CHECK_MIRROR] = "mirror image"};
+    static const char *const names[SDM_FIT_N_CHECKS] = {[SDM_FIT_CHECK_CONVERGED] = "convergence",
+                                                        [SDM_FIT_CHECK_NO_SHAPE] = "no shape",
+                                                        [SDM_FIT_CHECK_CONTRAST] = "contrast",
+                                                        [SDM_FIT_CHECK_CAVITY] = "cavity",
+                                                        [SDM_FIT_CHECK_IN_IMAGE] = "in the image",
+                                                        [SDM_FIT_CHECK_RESIDUALS] = "residuals",
+                                                        [SDM_FIT_CHECK_BESIDE] = "beside",
+                                                        [SDM_FIT_CHECK_EMPTY] = "empty",
+                                                        [SDM_FIT_CHECK_MISSING] = "missing",
+                                                        [SDM_FIT_CHECK_INSIDE] = "inside",
+                                                        [SDM_FIT_CHECK_OUTSIDE] = "outside",
+                                                        [SDM_FIT_CHECK_GIVEN] = "given values",
+                                                        [SDM_FIT_CHECK_BOUNDS] = "bounds",
+                                                        [SDM_FIT_CHECK_BLOB] = "blob",
+                                                        [SDM_FIT_CHECK_KEPT_POSE] = "kept pose",
+                                                        [SDM_FIT_CHECK_MIRROR] = "mirror image",
+                                                        [SDM_FIT_CHECK_GRID] = "grid",
+                                                        [SDM_FIT_CHECK_NETWORK] = "network"};
     return kind >= 0 && kind < SDM_FIT_N_CHECKS ? names[kind] : NULL;
 }
 
@@ -110,12 +124,12 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
     if (r->n_cavity)
         add(v, SDM_FIT_CHECK_CAVITY, widest < o->cavity, SDM_FIT_FAILED, widest, o->cavity,
             "the fitted shape holds a ball of %.3g mm, but spaces that hold one of %.3g mm were "
-            "left out (cavity): give a radius above that of the shape",
+            "left out (sdm_fit_opts.cavity): give a radius above that of the shape",
             widest, o->cavity);
     if (p->target->kind != SDM_FIT_POINTS)
         add(v, SDM_FIT_CHECK_IN_IMAGE, r->inside_share >= o->least_inside, SDM_FIT_FAILED,
             r->inside_share, o->least_inside,
-            "only %.0f %% of the shape lies in the image, need %.0f %% (least_inside)",
+            "only %.0f %% of the shape lies in the image, need %.0f %% (sdm_fit_opts.least_inside)",
             100 * r->inside_share, 100 * o->least_inside);
     size_t bounds = 0;
     for (size_t k = 0; k < p->n_params && !o->keep_params; k++) bounds += r->at_bound[k];
@@ -130,11 +144,12 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_v
     const bool exact = is_image(p) && p->maps.share && !(p->opts->tolerance > 0);
     const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps);
     char cause[200] = "another shape lies there, or the organ differs from the model (then say by "
-                      "how much it may: tolerance)";
+                      "how much it may: sdm_fit_opts.tolerance)";
     if (voxel > COARSE * radius)
         snprintf(cause, sizeof cause,
                  "the voxels of the maps, %.2g mm, are coarse for a shape whose largest ball has a "
-                 "radius of %.2g mm: finer ones are needed, or a tolerance",
+                 "radius of %.2g mm: finer ones are needed, or "
+                 "sdm_fit_opts.tolerance",
                  voxel, radius);
     add(v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1],
         exact ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, m->chi_square[1], m->limit[1],
@@ -159,19 +174,21 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
     const double most = fmax(p->opts->tolerance, biased ? VOLUME_MIN_BIASED : VOLUME_MIN),
                  beside = is_image(p) ? fmax(p->opts->beside, most) : most;
     add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
-        "%.0f %% of the volume of the shape is empty in the %s, allowed %.0f %% (tolerance)",
+        "%.0f %% of the volume of the shape is empty in the %s, allowed %.0f %% "
+        "(sdm_fit_opts.tolerance)",
         100 * m->empty, what, 100 * most);
     const double stray = fmax(p->opts->tolerance, STRAY_MAX);
     if (points && r->outliers > stray)
         add(v, SDM_FIT_CHECK_MISSING, false, SDM_FIT_FAILED, r->outliers, stray,
-            "%.0f %% of the points lie on no surface of the shape, allowed %.0f %% (tolerance)",
+            "%.0f %% of the points lie on no surface of the shape, allowed %.0f %% "
+            "(sdm_fit_opts.tolerance)",
             100 * r->outliers, 100 * stray);
     else
         add(v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED, m->missing, beside,
             "beside the shape the %s hold%s as much of its material as %.0f %% of its volume, "
             "allowed %.0f %% (%s)",
             what, is_image(p) ? "s" : "", 100 * m->missing, 100 * beside,
-            is_image(p) ? "beside" : "tolerance");
+            is_image(p) ? "sdm_fit_opts.beside" : "sdm_fit_opts.tolerance");
 }
 
 // the tissues against the robust statistics, and against the values at the start
@@ -212,12 +229,48 @@ static sdm_status check_blob(const fit_problem *p, const sdm_fit_result *r, sdm_
     return s;
 }
 
+// how deep inside the shape the border of its map is, mm; 0: the border is outside
+static double border_depth(const fit_maps *m)
+{
+    const int64_t *n = m->grid.n;
+    double least = 0;
+    for (int64_t k = 0; k < n[2]; k++)
+        for (int64_t j = 0; j < n[1]; j++) {
+            const bool all = !k || k == n[2] - 1 || !j || j == n[1] - 1;
+            const double *row = m->distance + (k * n[1] + j) * n[0];
+            for (int64_t i = 0; i < n[0]; i += all ? 1 : n[0] > 1 ? n[0] - 1 : 1)
+                least = fmin(least, row[i]);
+        }
+    return -least;
+}
+
+// whether the maps show the whole shape, and whether their network is any good
+static void check_maps(const fit_problem *p, sdm_fit_verdict *v)
+{
+    const double depth = border_depth(&p->maps),
+                 most = BORDER_MAX * fit_longest_edge(&p->maps.grid);
+    add(v, SDM_FIT_CHECK_GRID, depth <= most, SDM_FIT_FAILED, depth, most,
+        "the grid of the %s cuts the fitted shape, its surface ends open there: a grid that "
+        "reaches at least %.2g mm farther is needed%s",
+        p->source->model ? "model" : "maps", depth,
+        p->source->model ? " (train with grid: auto)" : "");
+    if (!p->source->model || p->maps.exact) return;
+    const sdm_model_quality *q = &sdm_model_get_info(p->source->model)->quality;
+    if (!*q->grade) return;
+    const bool poor = !strcmp(q->grade, "poor");
+    add(v, SDM_FIT_CHECK_NETWORK, !poor && !(q->cut > CUT_MAX), SDM_FIT_DOUBTFUL, q->cut, CUT_MAX,
+        "the training graded this network %s, and its grid cuts %.0f %% of the shapes of its "
+        "family: train it again (docs/symptoms.md)",
+        q->grade, 100 * q->cut);
+}
+
 sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err)
 {
     sdm_fit_verdict *v = &r->verdict;
     fit_residuals residuals;
     fit_misfit misfit;
     check_basics(p, r, v);
+    check_maps(p, v);
     sdm_status s = sdm_fit_residuals_create(p, &residuals, err);
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     if (!s) {
@@ -229,10 +282,15 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err
     if (!s && is_image(p)) check_tissues(p, &residuals, r, v);
     sdm_fit_residuals_dispose(&residuals);
     if (!s && is_image(p)) s = check_blob(p, r, v, err);
-    for (size_t i = 0; i < v->n_findings && !s; i++)
-        if (v->findings[i].grade == SDM_FIT_FAILED)
-            s = sdm_fail(err, SDM_E_QUALITY, "%s", v->findings[i].text);
-    return s;
+    // the first one that failed; but where the image shows a shape, a grid that cuts it is the
+    // reason
+    const sdm_fit_finding *why = NULL;
+    for (size_t i = 0; i < v->n_findings; i++) {
+        const sdm_fit_finding *x = &v->findings[i];
+        const bool cut = x->kind == SDM_FIT_CHECK_GRID && why && why->kind > SDM_FIT_CHECK_CONTRAST;
+        if (x->grade == SDM_FIT_FAILED && (!why || cut)) why = x;
+    }
+    return s || !why ? s : sdm_fail(err, SDM_E_QUALITY, "%s", why->text);
 }
 
 double sdm_fit_compare(const sdm_fit_result *fit, const sdm_fit_result *rival)

@@ -287,6 +287,13 @@ typedef enum sdm_fit_check_kind {
     SDM_FIT_CHECK_KEPT_POSE,
     /* the shape against its mirror image, see sdm_fit_compare() */
     SDM_FIT_CHECK_MIRROR,
+    /* The grid of the maps holds the shape. Figure: how deep inside the shape the border of the
+       grid is, mm; limit: a tenth of a voxel. Where the grid cuts the shape, the maps end open, and
+       the fit sees another shape */
+    SDM_FIT_CHECK_GRID,
+    /* network: fraction of the held-out shapes of its training that the grid cut; not passed also
+       where the training graded the network poor, see sdm_model_quality */
+    SDM_FIT_CHECK_NETWORK,
     SDM_FIT_N_CHECKS
 } sdm_fit_check_kind;
 

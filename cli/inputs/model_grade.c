@@ -1,0 +1,43 @@
+/* Prints the verdict of the training on a model, and warns of models that are poor or cut shapes.
+ */
+#include "model_grade.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "report/terminal.h"
+
+/* Largest fraction of the shapes that the grid of a good model cuts (docs/network.md). */
+#define CUT_MAX 0.05
+
+void cli_warn_quality(const char *path, const sdm_model_info *m)
+{
+    const sdm_model_quality *q = &m->quality;
+    const bool poor = !strcmp(q->grade, "poor"), cut = q->cut > CUT_MAX;
+    char shapes[120] = "";
+    if (cut)
+        snprintf(shapes, sizeof shapes,
+                 "its grid cuts %.0f %% of the shapes of its family, whose maps end open (train "
+                 "with grid: auto)",
+                 100 * q->cut);
+    if (poor || cut)
+        cli_warn("%s: %s%s%s", path,
+                 poor ? "the training graded this model poor (sdmgen info)" : "",
+                 poor && cut ? "; " : "", shapes);
+}
+
+void cli_print_quality(const sdm_model_quality *q)
+{
+    if (!*q->grade) {
+        cli_print("verdict      not stored: trained by an earlier version\n");
+        return;
+    }
+    cli_print("verdict      %s; the grid cuts %.3g %% of the held-out shapes\n", q->grade,
+           100 * q->cut);
+    if (!isnan(q->between_mm))
+        cli_print(
+            "             between the voxels exact maps, interpolated linearly, miss the surface "
+            "by %.5f mm RMS\n",
+            q->between_mm);
+}

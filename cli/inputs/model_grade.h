@@ -1,0 +1,11 @@
+/* What the training said about a model, for the commands that use it. */
+#pragma once
+
+#include "sdm/model.h"
+
+/* Warns in one line if the training graded the model poor, or if its grid cuts more than 5 % of the
+ * shapes of its family. Says nothing about models without a verdict. */
+void cli_warn_quality(const char *path, const sdm_model_info *m);
+
+/* Prints the verdict as lines of `info`. */
+void cli_print_quality(const sdm_model_quality *q);

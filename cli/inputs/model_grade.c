@@ -34,7 +34,7 @@ void cli_print_quality(const sdm_model_quality *q)
         return;
     }
     cli_print("verdict      %s; the grid cuts %.3g %% of the held-out shapes\n", q->grade,
-           100 * q->cut);
+              100 * q->cut);
     if (!isnan(q->between_mm))
         cli_print(
             "             between the voxels exact maps, interpolated linearly, miss the surface "

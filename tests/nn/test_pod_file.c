@@ -1,6 +1,7 @@
 /* Files of the pod network: what they keep, the survey of the weights that rounds them, damaged
  * files, and allocations that fail.
- * Tests: container.c model_file.c model_open.c model_quality.c pod_build.c pod_open.c pod_quantise.c pod_survey.c
+ * Tests: container.c model_file.c model_open.c model_quality.c pod_build.c pod_open.c
+ * pod_quantise.c pod_survey.c
  */
 #include <math.h>
 #include <setjmp.h>

@@ -14,12 +14,14 @@ web= checker=
 [ -n "${SDM_NODE_MODULES:-}" ] && [ -d "$SDM_NODE_MODULES/node_modules/onnxruntime-web" ] && web=yes
 $python -c 'import onnx' 2>/dev/null && checker=yes
 
+generate_without_warnings() { sdmgen generate "$@" 2>warnings; }
 # compare NAME BATCH LIMIT: the maps of NAME.onnx at BATCH parameter vectors against those of generate; LIMIT in mm
 compare() {
     local name=$1 limit=$3
     rm -f m*.npy
     expect 0 - "$python" "$tool" params "$name.onnx" "$2" p.csv
-    expect 0 - sdmgen generate "$name/model.sdm" --params p.csv -o m%04d.npy
+    # networks of a few steps are poor, and generate warns
+    expect 0 - generate_without_warnings "$name/model.sdm" --params p.csv -o m%04d.npy
     if [[ $name = pod* ]]; then
         expect 0 - "$python" "$tool" run "$name.onnx" p.csv a.f32
         expect 0 - "$python" "$tool" compare a.f32 "$limit" m*.npy

@@ -103,7 +103,7 @@ static void test_refused_outside(void **state)
     assert_int_equal(sdm_generate_grid(s->model[0], params, NULL, &g, values, NULL, NULL, &err),
                      SDM_E_RANGE);
     assert_non_null(strstr(err.text, "the grid leaves the box"));
-    assert_non_null(strstr(err.text, "bound, exact"));
+    assert_non_null(strstr(err.text, "sdm_generate_opts.outside bound or exact"));
     double x[6] = {0, 0, 0, 9, 1, 1};
     assert_int_equal(
         sdm_generate_points(s->model[0], params, NULL, x, 2, values, NULL, NULL, NULL, &err),

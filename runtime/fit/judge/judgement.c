@@ -19,6 +19,8 @@
 #define VOLUME_MIN 0.05
 // the same for images with the older observation model, which is biased where they are blurred
 #define VOLUME_MIN_BIASED 0.2
+// residuals that contradict less than this share of the volume leave doubt, but refuse no fit
+#define SERIOUS_MIN 0.02
 // voxels larger than this share of the radius of the largest ball inside explain residuals
 #define COARSE 0.5
 // largest share of points that may belong to another surface
@@ -141,8 +143,9 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
 // blurred images, so that its residuals are not noise alone
 static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
 {
-    const bool exact = is_image(p) && p->maps.share && !(p->opts->tolerance > 0);
     const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps);
+    const bool exact = is_image(p) && p->maps.share && !(p->opts->tolerance > 0),
+               serious = m->empty + m->missing > SERIOUS_MIN || voxel > COARSE * radius;
     char cause[200] = "another shape lies there, or the organ differs from the model (then say by "
                       "how much it may: sdm_fit_opts.tolerance)";
     if (voxel > COARSE * radius)
@@ -152,7 +155,7 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_v
                  "sdm_fit_opts.tolerance",
                  voxel, radius);
     add(v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1],
-        exact ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, m->chi_square[1], m->limit[1],
+        exact && serious ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, m->chi_square[1], m->limit[1],
         "the residuals inside the shape are not noise: neighbourhoods deviate by %.2g times what "
         "noise explains; %s",
         sqrt(m->chi_square[1]), cause);

@@ -3,6 +3,7 @@
 #include "crash_guard.h"
 
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,9 +14,12 @@
 
 /* Prints "sdmgen: error: shape 'mug', mesh() at r=2 h=3: REASON" and ends the program. snprintf()
  * is no function for signal handlers by the standard; the C libraries' own work there for short
- * texts without locks or memory, and the alternative is a message without numbers. */
+ * texts without locks or memory, and the alternative is a message without numbers. Where two
+ * threads crash at once, one tells it; the other waits for the end. */
 static void end_program(const sdm_callback *c, const char *reason)
 {
+    static atomic_flag told = ATOMIC_FLAG_INIT;
+    while (atomic_flag_test_and_set(&told)) pause();
     char line[1024];
     // names hold no characters that JSON escapes
     const bool json = cli_get_form() == CLI_FORM_JSON;

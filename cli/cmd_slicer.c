@@ -42,14 +42,10 @@ static sdm_status write_link(const char *path, const char *program, sdm_error *e
 
 static sdm_status write_description(const slicer_module *m, const char *path, sdm_error *err)
 {
-    sdm_outfile *file = NULL;
     sdm_text text = {0};
     slicer_describe(m, &text);
-    sdm_status s = text.failed ? sdm_fail(err, SDM_E_NOMEM, "%s: out of memory", path)
-                               : sdm_outfile_open(path, &file, err);
-    if (!s) s = sdm_outfile_write(file, text.data, text.size, err);
-    if (!s) s = sdm_outfile_commit(&file, err);
-    if (s) sdm_outfile_discard(&file);
+    const sdm_status s = text.failed ? sdm_fail(err, SDM_E_NOMEM, "%s: out of memory", path)
+                                     : sdm_file_write(path, text.data, text.size, err);
     sdm_text_dispose(&text);
     return s;
 }

@@ -80,16 +80,13 @@ static sdm_status read_line(const char *path, size_t number, char *line, bool he
 
 static sdm_status read_csv(const char *path, double **x, size_t *n, sdm_error *err)
 {
-    uint8_t *data = NULL;
-    size_t size = 0, lines = 1, number = 0;
-    sdm_status s = sdm_file_read(path, MAX_BYTES, &data, &size, err);
+    char *text = NULL;
+    size_t size, lines, number = 0;
+    sdm_status s = sdm_file_read_text(path, MAX_BYTES, &text, &size, &lines, err);
     if (s) return s;
-    if (strlen((char *)data) != size)
-        s = sdm_fail(err, SDM_E_FORMAT, "%s: not a text file (a zero byte)", path);
-    for (size_t i = 0; i < size; i++) lines += data[i] == '\n';
-    if (!s) s = SDM_ALLOC(x, 3 * lines, "points", err);
+    s = SDM_ALLOC(x, 3 * lines, "points", err);
     // spreadsheets begin the file with a byte order mark
-    char *at = (char *)data + (size >= 3 && !memcmp(data, "\xef\xbb\xbf", 3) ? 3 : 0);
+    char *at = size >= 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? text + 3 : text;
     bool header = true;
     columns order = {{0, 1, 2}};
     while (!s && *at) {
@@ -105,7 +102,7 @@ static sdm_status read_csv(const char *path, double **x, size_t *n, sdm_error *e
         *n += is_point;
         header = false;
     }
-    sdm_free(data);
+    sdm_free(text);
     return s;
 }
 

@@ -44,16 +44,10 @@ static sdm_status make_path(const char *folder, size_t index, const char *name, 
 static sdm_status write_file(const char *folder, size_t index, const char *name, sdm_error *err)
 {
     sdm_text path = {0}, content = {0};
-    sdm_outfile *file = NULL;
     sdm_status s = make_path(folder, index, name, &path, err);
     add_renamed(&content, files[index].content, name);
     if (!s && content.failed) s = sdm_fail(err, SDM_E_NOMEM, "no memory for %s", path.data);
-    if (!s) s = sdm_outfile_open(path.data, &file, err);
-    if (!s) s = sdm_outfile_write(file, content.data, content.size, err);
-    if (!s)
-        s = sdm_outfile_commit(&file, err);
-    else
-        sdm_outfile_discard(&file);
+    if (!s) s = sdm_file_write(path.data, content.data, content.size, err);
     sdm_text_dispose(&content);
     sdm_text_dispose(&path);
     return s;

@@ -39,15 +39,11 @@ void cli_results_params(cli_results *r, const char *name, const sdm_param *param
 
 sdm_status cli_results_write(cli_results *r, const char *path, sdm_error *err)
 {
-    sdm_outfile *file = NULL;
     sdm_status s = SDM_OK;
-    if (path) {
-        if (r->text.failed) s = sdm_fail(err, SDM_E_NOMEM, "%s: out of memory", path);
-        if (!s) s = sdm_outfile_open(path, &file, err);
-        if (!s) s = sdm_outfile_write(file, r->text.data, r->text.size, err);
-        if (!s) s = sdm_outfile_commit(&file, err);
-        if (s) sdm_outfile_discard(&file);
-    }
+    if (path && r->text.failed)
+        s = sdm_fail(err, SDM_E_NOMEM, "%s: out of memory", path);
+    else if (path)
+        s = sdm_file_write(path, r->text.data, r->text.size, err);
     cli_results_dispose(r);
     return s;
 }

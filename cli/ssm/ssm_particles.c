@@ -43,16 +43,13 @@ static bool read_line(char *line, double x[3])
 /* *x = new array [*n][3] of a file. */
 static sdm_status read_particles(const char *path, double **x, size_t *n, sdm_error *err)
 {
-    uint8_t *data = NULL;
-    size_t size = 0, lines = 1, number = 0;
-    sdm_status s = sdm_file_read(path, MAX_BYTES, &data, &size, err);
+    char *text = NULL;
+    size_t size, lines, number = 0;
+    sdm_status s = sdm_file_read_text(path, MAX_BYTES, &text, &size, &lines, err);
     if (s) return s;
-    if (strlen((char *)data) != size)
-        s = sdm_fail(err, SDM_E_FORMAT, "%s: not a text file (a zero byte)", path);
-    for (size_t i = 0; i < size; i++) lines += data[i] == '\n';
     *n = 0;
-    if (!s) s = SDM_ALLOC(x, 3 * lines, "particles", err);
-    for (char *at = (char *)data; !s && *at;) {
+    s = SDM_ALLOC(x, 3 * lines, "particles", err);
+    for (char *at = text; !s && *at;) {
         char *line = at + strspn(at, " \t\r");
         at += strcspn(at, "\n");
         if (*at) *at++ = '\0';
@@ -65,7 +62,7 @@ static sdm_status read_particles(const char *path, double **x, size_t *n, sdm_er
             ++*n;
     }
     if (!s && *n == 0) s = sdm_fail(err, SDM_E_FORMAT, "%s: no particles", path);
-    sdm_free(data);
+    sdm_free(text);
     return s;
 }
 
@@ -106,8 +103,8 @@ static sdm_status read_all(const char *folder, particles *p, sdm_error *err)
     return s;
 }
 
-/* Looks for the particles of the mesh NAME.vtk in the folder: NAME_local.particles or
- * NAME.particles. */
+/* path[size] = the file in the folder that holds the particles of the mesh NAME.vtk:
+ * NAME_local.particles, else NAME.particles. Returns false if there is neither. */
 static bool find_own(const char *folder, const char *mesh, char *path, size_t size)
 {
     static const char *const endings[] = {"_local.particles", ".particles"};

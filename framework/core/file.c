@@ -74,6 +74,23 @@ done:
     return SDM_OK;
 }
 
+sdm_status sdm_file_read_text(const char *path, uint64_t max_bytes, char **text, size_t *size,
+                              size_t *lines, sdm_error *err)
+{
+    uint8_t *data;
+    sdm_status s = sdm_file_read(path, max_bytes, &data, size, err);
+    *text = (char *)data;
+    *lines = 1;
+    if (s) return s;
+    if (strlen(*text) != *size) {
+        sdm_free(data);
+        *text = NULL;
+        return sdm_fail(err, SDM_E_FORMAT, "%s: not a text file (a zero byte)", path);
+    }
+    for (size_t i = 0; i < *size; i++) *lines += (*text)[i] == '\n';
+    return SDM_OK;
+}
+
 #define BUFFER_BYTES 65536u
 
 struct sdm_outfile {
@@ -277,6 +294,16 @@ void sdm_outfile_discard(sdm_outfile **pf)
     free(f->temp);
     sdm_free(f);
     *pf = NULL;
+}
+
+sdm_status sdm_file_write(const char *path, const void *data, size_t size, sdm_error *err)
+{
+    sdm_outfile *file = NULL;
+    sdm_status s = sdm_outfile_open(path, &file, err);
+    if (!s) s = sdm_outfile_write(file, data, size, err);
+    if (!s) return sdm_outfile_commit(&file, err);
+    sdm_outfile_discard(&file);
+    return s;
 }
 
 sdm_status sdm_make_folder(const char *path, sdm_error *err)

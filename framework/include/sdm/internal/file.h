@@ -19,6 +19,14 @@ extern "C" {
 sdm_status sdm_file_read(const char *path, uint64_t max_bytes, uint8_t **data, size_t *size,
                          sdm_error *err);
 
+/* Reads a text file as sdm_file_read() does. *lines: number of its lines, a last one without a line
+ * feed included. SDM_E_FORMAT also if it holds a zero byte. [any thread] */
+sdm_status sdm_file_read_text(const char *path, uint64_t max_bytes, char **text, size_t *size,
+                              size_t *lines, sdm_error *err);
+
+/* Writes a whole file as an output file (below) does. SDM_E_IO, SDM_E_NOMEM. [any thread] */
+sdm_status sdm_file_write(const char *path, const void *data, size_t size, sdm_error *err);
+
 /* An output file: nothing appears under its final name before sdm_outfile_commit() succeeds. */
 typedef struct sdm_outfile sdm_outfile;
 

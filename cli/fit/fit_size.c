@@ -5,34 +5,23 @@
 
 #include "fit_command.h"
 #include "report/terminal.h"
+#include "sdm/internal/box.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
 
 /* Largest ratio of the two sizes, either way, that gives no warning. */
 #define RATIO_MAX 5.0
 
-/* A box, by its diagonal, mm. */
-typedef struct box {
-    double min[3], max[3];
-} box;
-
-static void box_add(box *b, const double x[3])
-{
-    for (int a = 0; a < 3; a++)
-        b->min[a] = fmin(b->min[a], x[a]), b->max[a] = fmax(b->max[a], x[a]);
-}
-
-static double box_size(const box *b)
+/* Length of the diagonal, mm. */
+static double box_size(const sdm_box *b)
 {
     double square = 0;
     for (int a = 0; a < 3; a++) square += pow(fmax(b->max[a] - b->min[a], 0), 2);
     return sqrt(square);
 }
 
-static const box NOTHING = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-
 /* Adds the corners of voxels whose value is above (sign 1) or below (sign -1) the level. */
-static void add_voxels(const sdm_grid *g, const float *values, float sign, float level, box *b)
+static void add_voxels(const sdm_grid *g, const float *values, float sign, float level, sdm_box *b)
 {
     size_t v = 0;
     for (int64_t k = 0; k < g->n[2]; k++)
@@ -45,7 +34,7 @@ static void add_voxels(const sdm_grid *g, const float *values, float sign, float
                                              (double)k + (corner & 4 ? 0.5 : -0.5)};
                     double x[3];
                     sdm_grid_world(g, index, x);
-                    box_add(b, x);
+                    sdm_box_add(b, x);
                 }
             }
 }
@@ -53,11 +42,11 @@ static void add_voxels(const sdm_grid *g, const float *values, float sign, float
 /* Diagonal of the box of the start shape, from its mesh or its map. */
 static sdm_status shape_size(const cli_fit *f, double *size, sdm_error *err)
 {
-    box b = NOTHING;
+    sdm_box b = SDM_BOX_EMPTY;
     if (f->shape) {
         sdm_mesh mesh = {0};
         const sdm_status s = sdm_instance_mesh(f->shape, f->start, &mesh, err);
-        for (size_t v = 0; v < mesh.n_vert && !s; v++) box_add(&b, mesh.vert + 3 * v);
+        for (size_t v = 0; v < mesh.n_vert && !s; v++) sdm_box_add(&b, mesh.vert + 3 * v);
         sdm_mesh_dispose(&mesh);
         *size = box_size(&b);
         return s;
@@ -92,9 +81,9 @@ static const char *unit_of(double ratio)
 sdm_status cli_fit_warn_size(const cli_fit *f, sdm_error *err)
 {
     if (f->target.kind == SDM_FIT_IMAGE) return SDM_OK;
-    box b = NOTHING;
+    sdm_box b = SDM_BOX_EMPTY;
     double shape = 0;
-    for (size_t i = 0; i < f->target.n_points && f->points; i++) box_add(&b, f->points + 3 * i);
+    for (size_t i = 0; i < f->target.n_points && f->points; i++) sdm_box_add(&b, f->points + 3 * i);
     if (f->mask) add_voxels(&f->target.grid, f->mask, 1, 0.5f, &b);
     const sdm_status s = shape_size(f, &shape, err);
     const double target = box_size(&b), ratio = shape / target;

@@ -7,25 +7,15 @@
 
 #include "motion.h"
 #include "sdm/exact.h"
+#include "sdm/internal/box.h"
 #include "sdm/memory.h"
 #include "template_parts.h"
 
 enum { SAMPLES = 64 };
 
-typedef struct box {
-    double min[3], max[3];
-} box;
-
-static void box_add(box *b, const double x[3])
-{
-    for (int a = 0; a < 3; a++)
-        b->min[a] = fmin(b->min[a], x[a]), b->max[a] = fmax(b->max[a], x[a]);
-}
-
-static const box EMPTY = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-
 // *l = the lattice of the given spacing around a box. false: it has more than `nodes` nodes.
-static bool lattice_of(const box *b, double margin, double spacing, double nodes, sdm_lattice *l)
+static bool lattice_of(const sdm_box *b, double margin, double spacing, double nodes,
+                       sdm_lattice *l)
 {
     double cells[3], count = 1;
     *l = (sdm_lattice){.spacing = spacing};
@@ -199,11 +189,11 @@ static sdm_status fill_nodes(const part_solid *p, const sdm_lattice *l, const fl
 
 // Boxes that contain the corners of the grid, carried back into the frame of each part at random
 // parameters.
-static sdm_status grid_boxes(const template_design *d, box *boxes, sdm_error *err)
+static sdm_status grid_boxes(const template_design *d, sdm_box *boxes, sdm_error *err)
 {
     sdm_mesh mesh = {0};
     sdm_status s = SDM_OK;
-    for (size_t c = 0; c < d->n_parts; c++) boxes[c] = EMPTY;
+    for (size_t c = 0; c < d->n_parts; c++) boxes[c] = SDM_BOX_EMPTY;
     for (size_t i = 0; i < SAMPLES && !s; i++) {
         double p[SDM_POD_MAX_PARAMS];
         trainer_family_params(&d->family, i, p);
@@ -218,7 +208,7 @@ static sdm_status grid_boxes(const template_design *d, box *boxes, sdm_error *er
                 double x[3], y[3];
                 sdm_grid_world(d->grid, index, x);
                 trainer_motion_back(&m, x, y);
-                box_add(&boxes[c], y);
+                sdm_box_add(&boxes[c], y);
             }
         }
     }
@@ -274,13 +264,13 @@ sdm_status trainer_template_maps(template_design *d, sdm_error *err)
 {
     enum { FAR_NODES = 1 << 20, NEAR = 6, NEAR_WARPED = 3 }; // NEAR: voxels around the part
     const double h = fmin(fmin(d->grid->spacing[0], d->grid->spacing[1]), d->grid->spacing[2]);
-    box reach[SDM_TEMPLATE_MAX_PARTS];
+    sdm_box reach[SDM_TEMPLATE_MAX_PARTS];
     sdm_status s = grid_boxes(d, reach, err);
     for (size_t c = 0; c < d->n_parts && !s; c++) {
         sdm_template_part *p = &d->parts[c];
-        box b = EMPTY;
+        sdm_box b = SDM_BOX_EMPTY;
         for (size_t k = d->first[c]; k < d->first[c + 1]; k++)
-            box_add(&b, d->family.base.vert + 3 * d->vertices[k]);
+            sdm_box_add(&b, d->family.base.vert + 3 * d->vertices[k]);
         const double margin = (p->n_modes ? NEAR_WARPED : NEAR) * h;
         if (!lattice_of(&b, margin, h, SDM_TEMPLATE_MAX_NODES, &p->near))
             return sdm_fail(err, SDM_E_UNSUPPORTED,

@@ -47,11 +47,11 @@ static sdm_status unknown_option(const cli_args *args, const char *word, size_t 
                     command);
 }
 
-static const cli_option *find_long(const cli_args *args, const char *name, size_t length)
+const cli_option *cli_find_option(size_t command, const char *name, size_t length)
 {
     for (size_t i = 0; i < cli_n_options; i++) {
         const cli_option *o = &cli_options[i];
-        if (cli_option_fits(o, command_index(args)) && strlen(o->name) == length &&
+        if (cli_option_fits(o, command) && strlen(o->name) == length &&
             !strncmp(o->name, name, length))
             return o;
     }
@@ -187,7 +187,7 @@ static sdm_status parse_option(int argc, char **argv, int *i, cli_args *args, sd
     if (word[1] == '-') {
         const char *name = word + 2, *equals = strchr(name, '=');
         const size_t length = equals ? (size_t)(equals - name) : strlen(name);
-        o = find_long(args, name, length);
+        o = cli_find_option(command_index(args), name, length);
         if (!o) return unknown_option(args, name, length, err);
         if (equals) value = equals + 1;
     } else {

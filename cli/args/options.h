@@ -201,5 +201,9 @@ const cli_command *cli_find_command(const char *name, sdm_error *err);
  * "--max-iterations". The text gets shorter. */
 void cli_name_options(char *text);
 
+/* The option --name of a command (an index into cli_commands); name[length]. NULL: there is none.
+ */
+const cli_option *cli_find_option(size_t command, const char *name, size_t length);
+
 /* True when `command` (an index into cli_commands) has the option. */
 bool cli_option_fits(const cli_option *option, size_t command);

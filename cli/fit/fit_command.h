@@ -122,6 +122,9 @@ sdm_status cli_fit_mirror(cli_fit *f, sdm_error *err);
 /* Writes the file of --returnparameterfile. */
 sdm_status cli_fit_write_results(const cli_fit *f, sdm_error *err);
 
+/* "passed", "doubtful" or "failed". */
+const char *cli_fit_grade_name(sdm_fit_grade grade);
+
 /* Prints the verdict as text; adds it to a JSON object. */
 void cli_fit_print_verdict(const cli_fit *f);
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);

@@ -6,13 +6,11 @@
 
 static void add_verdict(cli_results *r, const sdm_fit_verdict *v)
 {
-    static const char *const words[] = {
-        [SDM_FIT_PASSED] = "passed", [SDM_FIT_DOUBTFUL] = "doubtful", [SDM_FIT_FAILED] = "failed"};
     sdm_text reasons = {0};
     for (size_t i = 0; i < v->n_findings; i++)
         if (v->findings[i].grade)
             sdm_text_add(&reasons, "%s%s", reasons.size ? "; " : "", v->findings[i].text);
-    cli_results_text(r, "verdict", words[v->grade]);
+    cli_results_text(r, "verdict", cli_fit_grade_name(v->grade));
     cli_results_text(r, "reasons", reasons.data ? reasons.data : "");
     sdm_text_dispose(&reasons);
 }

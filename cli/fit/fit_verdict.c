@@ -6,14 +6,19 @@
 
 static const char *const GRADES[] = {
     [SDM_FIT_PASSED] = "passed", [SDM_FIT_DOUBTFUL] = "doubtful", [SDM_FIT_FAILED] = "FAILED"};
-static const char *const WORDS[] = {
-    [SDM_FIT_PASSED] = "passed", [SDM_FIT_DOUBTFUL] = "doubtful", [SDM_FIT_FAILED] = "failed"};
+
+const char *cli_fit_grade_name(sdm_fit_grade grade)
+{
+    static const char *const words[] = {
+        [SDM_FIT_PASSED] = "passed", [SDM_FIT_DOUBTFUL] = "doubtful", [SDM_FIT_FAILED] = "failed"};
+    return words[grade];
+}
 
 void cli_fit_print_verdict(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
     if (!v->n_findings) return;
-    printf("verdict: %s\n", WORDS[v->grade]);
+    printf("verdict: %s\n", cli_fit_grade_name(v->grade));
     for (size_t i = 0; i < v->n_findings; i++) {
         const sdm_fit_finding *x = &v->findings[i];
         printf("  %-12s %-9s %.3g", sdm_fit_check_name(x->kind), GRADES[x->grade], x->figure);
@@ -26,13 +31,13 @@ void cli_fit_json_verdict(const cli_fit *f, sdm_json *j)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
     sdm_json_open(j, "verdict", '{');
-    sdm_json_text(j, "grade", WORDS[v->grade]);
+    sdm_json_text(j, "grade", cli_fit_grade_name(v->grade));
     sdm_json_open(j, "checks", '[');
     for (size_t i = 0; i < v->n_findings; i++) {
         const sdm_fit_finding *x = &v->findings[i];
         sdm_json_open(j, NULL, '{');
         sdm_json_text(j, "name", sdm_fit_check_name(x->kind));
-        sdm_json_text(j, "grade", WORDS[x->grade]);
+        sdm_json_text(j, "grade", cli_fit_grade_name(x->grade));
         sdm_json_real(j, "figure", x->figure);
         sdm_json_real(j, "limit", x->limit);
         sdm_json_text(j, "text", x->text);

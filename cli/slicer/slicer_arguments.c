@@ -60,17 +60,6 @@ static void push_list(slicer_line *line, const char *name, const char *value)
     }
 }
 
-static const cli_option *find_option(const slicer_module *m, const char *name, size_t length)
-{
-    for (size_t i = 0; i < cli_n_options; i++) {
-        const cli_option *o = &cli_options[i];
-        if (cli_option_fits(o, m->command) && strlen(o->name) == length &&
-            !strncmp(o->name, name, length))
-            return o;
-    }
-    return NULL;
-}
-
 static sdm_status push_option(slicer_line *line, const cli_option *o, char *value, sdm_error *err)
 {
     if (o->kind == CLI_LIST) {
@@ -114,7 +103,7 @@ static sdm_status add_argument(const slicer_module *m, int argc, char **argv, in
     const bool is_flag = !strncmp(word, "--", 2);
     const char *name = is_flag ? word + 2 : "";
     const slicer_file *f = is_flag ? slicer_find_file(m, name, strlen(name)) : NULL;
-    const cli_option *o = is_flag && !f ? find_option(m, name, strlen(name)) : NULL;
+    const cli_option *o = is_flag && !f ? cli_find_option(m->command, name, strlen(name)) : NULL;
     if ((!f && !o) || (o && o->kind == CLI_FLAG)) {
         push(line, word); // sdmgen's own check refuses a wrong one
         return SDM_OK;

@@ -12,6 +12,7 @@
 #include "sdm/internal/processor.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
+#include "toy_params.h"
 
 enum { P = 3, DEPTH = 2, WIDTH = 70, DEGREE = 3, INPUT_DEGREE = 2 };
 
@@ -31,11 +32,7 @@ typedef struct toy {
 static inline void toy_make(toy *t, sdm_pod_type type, int activation)
 {
     *t = (toy){0};
-    for (int i = 0; i < P; i++) {
-        snprintf(t->params[i].name, sizeof t->params[i].name, "p%d", i);
-        snprintf(t->params[i].unit, sizeof t->params[i].unit, "mm");
-        t->params[i].min = -1.0 - i, t->params[i].max = 2.0 + i, t->params[i].def = 0.5;
-    }
+    toy_params_fill(t->params, P);
     static const char *const names[] = {"edge", "ear"}, *const values[] = {"0.3", "left"};
     t->info = (sdm_model_info){
         .n_params = P,
@@ -188,7 +185,7 @@ static inline void reference(const toy *t, const double *p, double *map)
     }
 }
 
-/* p[P] = random parameters of a range; `index` chooses them. */
+/* p[P] = random parameters within their ranges: the same for the same index. */
 static inline void random_params(uint64_t index, double *p)
 {
     for (int i = 0; i < P; i++)

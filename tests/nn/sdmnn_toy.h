@@ -9,6 +9,7 @@
 #include "sdm/internal/rng.h"
 #include "sdm/internal/sdmnn.h"
 #include "sdm/memory.h"
+#include "toy_params.h"
 
 enum { P = 3, VOXELS = 11 * 6 * 7 };
 
@@ -32,11 +33,7 @@ typedef struct toy {
 static inline void toy_make(toy *t, bool half, int activation)
 {
     *t = (toy){0};
-    for (int i = 0; i < P; i++) {
-        snprintf(t->params[i].name, sizeof t->params[i].name, "p%d", i);
-        snprintf(t->params[i].unit, sizeof t->params[i].unit, "mm");
-        t->params[i].min = -1.0 - i, t->params[i].max = 2.0 + i, t->params[i].def = 0.5;
-    }
+    toy_params_fill(t->params, P);
     t->info = (sdm_model_info){
         .n_params = P,
         .params = t->params,

@@ -5,9 +5,7 @@ import json
 import math
 import os
 import shutil
-import subprocess
 import sys
-import tempfile
 
 try:
     import numpy as np
@@ -15,27 +13,13 @@ except ImportError as missing:
     print("skipped:", missing)
     sys.exit(77)
 
-program = sys.argv[1]
-folder = tempfile.TemporaryDirectory()
-os.chdir(folder.name)
+from sdm_program import done, refused
+
 chance = np.random.default_rng(5)
 
 
-def sdmgen(*arguments):
-    return subprocess.run([program, *arguments], capture_output=True, text=True)
-
-
-def done(*arguments):
-    result = sdmgen(*arguments)
-    assert result.returncode == 0, (arguments, result.stderr)
-    return result.stdout
-
-
-def refused(code, what, *arguments):
-    result = sdmgen("import", "ssm", *arguments, "-o", "never.ssm")
-    assert result.returncode == code, (arguments, result)
-    assert result.stderr.count("\n") == 1 and what in result.stderr, (arguments, result.stderr)
-    assert not os.path.exists("never.ssm"), arguments
+def import_refused(code, what, *arguments):
+    refused(code, what, "import", "ssm", *arguments, "-o", "never.ssm")
 
 
 def ball(n):
@@ -161,12 +145,12 @@ done("import", "ssm", "vertices", "--surface", "v3.obj", "-o", "m.ssm", "--quiet
 compare("m.ssm", dense)
 
 # mistakes
-refused(2, "--surface", "particles")
-refused(2, "--particles FILE", "particles", "--surface", "any.obj")
-refused(2, "does nothing", "particles", "--surface", "bone2.obj", "--model", "x")
-refused(3, "in its frame", "particles", "--surface", "bone2.obj", "--particles", "particles/bone3_local.particles")
-refused(1, "missing.particles", "particles", "--surface", "bone2.obj", "--particles", "missing.particles")
-refused(3, "114 particles", "particles", "--surface", "v3.obj", "--particles", "vertices/v3.particles")
+import_refused(2, "--surface", "particles")
+import_refused(2, "--particles FILE", "particles", "--surface", "any.obj")
+import_refused(2, "does nothing", "particles", "--surface", "bone2.obj", "--model", "x")
+import_refused(3, "in its frame", "particles", "--surface", "bone2.obj", "--particles", "particles/bone3_local.particles")
+import_refused(1, "missing.particles", "particles", "--surface", "bone2.obj", "--particles", "missing.particles")
+import_refused(3, "114 particles", "particles", "--surface", "v3.obj", "--particles", "vertices/v3.particles")
 good = open("others/bone1_local.particles").read()
 lines = good.splitlines(keepends=True)
 for what, text in (
@@ -182,7 +166,7 @@ for what, text in (
 ):
     with open("others/bone1_local.particles", "w") as file:
         file.write(text)
-    refused(3, what, "others", "--surface", "bone2.obj")
+    import_refused(3, what, "others", "--surface", "bone2.obj")
 shutil.copy("particles/bone1_local.particles", "others")
 flat = [(math.cos(i), math.cos(2.5 * i), 0.0) for i in range(60)]
 for what, points in (("one plane", flat), ("same place", [*local[1].tolist()[:59], local[1][0].tolist()]), ("all 60 points", [(1, 2, 3)] * 60)):
@@ -190,8 +174,8 @@ for what, points in (("one plane", flat), ("same place", [*local[1].tolist()[:59
     with open("own.obj", "w") as file:  # a small triangle at each particle
         for x, y, z in points:
             file.write(f"v {x!r} {y!r} {z!r}\nv {x + 0.01!r} {y!r} {z!r}\nv {x!r} {y + 0.01!r} {z!r}\nf -3 -2 -1\n")
-    refused(3, what, "others", "--surface", "own.obj", "--particles", "own.particles")
+    import_refused(3, what, "others", "--surface", "own.obj", "--particles", "own.particles")
 os.mkdir("one")
 shutil.copy("particles/bone0_local.particles", "one")
-refused(2, "at least 2", "one", "--surface", "bone0.obj")
+import_refused(2, "at least 2", "one", "--surface", "bone0.obj")
 print("models of particles agree with numpy")

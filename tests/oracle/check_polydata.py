@@ -3,9 +3,7 @@
 # Tests: vtk.c vtk_types.c vtp.c vtp_data.c vtp_tags.c polydata.c inflate.c
 import os
 import random
-import subprocess
 import sys
-import tempfile
 
 try:
     import numpy as np
@@ -15,13 +13,8 @@ except ImportError as missing:
     print("skipped:", missing)
     sys.exit(77)
 
-program = sys.argv[1]
-folder = tempfile.TemporaryDirectory()
-os.chdir(folder.name)
+from sdm_program import sdmgen
 
-
-def sdmgen(*arguments):
-    return subprocess.run([program, *arguments], capture_output=True, text=True, errors="replace")
 
 
 def surface(strips, kind):

@@ -4,9 +4,7 @@
 import json
 import os
 import shutil
-import subprocess
 import sys
-import tempfile
 
 try:
     import h5py
@@ -15,27 +13,9 @@ except ImportError as missing:
     print("skipped:", missing)
     sys.exit(77)
 
-program = sys.argv[1]
-folder = tempfile.TemporaryDirectory()
-os.chdir(folder.name)
+from sdm_program import done, refused
+
 chance = np.random.default_rng(1)
-
-
-def sdmgen(*arguments):
-    return subprocess.run([program, *arguments], capture_output=True, text=True)
-
-
-def done(*arguments):
-    result = sdmgen(*arguments)
-    assert result.returncode == 0, (arguments, result.stderr)
-    return result.stdout
-
-
-def refused(code, what, *arguments):
-    result = sdmgen(*arguments)
-    assert result.returncode == code, (arguments, result)
-    assert result.stderr.count("\n") == 1 and what in result.stderr, (arguments, result.stderr)
-    assert not os.path.exists("never.ssm"), arguments
 
 
 def sphere(n=12):

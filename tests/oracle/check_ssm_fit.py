@@ -5,21 +5,11 @@ import json
 import math
 import os
 import random
-import subprocess
-import sys
-import tempfile
 
-program = sys.argv[1]
-folder = tempfile.TemporaryDirectory()
-os.chdir(folder.name)
+from sdm_program import done
+
 chance = random.Random(3)
 AROUND, ALONG = 16, 36
-
-
-def done(*arguments):
-    result = subprocess.run([program, *arguments], capture_output=True, text=True)
-    assert result.returncode == 0, (arguments, result.stderr)
-    return result.stdout
 
 
 def femur(length, bow, neck, thick):

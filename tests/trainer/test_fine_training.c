@@ -23,9 +23,7 @@ static const char text[] =
 
 static void read_config(sdm_config *c, const char *override)
 {
-    sdm_error e = {0};
-    if (sdm_config_parse("test.yaml", text, sizeof text - 1, &override, override != NULL, c, &e))
-        fail_msg("%s", e.text);
+    *c = parse_config(text, &override, override != NULL);
 }
 
 static sdm_model *open_model(void)

@@ -31,9 +31,7 @@ static const char base[] =
 
 static void read_config(sdm_config *c, const char *override)
 {
-    sdm_error e = {0};
-    if (sdm_config_parse("test.yaml", base, sizeof base - 1, &override, override != NULL, c, &e))
-        fail_msg("%s", e.text);
+    *c = parse_config(base, &override, override != NULL);
 }
 
 static void touch(const char *name)

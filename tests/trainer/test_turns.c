@@ -52,15 +52,6 @@ static void note_warning(void *user, const char *text)
     snprintf(warned, sizeof warned, "%s", text);
 }
 
-static sdm_config config_of(const char *text, const char *const *overrides, size_t n)
-{
-    sdm_config c;
-    sdm_error e = {0};
-    if (sdm_config_parse("test.yaml", text, strlen(text), overrides, n, &c, &e))
-        fail_msg("%s", e.text);
-    return c;
-}
-
 static sdm_instance *shape_of(const sdm_config *c)
 {
     sdm_instance *out;
@@ -113,13 +104,13 @@ static void better_is_kept(void **state)
     for (int which = 0; which < 2; which++) {
         const char *const *set = which ? few : pod;
         const size_t n = which ? 4 : 0;
-        const sdm_config alone = config_of(link_text, set, n + 1);
+        const sdm_config alone = parse_config(link_text, set, n + 1);
         const sdm_train_report single = train(&alone);
         assert_false(single.compared);
         const uint64_t expected = hash_of("model.sdm");
         uint64_t metrics = 0;
         for (int threads = 1; threads <= 3; threads++) {
-            sdm_config c = config_of(link_text, set, n);
+            sdm_config c = parse_config(link_text, set, n);
             c.threads = c.data.workers = threads;
             const sdm_train_report r = train(&c);
             if (!strstr(said, "ready, then pod is trained")) fail_msg("%s", said);
@@ -140,7 +131,7 @@ static void better_is_kept(void **state)
 static void budget_is_shared(void **state)
 {
     (void)state;
-    sdm_config c = config_of(ring_text, NULL, 0);
+    sdm_config c = parse_config(ring_text, NULL, 0);
     const sdm_train_report r = train(&c);
     if (!r.compared) fail_msg("%s", said);
     sdm_config stored;
@@ -179,7 +170,7 @@ static void resume_is_bit_exact(void **state)
          {"a decoder of", NULL, 20, false, true},
          {"pod is trained with", "a decoder of", 70, true, true}}};
     for (int which = 0; which < 3; which++) {
-        sdm_config c = config_of(which == 2 ? ring_text : link_text, few, which == 1 ? 4 : 0);
+        sdm_config c = parse_config(which == 2 ? ring_text : link_text, few, which == 1 ? 4 : 0);
         c.threads = 1;
         train(&c);
         const uint64_t model = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl"),
@@ -212,7 +203,7 @@ static void refused_resume_loses_nothing(void **state)
 {
     (void)state;
     static const char *const wrong[] = {"network.width=24", "data.start=100000"};
-    const sdm_config c = config_of(link_text, NULL, 0);
+    const sdm_config c = parse_config(link_text, NULL, 0);
     train(&c);
     const uint64_t whole = hash_of("model.sdm");
     sdm_instance *shape = shape_of(&c);
@@ -225,7 +216,7 @@ static void refused_resume_loses_nothing(void **state)
     const uint64_t checkpoint = hash_of("checkpoint.sdmc"), model = hash_of("model.sdm");
     hooks.cancelled = NULL;
     for (int i = 0; i < 2; i++) {
-        const sdm_config other = config_of(link_text, &wrong[i], 1);
+        const sdm_config other = parse_config(link_text, &wrong[i], 1);
         said[0] = '\0';
         assert_int_equal(sdm_train(&other, shape, folder, true, &hooks, NULL, &e), SDM_E_CONFIG);
         if (!strstr(e.text,
@@ -256,7 +247,7 @@ static void second_model_cannot_be_written(void **state)
 {
     (void)state;
     static char blocked[2][16] = {"model.sdm", "config.yaml"};
-    const sdm_config c = config_of(link_text, NULL, 0);
+    const sdm_config c = parse_config(link_text, NULL, 0);
     train(&c);
     const uint64_t model = hash_of("model.sdm"), metrics = hash_of("metrics.jsonl"),
                    config = hash_of("config.yaml");
@@ -285,8 +276,8 @@ static void template_remains(void **state)
     (void)state;
     static const char *const much[] = {"data.start=100000", "data.memory_gb=0.02"},
                              *const short_time[] = {"train.steps=0", "train.minutes=0.0001"};
-    const sdm_config large = config_of(link_text, much, 2),
-                     brief = config_of(link_text, short_time, 2);
+    const sdm_config large = parse_config(link_text, much, 2),
+                     brief = parse_config(link_text, short_time, 2);
     sdm_train_report r = train(&large);
     assert_non_null(strstr(warned, "template is kept, because pod failed: test.yaml: data.static"));
     assert_kind("template");
@@ -309,7 +300,7 @@ static void overlap_is_named(void **state)
         "shape.options.joint=1",
         "shape.options.base=1",
         "grid={size: [40, 40, 24], spacing: 0.12, centre: [0.4, 0, 0]}"};
-    const sdm_config c = config_of(link_text, thick, 7);
+    const sdm_config c = parse_config(link_text, thick, 7);
     const sdm_train_report r = train(&c);
     const double *part = r.verdict.part_mm2;
     assert_int_equal(r.verdict.limit, SDM_CAUSE_OVERLAP);
@@ -326,7 +317,7 @@ static void turns_share_the_budget(void **state)
                                              {"train.steps=0", "train.samples=1600"},
                                              {"train.steps=0", "train.minutes=3"}};
     for (int i = 0; i < 3; i++) {
-        const sdm_config asked = config_of(link_text, budgets[i], 2);
+        const sdm_config asked = parse_config(link_text, budgets[i], 2);
         training_turns r = {.n = 2,
                             .kind = {SDM_NETWORK_TEMPLATE, SDM_NETWORK_POD},
                             .share = 0.25,

@@ -28,11 +28,7 @@ static const char base[] =
 
 static sdm_config config_of(const char *const *overrides, size_t n)
 {
-    sdm_config c;
-    sdm_error e = {0};
-    if (sdm_config_parse("test.yaml", base, sizeof base - 1, overrides, n, &c, &e))
-        fail_msg("%s", e.text);
-    return c;
+    return parse_config(base, overrides, n);
 }
 
 /* A good model with a voxel of 0.8 mm, an error of 0.01 mm and no cause. */
@@ -185,8 +181,8 @@ static void grades(void **state)
     }
 }
 
-// Shapes that leave the grid come first in the sentence; what limits the others follows.
-// Inside-out parts are the cause, whatever the parts of the error say.
+// Where parts are inside out, the verdict names them as the cause, whichever part of the error is
+// the largest.
 static void inside_out_is_the_cause(void **state)
 {
     (void)state;
@@ -204,6 +200,7 @@ static void inside_out_is_the_cause(void **state)
     }
 }
 
+// Shapes that leave the grid come first in the sentence; what limits the others follows.
 static void grid_cuts(void **state)
 {
     (void)state;

@@ -5,6 +5,7 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "sdm/builtin_shapes.h"
@@ -39,6 +40,16 @@ static inline uint64_t hash_of(const char *name)
     const uint64_t h = sdm_crc64(0, data, size - 8);
     sdm_free(data);
     return h;
+}
+
+/* The configuration of a YAML text with n overrides "key=value". */
+static inline sdm_config parse_config(const char *text, const char *const *overrides, size_t n)
+{
+    sdm_config c;
+    sdm_error e = {0};
+    if (sdm_config_parse("test.yaml", text, strlen(text), overrides, n, &c, &e))
+        fail_msg("%s", e.text);
+    return c;
 }
 
 /* Removes all files that a run writes. */

@@ -18,7 +18,7 @@ PAGE_EXPORT(page_alloc) void *page_alloc(size_t size);
 /* Opens the model in bytes[size] from page_alloc(), and frees them. Call it once. */
 PAGE_EXPORT(page_open) int page_open(uint8_t *bytes, size_t size);
 
-/* params[page_n_params()]: the parameters of the next map, to be written by the caller. */
+/* The array of page_n_params() parameters of the next map: the caller writes into it. */
 PAGE_EXPORT(page_params) double *page_params(void);
 PAGE_EXPORT(page_n_params) size_t page_n_params(void);
 

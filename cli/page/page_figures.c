@@ -1,4 +1,5 @@
-/* The figures of a page as JSON: what the page shows, and what other programs can read from it. */
+/* Writes all numbers that a page shows as JSON: the scripts of the page draw from it, and other
+ * programs can read it. */
 #include <stdio.h>
 
 #include "page.h"

@@ -5,7 +5,8 @@
 #include "args/options.h"
 #include "sdm/shape.h"
 
-/* Zero-initialise it; cli_results_dispose() frees it. Line feeds in values become spaces. */
+/* The lines that were added so far. Zero-initialise it; cli_results_dispose() frees it. A line feed
+ * within a value becomes a space, because a line ends a value. */
 typedef struct cli_results {
     sdm_text text;
 } cli_results;

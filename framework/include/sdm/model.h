@@ -35,7 +35,9 @@ typedef struct sdm_accuracy {
 /* The verdict of the training on the model. Earlier versions stored none: grade "", numbers NaN. */
 typedef struct sdm_model_quality {
     char grade[16]; /* "good", "usable" or "poor" */
-    double cut;     /* fraction of the held-out shapes whose surfaces leave the grid */
+    /* fraction of the held-out shapes that do not fit into the grid: their surfaces end open at its
+       border */
+    double cut;
     /* Between the voxels: how far exact maps, interpolated linearly, miss the surface of held-out
        shapes, root mean square, mm. sdm_accuracy holds errors at the voxels only. */
     double between_mm;

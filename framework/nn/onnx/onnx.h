@@ -69,7 +69,8 @@ void sdm_onnx_set_int(sdm_onnx *g, const char *name, int64_t v);
 void sdm_onnx_set_float(sdm_onnx *g, const char *name, double v);
 void sdm_onnx_set_ints(sdm_onnx *g, const char *name, size_t n, const int64_t *v);
 
-/* Appends a node with the operator `op`; returns its result. */
+/* Adds a node of the ONNX operator `op`, for example "MatMul", with inputs[n] to the graph; returns
+   the output of the node. */
 sdm_onnx_value sdm_onnx_node(sdm_onnx *g, const char *op, size_t n, const sdm_onnx_value *inputs);
 
 /* The same for one, two and three inputs. */

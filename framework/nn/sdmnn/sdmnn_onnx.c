@@ -1,5 +1,6 @@
-/* An sdmnn as ONNX operators. Feature maps are [N][channels][z][y][x]. Up-sampling repeats voxels
-   by Gather along each axis, which also cuts off what the level does not have. */
+/* Writes a network of kind sdmnn, a decoder of 3-D convolutions, as ONNX operators. Feature maps
+   are [N][channels][z][y][x]. Up-sampling repeats voxels by Gather along each axis, which also cuts
+   off what the level does not have. */
 #include "sdm/internal/kernels.h"
 #include "sdmnn_model.h"
 

@@ -91,7 +91,8 @@ static void set_frame(template_graph *t, size_t c, sdm_onnx_value numbers)
     p->frame = sdm_onnx_product(g, m, p->frame);
 }
 
-// index of part c
+// Sets the matrix `index` of part c: it takes a voxel (i, j, k, 1) to its place in the lattice
+// `near`.
 static void set_index(template_graph *t, size_t c)
 {
     sdm_onnx *g = t->g;

@@ -35,7 +35,7 @@ fi
 say "building the wheel"
 libraries=("$work"/first/sdmgen/debian/tmp/usr/lib/*/libsdmgen.so)
 cp -r "$work/first/sdmgen/python" "$work/wheel"
-(cd "$work/wheel" && SDMGEN_LIBRARY=${libraries[0]} python3 -c "from setuptools import build_meta as b; b.build_wheel('..')" >../wheel.log 2>&1) ||
+(cd "$work/wheel" && SDMGEN_LIBRARY=${libraries[0]} /usr/bin/python3 -c "from setuptools import build_meta as b; b.build_wheel('..')" >../wheel.log 2>&1) ||
     { cat "$work/wheel.log" >&2 && exit 1; }
 
 say "using the packages and the wheel in a bare system"

@@ -6,6 +6,7 @@
 #include "fit_command.h"
 #include "report/terminal.h"
 #include "sdm/internal/box.h"
+#include "sdm/internal/units.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
 
@@ -62,22 +63,6 @@ static sdm_status shape_size(const cli_fit *f, double *size, sdm_error *err)
     return s;
 }
 
-/* The unit whose length in mm is nearest to `ratio`; NULL: none is within a factor of 2.5. */
-static const char *unit_of(double ratio)
-{
-    static const struct {
-        const char *name;
-        double mm;
-    } units[] = {{"m", 1000}, {"inches", 25.4}, {"cm", 10}, {"um", 1e-3}};
-    const char *best = NULL;
-    double least = log(2.5);
-    for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
-        const double off = fabs(log(ratio / units[i].mm));
-        if (off < least) best = units[i].name, least = off;
-    }
-    return best;
-}
-
 sdm_status cli_fit_warn_size(const cli_fit *f, sdm_error *err)
 {
     if (f->target.kind == SDM_FIT_IMAGE) return SDM_OK;
@@ -89,7 +74,7 @@ sdm_status cli_fit_warn_size(const cli_fit *f, sdm_error *err)
     const double target = box_size(&b), ratio = shape / target;
     if (s || !(shape > 0) || !(target > 0)) return s;
     if (ratio <= RATIO_MAX && ratio >= 1 / RATIO_MAX) return SDM_OK;
-    const char *unit = unit_of(ratio);
+    const char *unit = sdm_unit_near(ratio, NULL);
     char advice[80] = "lengths are mm";
     if (unit) snprintf(advice, sizeof advice, "are they in %s? lengths are mm", unit);
     cli_warn("%s: the %s measure %.3g mm across, the start shape %.3g mm: %s", f->path,

@@ -13,6 +13,11 @@
 /* Largest ratio of the two sizes, either way, that gives no warning. */
 #define RATIO_MAX 5.0
 
+/* A shape that is larger than its image by the first factor does not fit into it; by the second,
+ * the image is in m. */
+#define IMAGE_MAX 2.0
+#define IMAGE_IN_M 30.0
+
 /* Length of the diagonal, mm. */
 static double box_size(const sdm_box *b)
 {
@@ -63,15 +68,34 @@ static sdm_status shape_size(const cli_fit *f, double *size, sdm_error *err)
     return s;
 }
 
+/* Warns if the image is too small to hold the shape, or has voxels larger than the shape. An image
+ * may be much larger than the shape, so its unit is named only where it is clear. */
+static void warn_image(const cli_fit *f, double shape)
+{
+    const sdm_grid *g = &f->target.grid;
+    double square = 0, voxel = 0;
+    for (int i = 0; i < 3; i++) {
+        square += pow(g->spacing[i] * (double)g->n[i], 2);
+        voxel = fmax(voxel, g->spacing[i]);
+    }
+    const double image = sqrt(square);
+    const char *unit = shape > IMAGE_IN_M * image ? "m" : voxel > shape ? "um" : NULL;
+    if (!unit && shape <= IMAGE_MAX * image) return;
+    cli_warn("%s: the image measures %.3g mm across, its voxels %.3g mm, the start shape %.3g mm: "
+             "%s%s%slengths are mm",
+             f->path, image, voxel, shape, unit ? "are they in " : "", unit ? unit : "",
+             unit ? "? " : "");
+}
+
 sdm_status cli_fit_warn_size(const cli_fit *f, sdm_error *err)
 {
-    if (f->target.kind == SDM_FIT_IMAGE) return SDM_OK;
     sdm_box b = SDM_BOX_EMPTY;
     double shape = 0;
     for (size_t i = 0; i < f->target.n_points && f->points; i++) sdm_box_add(&b, f->points + 3 * i);
     if (f->mask) add_voxels(&f->target.grid, f->mask, 1, 0.5f, &b);
     const sdm_status s = shape_size(f, &shape, err);
     const double target = box_size(&b), ratio = shape / target;
+    if (!s && f->target.kind == SDM_FIT_IMAGE) warn_image(f, shape);
     if (s || !(shape > 0) || !(target > 0)) return s;
     if (ratio <= RATIO_MAX && ratio >= 1 / RATIO_MAX) return SDM_OK;
     const char *unit = sdm_unit_near(ratio, NULL);

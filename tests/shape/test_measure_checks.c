@@ -1,5 +1,5 @@
 /* The measures of plug-ins: what is refused at registration, and checks around the callback.
- * Tests: shape_check.c shape_measure.c */
+ * Tests: mesh_measures.c shape_check.c shape_measure.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

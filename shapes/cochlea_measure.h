@@ -24,7 +24,7 @@ extern const sdm_measure sdm_cochlea_measures[COCHLEA_MEASURES];
  * needs three quarters of a turn. */
 #define COCHLEA_MEASURES_FROM 4.8
 
-/* *value = measure number `index` at the unknowns x[COCHLEA_UNKNOWNS], x[COCHLEA_THETA] >=
+/* Measure number `index` at the unknowns x[COCHLEA_UNKNOWNS], x[COCHLEA_THETA] >=
  * COCHLEA_MEASURES_FROM. depth: along the lateral wall from the basal end, mm; beyond the apical
- * end the value is NaN. Lengths and angles are right to 1e-5 of their value. */
+ * end it is NaN. Lengths and angles are right to 1e-5 of their value. */
 double sdm_cochlea_measure(const cochlea_model *m, const double *x, uint32_t index, double depth);

@@ -467,7 +467,8 @@ SDM_API void sdm_fit_dispose(sdm_fit_result *r);
 
 /* sdm_shape_measure() at the estimate of a fit, with the standard deviations that follow from its
    covariance to first order: sqrt(g^T C g), with the covariance C of the parameters and the
-   gradient g of the measure by central differences. The pose changes no measure. `shape`: the shape
+   gradient g of the measure by differences over one standard deviation of each parameter to either
+   side. The pose changes no measure. `shape`: the shape
    of the fit's source or, for a fit with a model alone, one by sdm_runtime_instance(). SDM_E_ARG:
    another number of parameters; errors of sdm_shape_measure(). [any thread] */
 SDM_API sdm_status sdm_fit_measure(const sdm_instance *shape, const sdm_fit_result *fit,

@@ -132,14 +132,16 @@ static sdm_status show_result(cli_fit *f, sdm_error *err)
 {
     const bool files = f->args->outputs.n || f->args->fit.label_out,
                write = !f->doubt.status || f->args->force;
-    sdm_status s = SDM_OK;
+    sdm_status s = SDM_OK, measured = SDM_OK;
     if (f->found) {
         print_notices(f);
+        measured = cli_fit_measure(f, err); // the result is shown without measures, too
         s = cli_fit_make_map(f, err);
         if (!s) s = cli_fit_compare(f, err);
         if (!s && write) s = cli_fit_write_files(f, err);
         if (!s) s = print_result(f, err);
         if (!s) s = cli_fit_write_results(f, err);
+        if (!s) s = measured;
     }
     if (s || !f->doubt.status) return s;
     return sdm_fail(err, f->doubt.status, "%s: %s%s", f->path, f->doubt.text,
@@ -152,6 +154,7 @@ sdm_status cmd_fit(const cli_args *args, sdm_error *err)
     cli_fit f = {.args = args};
     sdm_status s = check_arguments(&f, err);
     if (!s) s = cli_fit_open_source(&f, err);
+    if (!s) s = cli_fit_prepare_measures(&f, err);
     if (!s) s = cli_fit_read_options(&f, err);
     if (!s) s = cli_fit_read_target(&f, err);
     if (!s) s = cli_fit_check_options(&f, err);

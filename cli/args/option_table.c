@@ -496,6 +496,15 @@ const cli_option cli_options[] = {
      "also write the fitted shape as labels on the grid of the image, 1 inside and 0 outside: .nii "
      ".nii.gz .nrrd .mha"},
 
+    {"measure", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(measure),
+     "print the measures of the shape: its own (sdmgen shapes NAME lists them), volume, area and "
+     "extents"},
+    {"measure", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(measure),
+     "print the measures of the fitted shape with standard deviations: its own (sdmgen shapes NAME "
+     "lists them), volume, area and extents"},
+    {"depth", 0, CLI_TEXT, "MM[,MM...]", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT),
+     AT(depths),
+     "with --measure: also the measures at these depths, such as the frequency along the cochlea"},
     {"returnparameterfile", 0, CLI_TEXT, "FILE", NULL, 0, 0,
      ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT), AT(returns),
      "also write the main results as lines NAME = VALUE, as 3D Slicer reads them"},

@@ -150,6 +150,8 @@ struct cli_args {
     const char *out;                 /* train, experiment, shapes */
     const char *install;             /* slicer */
     const char *returns;             /* generate, exact, fit: file of results */
+    bool measure;                    /* generate, exact, fit */
+    const char *depths;              /* generate, exact, fit: list of mm; NULL: option missing */
     const char *rows;                /* generate: the file of --params */
     const char *policy;              /* generate, fit */
     const char *shape;               /* exact, mesh, bench, phantom, fit */

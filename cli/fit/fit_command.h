@@ -2,6 +2,7 @@
 #pragma once
 
 #include "args/options.h"
+#include "measure/measures.h"
 #include "sdm/fit.h"
 #include "sdm/volume.h"
 
@@ -66,11 +67,22 @@ typedef struct cli_fit {
     float *map;                /* [map_grid] signed distance, mm */
     sdm_mesh surface;          /* zero level set of the map, in the world */
     cli_overlap overlap;
+
+    /* fit_measures.c: --measure */
+    cli_depths depths;
+    sdm_measures measures;
 } cli_fit;
 
 /* Opens the model or the shape; sets the start parameters and the source of the maps. SDM_E_ARG,
  * SDM_E_RANGE, errors of opening. */
 sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err);
+
+/* After cli_fit_open_source(): reads --depth. With --measure it measures the shape at the start, so
+ * that a mistake ends the command before the fit. SDM_E_ARG, SDM_E_PLUGIN. */
+sdm_status cli_fit_prepare_measures(cli_fit *f, sdm_error *err);
+
+/* After the fit: with --measure fills f->measures. */
+sdm_status cli_fit_measure(cli_fit *f, sdm_error *err);
 
 /* Reads the image, label map, mesh or points. SDM_E_ARG, SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_target(cli_fit *f, sdm_error *err);

@@ -6,6 +6,7 @@
 
 #define SHAPE_PARAMS_MAX 64
 #define SHAPE_OPTIONS_MAX 64
+#define SHAPE_MEASURES_MAX 64
 
 /* shape_check.c: copies min(size, sizeof(sdm_shape)) bytes of a plug-in's table to *out (further
    members become zero) and checks the contents. `origin` is the start of error messages.

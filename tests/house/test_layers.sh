@@ -45,7 +45,7 @@ check() {
         own("nn", "model")
         own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template")
         own("io", "glb image meshfile npy picture ssm volume")
-        own("shape", "callback registry shape_box shape_survey")
+        own("shape", "callback mesh_measures registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
          own("all", "sdmgen") # the header that includes all public ones
@@ -66,7 +66,7 @@ check() {
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit/judge fit vdb")
         rooms("trainer/", "numerics ssm data state pod fine template direct .")
-        rooms("cli/", "args slicer report inputs shapes phantom fit ssm study page .")
+        rooms("cli/", "args slicer report inputs measure shapes phantom fit ssm study page .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", "."); rooms("shapes/", ".")
         while ((getline line < files) > 0) {
             exists[line] = 1

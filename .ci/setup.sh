@@ -36,11 +36,12 @@ install_packages() {
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
 }
 
-# configure PRESET: makes build/PRESET ready.
+# configure PRESET [OPTION...]: makes build/PRESET ready.
 configure() {
     local preset=$1 generator=()
+    shift
     [ -f "build/$preset/CMakeCache.txt" ] || generator=(-G Ninja)
-    cmake --preset "$preset" "${generator[@]}" >"$(log_of configure "$preset")" 2>&1 || fail_with "$(log_of configure "$preset")"
+    cmake --preset "$preset" "${generator[@]}" "$@" >"$(log_of configure "$preset")" 2>&1 || fail_with "$(log_of configure "$preset")"
 }
 
 # build PRESET [TARGET]: configures build/PRESET and builds it.

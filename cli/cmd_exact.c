@@ -64,6 +64,7 @@ static sdm_status make_shape_mesh(job *j, sdm_error *err)
         s = cli_layers_velocity(&j->layers, j->args, shape.instance, shape.values, j->mesh.n_vert,
                                 err);
     if (!s) cli_add_params(shape.params, shape.n_params, shape.values, &j->params);
+    if (!s && j->params.failed) s = sdm_fail(err, SDM_E_NOMEM, "out of memory for the metadata");
     cli_shape_dispose(&shape);
     return s;
 }

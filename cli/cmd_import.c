@@ -76,7 +76,8 @@ static sdm_status read_source(const cli_args *args, const char *path, sdm_ssm *m
                         "import: source '%s': need a model .h5 or .h5.json, or a folder of meshes "
                         "or particles",
                         path);
-    return cli_ssm_statismo(args, path, m, err);
+    return cli_ends_with(path, ".json") ? cli_ssm_statismo(args, path, m, err)
+                                        : cli_ssm_hdf5(args, path, m, err);
 }
 
 sdm_status cmd_import(const cli_args *args, sdm_error *err)

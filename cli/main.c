@@ -45,10 +45,10 @@ static int print_description(const slicer_module *module)
     return cli_print_text(&text, &err) ? cli_report(&err) : CLI_EXIT_DONE;
 }
 
-/* Turns success into failure when stdout cannot be written, for example to a full disk. */
+/* Turns success into failure when a result is missing on stdout, for example on a full disk. */
 static int flush_results(int code)
 {
-    if (fflush(stdout) == 0 && !ferror(stdout)) return code;
+    if (fflush(stdout) == 0 && !ferror(stdout) && !cli_is_unprinted()) return code;
     fputs("sdmgen: error: cannot write to standard output\n", stderr);
     return code ? code : CLI_EXIT_FAILED;
 }

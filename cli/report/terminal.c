@@ -16,6 +16,7 @@ static bool quiet_wanted;
 static cli_form form;
 static size_t warnings;
 static volatile sig_atomic_t interrupts;
+static bool unprinted; // by cli_print()
 
 static int exit_code_of(sdm_status status)
 {
@@ -160,9 +161,14 @@ void cli_print(const char *fmt, ...)
     va_start(args, fmt);
     format_text(&text, true, fmt, args);
     va_end(args);
-    fputs(text.failed || !text.data ? "(out of memory)\n" : text.data, stdout);
+    if (text.failed || !text.data)
+        unprinted = true;
+    else
+        fputs(text.data, stdout);
     sdm_text_dispose(&text);
 }
+
+bool cli_is_unprinted(void) { return unprinted; }
 
 void cli_notice(const char *fmt, ...)
 {

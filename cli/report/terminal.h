@@ -57,6 +57,9 @@ size_t cli_warnings(void);
  * they are in all messages on stderr. */
 void cli_print(const char *fmt, ...) SDM_PRINTF(1, 2);
 
+/* True when memory was too short for a text of cli_print(), which is then missing. */
+bool cli_is_unprinted(void);
+
 /* True when stderr is a terminal that can redraw a line: TERM is set and not "dumb". */
 bool cli_has_terminal(void);
 

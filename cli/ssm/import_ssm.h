@@ -10,6 +10,10 @@
  * SDM_E_IO, SDM_E_NOMEM. */
 sdm_status cli_ssm_statismo(const cli_args *args, const char *path, sdm_ssm *out, sdm_error *err);
 
+/* The same for a file of HDF5 (.h5), in a child process (cli_read_in_child()): libhdf5 crashes or
+ * does not end when some files are damaged. */
+sdm_status cli_ssm_hdf5(const cli_args *args, const char *path, sdm_ssm *out, sdm_error *err);
+
 /* Makes a model of the mesh files of a folder, which have the same triangles: sdm_ssm_align(),
  * sdm_ssm_components(). Errors as above. */
 sdm_status cli_ssm_meshes(const cli_args *args, const char *folder, sdm_ssm *out, sdm_error *err);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Damaged .vdb files, with a checksum that is right: each gives one line and an exit code of 0, 1 or 3, within limits of time and memory;
 # what is no regular file is not read; a full disk is told. Third argument: the program damage_vdb.
-# Tests: vdb_child.c vdb_file.cc
+# Tests: reader_child.c vdb_child.c vdb_file.cc
 damage=$3
 . "$(dirname "$0")/common.sh"
 

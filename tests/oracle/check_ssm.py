@@ -1,6 +1,6 @@
 # check_ssm.py SDMGEN: shape models that h5py writes (versions 0.8, 0.9, 1.0, a catalog, the JSON form) and folders of meshes give the
 # shapes that numpy computes; models that are broken are refused in one line.
-# Tests: cmd_import.c report_ssm.c ssm_statismo.c ssm_meshes.c tree_hdf5.c tree_json.c ssm_file.c json_read.c align.c components.c statistical.c
+# Tests: cmd_import.c report_ssm.c ssm_child.c ssm_statismo.c ssm_meshes.c tree_hdf5.c tree_json.c ssm_file.c json_read.c align.c components.c statistical.c
 import json
 import os
 import shutil
@@ -13,7 +13,7 @@ except ImportError as missing:
     print("skipped:", missing)
     sys.exit(77)
 
-from sdm_program import done, refused
+from sdm_program import done, refused, sdmgen
 
 chance = np.random.default_rng(1)
 
@@ -201,6 +201,15 @@ for cut in (0, 7, 100, 2000, len(whole) // 2, len(whole) - 1):
     with open("bad.h5", "wb") as f:
         f.write(whole[:cut])
     refused(3, "bad.h5", "import", "ssm", "bad.h5", "-o", "never.ssm")
+# damaged anywhere: a model, or one line in bounded time, though libhdf5 crashes and hangs
+damage = np.random.default_rng(2)
+for _ in range(12):
+    bad = np.frombuffer(whole, np.uint8).copy()
+    bad[damage.integers(0, len(whole) // 4, size=20)] = damage.integers(0, 256, size=20)
+    bad.tofile("bad.h5")
+    ended = sdmgen("import", "ssm", "bad.h5", "-o", "may_be.ssm", "--quiet")
+    assert ended.returncode in (0, 3) and ended.stderr.count("\n") == (ended.returncode == 3), ended
+
 refused(2, "need a model", "import", "ssm", "surface.off", "-o", "never.ssm")
 refused(1, "missing.h5", "import", "ssm", "missing.h5", "-o", "never.ssm")
 refused(2, "exclude", "import", "ssm", "v09.h5", "-o", "never.ssm", "--modes", "2", "--variance", "0.5")

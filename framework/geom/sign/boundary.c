@@ -216,8 +216,7 @@ sdm_strips_winding sdm_strips_evaluate(const sdm_strips *s, const double x[3], c
     sdm_strips_winding out = {.distance = INFINITY};
     angle_sum sum = {0, 1, 0};
     double nearest2 = INFINITY;
-    const sdm_chain *c = s->boundary->chain,
-                    *end = c + (s->boundary->n ? 2 * s->boundary->n - 1 : 0);
+    const sdm_chain *c = s->boundary->chain, *end = s->boundary->n ? c + 2 * s->boundary->n - 1 : c;
     while (c < end) {
         double ends[2][3], r[3], z[2], r2 = 0;
         if (c->n > 1) {

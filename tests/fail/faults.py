@@ -1,0 +1,239 @@
+"""Failed output operations, failed allocations and kills in the commands of sdmgen.
+
+    faults.py PROGRAM SOURCE OUTPUT_SHIM MEMORY_SHIM [--sample N] [--only CASE] [--seed S]
+
+Each case is a command that writes files, some of which were there before. It is run once without a fault, and then with a fault at the
+n-th operation: by the shims fail_output.c and fail_memory.c. Without --sample all n up to 40 are tried, and 40 random ones beyond; with it,
+N of them for each kind of fault. Whatever fails:
+  - the program does not crash, and it ends: with the exit code 0 and every output complete, or with 1 and a message;
+  - a file under its final name is the old one or a complete new one, and no temporary file stays (but after a kill);
+  - a training that was killed goes on with --resume to a model of the same bits.
+Prints a table of the faults; exit code 1 if one of them broke a promise."""
+
+import argparse
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+TRAIN = """shape: {name: capsule}
+grid: {size: [8, 8, 8], spacing: 2}
+network: {kind: pod, depth: 1, width: 8, rank: 2, levels: 1, block: 4, modes: 8, degree: 1, input_degree: 1}
+data: {static: 0, start: 8, online: 4, holdout: 2, workers: 1}
+train: {steps: 30, batch: 2, refine_batch: 2, checkpoint_seconds: 0.001}
+"""
+EXPERIMENT = """experiment: {title: tiny, samples: 2, engine_samples: 1}
+shape: {name: capsule}
+grid: {size: [8, 8, 8], spacing: 2}
+network: {depth: 1, width: 8, rank: 2, levels: 1, block: 4, modes: 8, degree: 1, input_degree: 1}
+data: {static: 0, start: 8, online: 4, holdout: 2}
+train: {steps: 20, batch: 2, refine_batch: 2}
+methods:
+  - {name: POD, network: pod}
+  - {name: exact, engine: exact}
+"""
+POINTS = "x,y,z\n0,0,5\n0,0,-5\n" + "".join(f"{x},{y},{z}\n" for z in (0, 2, -2) for x, y in ((2, 0), (-2, 0), (0, 2), (0, -2)))
+OLD = b"the old file\n"
+FORMATS = ("npy", "nii", "nii.gz", "nrrd", "mha", "vdb", "ply", "stl", "obj", "off", "vtk", "vtp", "png", "svg", "pdf")
+TIME_LIMIT = 200
+EVERY, BEYOND, RANDOM_KILLS = 40, 40, 40
+
+
+class Case:
+    """A command, the outputs that it promises, and those that it may leave out."""
+
+    def __init__(self, name, *command, outputs=(), extra=(), own=False):
+        self.name, self.command, self.outputs, self.extra = name, command, outputs, extra
+        self.own = own  # failed allocations: those of the program alone, without those in shared libraries
+        self.reference = {}
+
+
+def cases(golden):
+    model = str(golden / "pod_i8.sdm")
+    # OpenVDB and cairo do not survive failed allocations of their own
+    made = [Case(f"generate {e}", "generate", model, "-o", f"x.{e}", outputs=(f"x.{e}",), own=e in ("vdb", "png", "svg", "pdf")) for e in FORMATS]
+    return made + [
+        Case("exact", "exact", "--shape", "capsule", "--size", "9,9,9", "--spacing", "1.5", "-o", "x.nrrd", "-o", "x.ply",
+             outputs=("x.nrrd", "x.ply")),
+        Case("fit", "fit", model, "points.csv", "--translation", "0,0,0", "--rotation", "0,0,0", "--force", "-o", "x.stl", "-o", "x.json",
+             outputs=("x.stl", "x.json")),
+        Case("report", "report", model, "-o", "x.html", outputs=("x.html",)),
+        Case("train", "train", "train.yaml", "--out", "run", outputs=("run/model.sdm", "run/metrics.jsonl", "run/config.yaml"),
+             extra=("run/loss.png", "run/slices.png", "run/checkpoint.sdmc"), own=True),
+        Case("experiment", "experiment", "experiment.yaml", "--out", "run", "--peers", "none",
+             outputs=("run/table.md", "run/table.csv", "run/table.json", "run/pod/model.sdm"),
+             extra=("run/pod/loss.png", "run/pod/slices.png", "run/pod/surfaces.png"), own=True),
+    ]  # fmt: skip
+
+
+class Runner:
+    def __init__(self, options, work):
+        self.program, self.shims, self.work = options.program, {"output": options.output_shim, "memory": options.memory_shim}, work
+
+    def folder(self, case):
+        """A new folder with the inputs, and an old file in the place of each output that the command names."""
+        folder = Path(tempfile.mkdtemp(dir=self.work))
+        (folder / "train.yaml").write_text(TRAIN)
+        (folder / "experiment.yaml").write_text(EXPERIMENT)
+        (folder / "points.csv").write_text(POINTS)
+        for name in case.outputs:
+            if name in case.command:
+                (folder / name).write_bytes(OLD)
+        return folder
+
+    def run(self, case, folder, shim=None, at=0, mode="once", more=()):
+        """The finished process; .count: the operations that the shim has counted."""
+        environment = dict(os.environ, LC_ALL="C", OMP_NUM_THREADS="1")
+        if shim:
+            environment.update(LD_PRELOAD=self.shims[shim], FAIL_AT=str(at), FAIL_MODE=mode, FAIL_COUNT=str(folder / "count"))
+            if case.own:
+                environment["FAIL_OWN"] = "1"
+        done = subprocess.run([self.program, *case.command, "--quiet", "--threads", "1", *more], cwd=folder, env=environment, timeout=TIME_LIMIT,
+                              capture_output=True, text=True, errors="replace")  # fmt: skip
+        count = folder / "count"
+        done.count = int(count.read_text()) if count.exists() else 0
+        return done
+
+    def is_complete(self, case, folder, name):
+        """Whether a file is that of the run without a fault, or, where it holds times or a random number, whether its end is there."""
+        content = (folder / name).read_bytes()
+        if content == case.reference[name]:
+            return True
+        text = content.decode(errors="replace")
+        if name.endswith(".vdb"):
+            return subprocess.run([self.program, "verify", name], cwd=folder, capture_output=True).returncode == 0
+        if name.endswith(".json"):
+            return bool(json.loads(text))
+        if name.endswith((".md", ".csv")):  # a row that failed has no figures
+            return text.split("\n")[0] == case.reference[name].decode().split("\n")[0] and text.endswith("\n")
+        if name.endswith(("pod/model.sdm", ".html", ".pdf", ".svg", ".png")):
+            return abs(len(content) - len(case.reference[name])) < 200 and content[-4:] == case.reference[name][-4:]
+        return False
+
+    def check(self, case, folder, done, killed):
+        """What a run with a fault has broken; None: nothing."""
+        if killed and done.returncode == -9:
+            pass
+        elif done.returncode not in (0, 1):
+            return f"exit code {done.returncode}: {done.stderr[-300:]}"
+        elif done.returncode == 1 and not done.stderr.strip():
+            return "exit code 1 without a message"
+        for name in case.outputs + case.extra:
+            path = folder / name
+            if not path.exists():
+                if done.returncode == 0 and name in case.outputs:
+                    return f"exit code 0 without {name}"
+                continue
+            if name == "run/checkpoint.sdmc":
+                continue
+            old = path.read_bytes() == OLD
+            if old and done.returncode == 0:
+                return f"exit code 0 with the old {name}"
+            # lines are added to the metrics while the training runs
+            if not old and (done.returncode == 0 or name != "run/metrics.jsonl") and not self.is_complete(case, folder, name):
+                return f"{name} is damaged, exit code {done.returncode}"
+        left = [str(p.relative_to(folder)) for p in folder.rglob("*.tmp")]
+        return f"left over: {left}" if left and done.returncode != -9 else None
+
+    def resume(self, case, folder):
+        """Goes on with a training that was killed. None: the model has the same bits as without the kill."""
+        run = folder / "run"
+        if (run / "model.sdm").exists() and not (run / "checkpoint.sdmc").exists():
+            return None if self.is_complete(case, folder, "run/model.sdm") else "another model after a kill"
+        done = self.run(case, folder, more=("--resume",))
+        if done.returncode:
+            return f"--resume after a kill: exit code {done.returncode}: {done.stderr[-300:]}"
+        return next((f"{name} differs after a kill and --resume" for name in ("run/model.sdm", "run/metrics.jsonl")
+                     if (folder / name).read_bytes() != case.reference[name]), None)  # fmt: skip
+
+    def kill_at_random(self, case, folder, seed):
+        """Kills a training, and what goes on with it, at random times."""
+        chance = random.Random(seed)
+        for more in ((), ("--resume",), ("--resume",)):
+            if (folder / "run/model.sdm").exists():
+                break
+            process = subprocess.Popen([self.program, *case.command, "--quiet", "--threads", "1", *more], cwd=folder,
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
+            try:
+                process.wait(chance.uniform(0, case.seconds))
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+    def fault(self, case, shim, mode, at):
+        folder = self.folder(case)
+        wrong = None
+        try:
+            killed = mode in ("kill", "half", "random")
+            if mode == "random":
+                self.kill_at_random(case, folder, at)
+            else:
+                wrong = self.check(case, folder, self.run(case, folder, shim, at, mode), killed)
+            if not wrong and killed and case.name == "train":
+                wrong = self.resume(case, folder)
+        except (subprocess.TimeoutExpired, ValueError) as error:
+            wrong = str(error)
+        shutil.rmtree(folder, ignore_errors=True)
+        return None if wrong is None else f"{case.name}: {shim} {mode} at {at}: {wrong}"
+
+    def count(self, case, shim):
+        folder, start = self.folder(case), time.monotonic()
+        done = self.run(case, folder, shim)
+        case.seconds = time.monotonic() - start
+        if done.returncode:
+            raise SystemExit(f"{case.name}: exit code {done.returncode} without a fault: {done.stderr}")
+        if done.count == 0:
+            raise SystemExit(f"{case.name}: {self.shims[shim]} counts nothing: {done.stderr}")
+        case.reference = {name: (folder / name).read_bytes() for name in case.outputs + case.extra if (folder / name).exists()}
+        shutil.rmtree(folder)
+        return done.count
+
+
+def places(n, sample, chance):
+    """The operations 1 .. n that fail."""
+    if sample:
+        return sorted(chance.sample(range(1, n + 1), min(sample, n)))
+    return list(range(1, min(n, EVERY) + 1)) + sorted(chance.sample(range(EVERY + 1, n + 1), min(BEYOND, max(0, n - EVERY))))
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    for name in ("program", "source", "output_shim", "memory_shim"):
+        parser.add_argument(name, type=os.path.abspath)
+    parser.add_argument("--sample", type=int, default=0)
+    parser.add_argument("--only", action="append", default=[])
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    chance, wrong, total = random.Random(options.seed), [], 0
+    print(f"{'command':16} {'operations':>10} {'allocations':>11} {'output faults':>13} {'kills':>6} {'memory faults':>13} {'broken':>6}")
+    with tempfile.TemporaryDirectory(prefix="faults.") as work, ThreadPoolExecutor(os.cpu_count()) as pool:
+        runner = Runner(options, work)
+        for case in cases(Path(options.source) / "tests/golden"):
+            if options.only and case.name not in options.only:
+                continue
+            counts = {shim: runner.count(case, shim) for shim in ("memory", "output")}
+            jobs = [(case, shim, mode, at)
+                    for shim, modes in (("output", ("once", "lasting", "kill", "half")), ("memory", ("once", "lasting")))
+                    for mode in modes for at in places(counts[shim], options.sample, chance)]  # fmt: skip
+            if case.name == "train":
+                jobs += [(case, "output", "random", seed) for seed in range(options.sample or RANDOM_KILLS)]
+            broken = [line for line in pool.map(lambda job: runner.fault(*job), jobs) if line]
+            number = {kind: sum(1 for _, shim, mode, _ in jobs if (shim if shim == "memory" else "kill" if mode in ("kill", "half", "random") else shim) == kind)
+                      for kind in ("output", "kill", "memory")}  # fmt: skip
+            print(f"{case.name:16} {counts['output']:10} {counts['memory']:11} {number['output']:13} {number['kill']:6} {number['memory']:13} {len(broken):6}",
+                  flush=True)  # fmt: skip
+            wrong += broken
+            total += len(jobs)
+    for line in wrong:
+        print("BROKEN:", line)
+    print(f"{total} faults, {len(wrong)} broken promises")
+    sys.exit(1 if wrong or total == 0 else 0)
+
+
+main()

@@ -14,10 +14,12 @@
 
 static bool quiet_wanted;
 static cli_form form;
+static bool incomplete;
 static volatile sig_atomic_t interrupts;
 
 static int exit_code_of(sdm_status status)
 {
+    if (incomplete) return CLI_EXIT_INCOMPLETE;
     switch (status) {
     case SDM_OK:
         return CLI_EXIT_DONE;
@@ -41,6 +43,8 @@ static int exit_code_of(sdm_status status)
 
 void cli_set_quiet(bool quiet) { quiet_wanted = quiet; }
 bool cli_is_quiet(void) { return quiet_wanted; }
+
+void cli_set_incomplete(void) { incomplete = true; }
 
 void cli_set_form(const char *name)
 {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "args/options.h"
-#include "cells.h"
+#include "csv_cells.h"
 #include "sdm/internal/config.h"
 #include "sdm/internal/sha256.h"
 
@@ -40,9 +40,9 @@ typedef struct cli_cohort {
     cli_column *columns;          /* [cells.n_columns] */
 } cli_cohort;
 
-/* Reads the table of --cases and checks it: columns, ids, and every value as the command line of
- * one fit would. The first -o is the folder of the results. SDM_E_ARG; SDM_E_FORMAT with file and
- * line; SDM_E_IO. cli_cohort_dispose() frees, also after an error. */
+/* Reads the table of --cases and checks its columns and ids. The first -o is the folder of the
+ * results. SDM_E_ARG; SDM_E_FORMAT with file and line; SDM_E_IO. cli_cohort_dispose() frees, also
+ * after an error. */
 sdm_status cli_cohort_read(const cli_args *args, cli_cohort *out, sdm_error *err);
 void cli_cohort_dispose(cli_cohort *c);
 
@@ -76,6 +76,10 @@ void cli_words_dispose(cli_words *w);
 /* key = a hash of all that decides the result of a fit: version of the program, settings, content
  * of the input files. A file that cannot be read counts as such: a fit will tell. SDM_E_NOMEM. */
 sdm_status cli_words_key(const cli_words *w, char key[SDM_SHA256_TEXT], sdm_error *err);
+
+/* Checks the values of all cases without opening their files (cohort_check.c). SDM_E_FORMAT with
+ * file and line. */
+sdm_status cli_cohort_check(const cli_cohort *c, sdm_error *err);
 
 /* ---- the record of a case (cohort_record.c) ---- */
 

@@ -238,6 +238,7 @@ sdm_status cli_cohort_run(const cli_args *args, cli_cohort_fit *fit, sdm_error *
 {
     cohort_run r = {.fit = fit};
     sdm_status s = cli_cohort_read(args, &r.cohort, err);
+    if (!s) s = cli_cohort_check(&r.cohort, err);
     if (!s) s = run_cases(&r, err);
     cli_cohort_dispose(&r.cohort);
     return s;

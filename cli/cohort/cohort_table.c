@@ -1,4 +1,4 @@
-/* Reads and checks the table of a cohort: its columns, the ids of the cases, every value. */
+/* Reads and checks the table of a cohort: its columns and the ids of the cases. */
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -6,7 +6,6 @@
 #include <strings.h>
 
 #include "cohort.h"
-#include "fit/fit_command.h"
 #include "report/output.h"
 #include "sdm/memory.h"
 
@@ -148,62 +147,6 @@ static sdm_status check_ids(const cli_cohort *c, sdm_error *err)
     return s;
 }
 
-/* ---- values ---- */
-
-/* The files of a case lie in its own folder, beside those that every case has. */
-static sdm_status check_output(const char *name, sdm_error *err)
-{
-    static const char *const own[] = {CLI_CASE_FIT, CLI_CASE_RECORD, CLI_CASE_LOG};
-    if (strchr(name, '/'))
-        return sdm_fail(err, SDM_E_ARG,
-                        "output '%s': with --cases an output is a file name without a folder: it "
-                        "is written into the folder of the case",
-                        name);
-    for (size_t i = 0; i < sizeof own / sizeof *own; i++)
-        if (!strcmp(name, own[i]))
-            return sdm_fail(err, SDM_E_ARG, "output '%s': every case has this file already", name);
-    if (!strncmp(name, CLI_CASE_LEASE, strlen(CLI_CASE_LEASE)) || *name == '.')
-        return sdm_fail(err, SDM_E_ARG, "output '%s': need another name", name);
-    return SDM_OK;
-}
-
-/* Checks what can be checked without opening a file. */
-static sdm_status check_args(const cli_args *args, const cli_words *w, sdm_error *err)
-{
-    if ((args->files.n == 2) == (args->shape != NULL))
-        return sdm_fail(err, SDM_E_ARG,
-                        args->shape
-                            ? "a model and --shape %s: need one of them"
-                            : "no model: need MODEL or --shape NAME on the command line, or "
-                              "a column model or shape%s",
-                        args->shape ? args->shape : "");
-    sdm_status s = SDM_OK;
-    for (size_t i = 0; i < w->outputs.n && !s; i++) s = check_output(w->outputs.items[i], err);
-    for (size_t i = 0; i < w->outputs.n && !s; i++)
-        for (size_t k = 0; k < i && !s; k++)
-            if (!strcmp(w->outputs.items[i], w->outputs.items[k]))
-                s = sdm_fail(err, SDM_E_ARG, "output '%s' is given twice", w->outputs.items[i]);
-    return s ? s : cli_fit_check_types(args, err);
-}
-
-/* Parses the command line of each case: mistakes show before any work. */
-static sdm_status check_values(const cli_cohort *c, sdm_error *err)
-{
-    sdm_status s = SDM_OK;
-    for (size_t i = 0; i < c->cells.n_rows && !s; i++) {
-        cli_words w = {0};
-        cli_args args = {0};
-        s = cli_words_make(c, i, &w, err);
-        if (!s) s = cli_parse(w.argc, w.argv, &args, err);
-        if (!s) s = check_args(&args, &w, err);
-        if (s && s != SDM_E_NOMEM)
-            s = sdm_fail_in(err, SDM_E_FORMAT, "%s:%d", c->csv, c->cells.line[i + 1]);
-        cli_args_dispose(&args);
-        cli_words_dispose(&w);
-    }
-    return s;
-}
-
 /* ---- the whole ---- */
 
 static sdm_status read_folder(cli_cohort *c, sdm_error *err)
@@ -241,8 +184,7 @@ sdm_status cli_cohort_read(const cli_args *args, cli_cohort *out, sdm_error *err
     sdm_status s = read_folder(out, err);
     if (!s) s = cli_cells_read(out->csv, &out->cells, err);
     if (!s) s = read_columns(out, err);
-    if (!s) s = check_ids(out, err);
-    return s ? s : check_values(out, err);
+    return s ? s : check_ids(out, err);
 }
 
 void cli_cohort_dispose(cli_cohort *c)

@@ -1,5 +1,5 @@
 /* Reads CSV files whose cells are texts. */
-#include "cells.h"
+#include "csv_cells.h"
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -68,29 +68,39 @@ static sdm_status check_complete(const cli_args *args, const cli_collect *t, sdm
     return s;
 }
 
-static sdm_status write_table(const cli_args *args, const cli_collect *t, sdm_error *err)
+static sdm_status write_output(const cli_args *args, const cli_collect *t, const char *path,
+                               sdm_error *err)
+{
+    sdm_text text = {0};
+    if (cli_ends_with(path, ".csv"))
+        cli_collect_csv(t, &text);
+    else
+        cli_collect_page(t, args->files.items[0], path, &text);
+    const sdm_status s = sdm_text_write(&text, path, err);
+    sdm_text_dispose(&text);
+    return s;
+}
+
+/* Prints the table as JSON, or as CSV where no file holds it. */
+static sdm_status print_table(const cli_args *args, const cli_collect *t, sdm_error *err)
 {
     sdm_text csv = {0};
     sdm_json json = {0};
-    sdm_status s = SDM_OK;
-    cli_collect_csv(t, &csv);
-    for (size_t i = 0; i < args->outputs.n && !s; i++)
-        s = sdm_text_write(&csv, args->outputs.items[i], err);
-    if (!s && args->json) {
+    if (args->json) {
         cli_collect_json(t, &json);
-        s = cli_print_json(&json, err);
-    } else if (!s && !args->outputs.n) {
-        return cli_print_text(&csv, err);
+        return cli_print_json(&json, err);
     }
-    sdm_text_dispose(&csv);
-    return s;
+    if (args->outputs.n) return SDM_OK;
+    cli_collect_csv(t, &csv);
+    return cli_print_text(&csv, err);
 }
 
 static sdm_status check_arguments(const cli_args *args, sdm_error *err)
 {
     for (size_t i = 0; i < args->outputs.n; i++)
-        if (!cli_ends_with(args->outputs.items[i], ".csv"))
-            return sdm_fail(err, SDM_E_ARG, "collect: output '%s': its name must end in .csv",
+        if (!cli_ends_with_any(args->outputs.items[i], ".csv .html .htm"))
+            return sdm_fail(err, SDM_E_ARG,
+                            "collect: output '%s': its name must end in .csv or .html",
                             args->outputs.items[i]);
     return cli_check_files(args, NULL, err);
 }
@@ -101,7 +111,9 @@ sdm_status cmd_collect(const cli_args *args, sdm_error *err)
     sdm_status s = check_arguments(args, err);
     if (!s) s = cli_collect_read(args->files.items[0], &table, err);
     if (!s) s = cli_collect_outliers(&table, err);
-    if (!s) s = write_table(args, &table, err);
+    for (size_t i = 0; i < args->outputs.n && !s; i++)
+        s = write_output(args, &table, args->outputs.items[i], err);
+    if (!s) s = print_table(args, &table, err);
     if (!s) notice_refused(&table);
     if (!s) notice_outliers(&table);
     if (!s) s = check_complete(args, &table, err);

@@ -277,7 +277,8 @@ const cli_option cli_options[] = {
      "output: .vdb .ply .stl .obj .off .vtk .vtp .nii .nii.gz .nrrd .mha .npy .png .svg .pdf "
      ".json; may be repeated. With --cases the first one is the folder of the results, the others "
      "are files in the folder of each case"},
-    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_COLLECT), AT(outputs), "the table: .csv"},
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_COLLECT), AT(outputs),
+     "the table: .csv; or .html, a page with the outliers first; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_EXPORT), AT(outputs),
      "output: .onnx (MODEL) or .glb (--shape); may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_SHAPES), AT(outputs),

@@ -50,3 +50,8 @@ sdm_status cli_collect_outliers(cli_collect *table, sdm_error *err);
 /* Appends the table as CSV; adds it as a JSON object. */
 void cli_collect_csv(const cli_collect *table, sdm_text *out);
 void cli_collect_json(const cli_collect *table, sdm_json *json);
+
+/* Appends the table as an HTML page, which is to be written to `path`: outliers first. It links to
+ * the files of the cases in `folder` if it lies there. */
+void cli_collect_page(const cli_collect *table, const char *folder, const char *path,
+                      sdm_text *out);

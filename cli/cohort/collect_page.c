@@ -19,7 +19,7 @@ static const char BEGIN[] =
     "border-bottom: 1px solid #8885; }\n"
     "th { position: sticky; top: 0; background: Canvas; }\n"
     "td.number { text-align: right; font-variant-numeric: tabular-nums; }\n"
-    "td.text { white-space: normal; min-width: 14em; }\n"
+    "td.text { white-space: normal; min-width: 24em; }\n"
     ".failed, .missing { background: #e0303030; }\n.refused { background: #e0903030; }\n"
     ".outlier { background: #3070e030; }\n"
     "img { max-height: 7em; }\n</style>\n</head>\n<body>\n";
@@ -108,11 +108,11 @@ static void add_row(const cli_collect *t, size_t i, const char *folder, sdm_text
     sdm_text_add(out, "</td><td>%s</td><td>%s</td><td>", cli_case_state_name(row->state),
                  row->verdict);
     if (row->outliers.size) add_escaped(out, row->outliers.data);
+    sdm_text_add(out, "</td><td class=\"text\">");
+    add_escaped(out, row->reason);
     sdm_text_add(out, "</td>");
     add_figures(t, i, out);
-    sdm_text_add(out, "<td class=\"text\">");
-    add_escaped(out, row->reason);
-    sdm_text_add(out, "</td></tr>\n");
+    sdm_text_add(out, "</tr>\n");
 }
 
 static void add_head(const cli_collect *t, sdm_text *out)
@@ -129,14 +129,14 @@ static void add_head(const cli_collect *t, sdm_text *out)
                  t->ids.n, n[CLI_CASE_ACCEPTED], n[CLI_CASE_REFUSED], n[CLI_CASE_FAILED],
                  n[CLI_CASE_MISSING], outliers);
     sdm_text_add(out, "<table>\n<thead><tr><th>case</th><th></th><th>state</th><th>verdict</th>"
-                      "<th>outliers</th>");
+                      "<th>outliers</th><th>reason</th>");
     for (size_t k = 0; k < t->n_columns; k++) {
         if (!is_shown(&t->columns[k])) continue;
         sdm_text_add(out, "<th>");
         add_escaped(out, t->columns[k].name);
         sdm_text_add(out, "</th>");
     }
-    sdm_text_add(out, "<th>reason</th></tr></thead>\n<tbody>\n");
+    sdm_text_add(out, "</tr></thead>\n<tbody>\n");
 }
 
 void cli_collect_page(const cli_collect *t, const char *folder, const char *path, sdm_text *out)

@@ -142,6 +142,24 @@ static void test_right_fits_pass(void **state)
         }
 }
 
+// An image without noise shows the shape beyond doubt.
+static void test_an_image_without_noise_passes(void **state)
+{
+    (void)state;
+    sdm_instance *torus = shape_of("torus");
+    const sdm_grid g = cube(5.5, 0.35);
+    float *v = image_of_shape(torus, &g, 0, false, 5);
+    const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = v};
+    sdm_fit_result r;
+    sdm_error err;
+    (void)fit_of(torus, &t, 0, &r, &err);
+    if (!(r.evidence > 1000)) fail_msg("evidence %g: %s", r.evidence, err.text);
+    assert_int_equal(finding(&r, SDM_FIT_CHECK_NO_SHAPE)->grade, SDM_FIT_PASSED);
+    sdm_fit_dispose(&r);
+    free(v);
+    sdm_instance_free(torus);
+}
+
 static void test_wrong_shapes_are_refused(void **state)
 {
     (void)state;
@@ -405,6 +423,7 @@ int main(void)
         cmocka_unit_test(test_noise_is_robust),
         cmocka_unit_test(test_findings_are_sorted),
         cmocka_unit_test(test_right_fits_pass),
+        cmocka_unit_test(test_an_image_without_noise_passes),
         cmocka_unit_test(test_wrong_shapes_are_refused),
         cmocka_unit_test(test_points_of_another_shape_are_refused),
         cmocka_unit_test(test_strays_are_refused_if_many),

@@ -49,6 +49,17 @@ static bool is_image(const fit_problem *p)
     return p->target->kind == SDM_FIT_IMAGE && !p->given_labels;
 }
 
+// Gain in log-likelihood by the shape, as of independent voxels, less the cost of its unknowns
+// (Schwarz 1978). The covariance of the score, which noise_factor belongs to, is that of the few
+// voxels at the surface; the robust correlations of all others are the steadier measure.
+static double evidence_of(const fit_problem *p, const sdm_fit_result *r, double factor)
+{
+    const double unknowns =
+        (p->opts->keep_params ? 0 : (double)p->n_params) + (p->opts->keep_pose ? 0 : 6);
+    return (p->information.log_likelihood - r->log_likelihood_without) / factor -
+           0.5 * unknowns * log((double)p->samples.n / factor);
+}
+
 // evidence, contrast, cavities, field of view, convergence
 static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)
 {
@@ -195,14 +206,14 @@ static void check_tissues(const fit_problem *p, const fit_residuals *s, const sd
 }
 
 // the blob must be worse by more than the cost of the unknowns that the shape has beyond its nine
-static sdm_status check_blob(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v,
+static sdm_status check_blob(const fit_problem *p, double factor, sdm_fit_verdict *v,
                              sdm_error *err)
 {
     double gain, alike;
     if (!p->maps.share) return SDM_OK;
     const sdm_status s = sdm_fit_against_blob(p, &gain, &alike, err);
     if (s || alike > BLOB_ALIKE) return s;
-    gain /= fmax(r->noise_factor, 1);
+    gain /= factor;
     sdm_fit_judge_add(
         v, SDM_FIT_CHECK_BLOB, gain > SDM_FIT_PREFERRED, SDM_FIT_FAILED, gain, SDM_FIT_PREFERRED,
         "a blob of the same size in its place explains the image as well as the shape does");
@@ -266,9 +277,12 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err
     sdm_fit_verdict *v = &r->verdict;
     fit_residuals residuals;
     fit_misfit misfit;
+    sdm_status s = sdm_fit_residuals_create(p, &residuals, err);
+    const double robust = s ? 0 : sdm_fit_residual_correlation(&residuals),
+                 factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
+    if (is_image(p)) r->evidence = evidence_of(p, r, factor);
     check_basics(p, r, v);
     check_maps(p, v);
-    sdm_status s = sdm_fit_residuals_create(p, &residuals, err);
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     if (!s) {
         check_residuals(p, &misfit, v);
@@ -280,7 +294,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err
     if (!s && is_image(p)) check_tissues(p, &residuals, r, v);
     if (!s) sdm_fit_check_voxels(p, is_image(p) ? r->blur : 0, v);
     sdm_fit_residuals_dispose(&residuals);
-    if (!s && is_image(p)) s = check_blob(p, r, v, err);
+    if (!s && is_image(p)) s = check_blob(p, factor, v, err);
     const sdm_fit_finding *why = s ? NULL : reason(v);
     return s || !why ? s : sdm_fail(err, SDM_E_QUALITY, "%s", why->text);
 }

@@ -396,9 +396,10 @@ typedef struct sdm_fit_result {
        which the outside tissues keep the relative weights in space of the fit; other targets:
        NaN */
     double log_likelihood_without;
-    /* image: evidence of the shape: its gain in log-likelihood, corrected for correlated voxels,
-       less the cost of its unknowns (Schwarz 1978). At most 0: the image shows no such shape. Other
-       targets: NaN */
+    /* image: evidence of the shape: its gain in log-likelihood, as of independent voxels, less the
+       cost of its unknowns (Schwarz 1978). How many voxels count as one independent one follows
+       from the robust correlations of SDM_FIT_CHECK_RESIDUALS or, where these cannot be measured,
+       is noise_factor. At most 0: the image shows no such shape. Other targets: NaN */
     double evidence;
     /* share of the volume of the shape that lies in the image; 1 for points; NaN if the fit failed
        before computing it; the same holds for the figures marked "NaN as inside_share" */

@@ -13,7 +13,7 @@
 #define REPORTS                                                                                    \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) |              \
      ON(CLI_SHAPES) | ON(CLI_INFO) | ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |         \
-     ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_IMPORT))
+     ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_COLLECT) | ON(CLI_IMPORT))
 
 /* Commands that train networks. */
 #define WITH_MODELS                                                                                \
@@ -126,7 +126,7 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "sdmgen phantom --shape cochlea --random-params --random-pose 20,1 --spacing 0.2 -o ct.nii.gz "
      "--truth truth.json",
      0, 0},
-    {"fit", "MODEL IMAGE | --shape NAME IMAGE",
+    {"fit", "MODEL IMAGE | --shape NAME IMAGE | [MODEL] --cases FILE.csv -o DIR",
      "fit a shape to an image, a label map, a mesh or points",
      "Estimates the parameters and the pose of the shape, with their uncertainty, using the\n"
      "network of MODEL or (--exact, --shape) the exact engine. IMAGE is a volume (.nii\n"
@@ -139,10 +139,22 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      ".npy distances on the grid of the image; .png .svg .pdf the contour over the\n"
      "image; .json the results.\n"
      "Exit code 4: the fit failed or is not to be trusted; files are then written only with\n"
-     "--force.",
+     "--force.\n"
+     "--cases fits all cases of a table, each into its folder DIR/ID with fit.json, case.json,\n"
+     "log.txt and the files of further -o. The same command does what is missing or changed.\n"
+     "Exit code 0: each case has a result, accepted or refused; 6: some failed, DIR/failed.csv\n"
+     "tells why.",
      "sdmgen fit runs/cochlea/model.sdm ct.nii.gz --start-centre 4,-2,7 --start-axis 0,0,1 -o "
      "fit.stl -o fit.png",
-     1, 2},
+     0, 2},
+    {"collect", "DIR [-o FILE.csv]", "make one table of the fits of a cohort",
+     "DIR is the folder of `sdmgen fit --cases`. The table has a row for each case, in their\n"
+     "order: state, verdict, parameters, pose and measures with their standard deviations,\n"
+     "comparison with the reference, evidence, outliers. Without -o it is printed. It does not\n"
+     "depend on how the cases were divided or how often a run was interrupted.\n"
+     "An outlier is a parameter more than 3.5 robust standard deviations from the median of the\n"
+     "accepted fits. Exit code 6: cases failed or are missing.",
+     "sdmgen collect out -o cohort-results.csv", 1, 1},
     {"export", "MODEL -o FILE.onnx | --shape NAME -o FILE.glb",
      "write a network or a shape for other programs",
      "MODEL: the network as ONNX (opset 13): input `params` [N][P] in the units of the\n"
@@ -263,7 +275,10 @@ const cli_option cli_options[] = {
      "output: .ply .stl .obj .off .vtk .vtp; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(outputs),
      "output: .vdb .ply .stl .obj .off .vtk .vtp .nii .nii.gz .nrrd .mha .npy .png .svg .pdf "
-     ".json; may be repeated"},
+     ".json; may be repeated. With --cases the first one is the folder of the results, the others "
+     "are files in the folder of each case"},
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_COLLECT), AT(outputs),
+     "the table: .csv; or .html, a page with the outliers first; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_EXPORT), AT(outputs),
      "output: .onnx (MODEL) or .glb (--shape); may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_SHAPES), AT(outputs),
@@ -482,6 +497,17 @@ const cli_option cli_options[] = {
     {"mirror", 0, CLI_CHOICE, NULL, "auto|no", 0, 0, ON(CLI_FIT), AT(fit.mirror),
      "auto: also fit the mirror image of a shape that has one and tell which fits better; a shape "
      "whose side is not given with -O takes the better one (default auto)"},
+
+    /* fits of many cases */
+    {"cases", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_FIT), AT(cohort.cases),
+     "fit the cases of a table: a column id, a column image (an image, labels, a mesh or points), "
+     "and others with the names of options, or model, for those that differ from case to case; "
+     "relative paths start from the folder of the table"},
+    {"part", 0, CLI_TEXT, "I/N", NULL, 0, 0, ON(CLI_FIT), AT(cohort.part),
+     "fit only part I of N of the cases, contiguous rows of the table"},
+    {"claim", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(cohort.claim),
+     "share the cases with other processes that run the same command, on this machine or on others "
+     "with the same file system"},
 
     /* fits: outputs */
     {"reference", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(fit.reference),

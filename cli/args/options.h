@@ -66,6 +66,7 @@ enum {
     CLI_EXPERIMENT,
     CLI_PHANTOM,
     CLI_FIT,
+    CLI_COLLECT,
     CLI_EXPORT,
     CLI_IMPORT,
     CLI_SLICER,
@@ -77,6 +78,12 @@ typedef struct cli_list {
     const char **items; /* point into argv */
     size_t n;
 } cli_list;
+
+/* An option as given on the command line. */
+typedef struct cli_given {
+    const cli_option *option;
+    const char *value; /* a flag: its name */
+} cli_given;
 
 /* A pose: the pose of the shape for `phantom`, the start pose for `fit`. Each vector is NaN when
  * its option is missing. */
@@ -109,6 +116,12 @@ typedef struct cli_fit_args {
         tolerance, beside;
     double prior_sd, prior_rotation, prior_translation, eps;
 } cli_fit_args;
+
+/* Options of `fit` for a table of cases; NULL: option missing. */
+typedef struct cli_cohort_args {
+    const char *cases, *part;
+    bool claim;
+} cli_cohort_args;
 
 /* Options of `import` alone; 0 or NULL: option missing. */
 typedef struct cli_import_args {
@@ -181,7 +194,10 @@ struct cli_args {
     cli_pose_args pose;              /* phantom, fit */
     cli_phantom_args phantom;
     cli_fit_args fit;
+    cli_cohort_args cohort; /* fit */
     cli_import_args import;
+    cli_given *given; /* [n_given] all options in the order of the command line */
+    size_t n_given;
     const char **memory; /* storage of the items of all lists */
 };
 

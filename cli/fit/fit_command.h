@@ -159,6 +159,9 @@ const char *cli_fit_kind(const cli_fit *f);
 /* Negates x and y of points[n][3]: this converts RAS to LPS and back. */
 void cli_fit_negate_xy(double *points, size_t n);
 
+/* Checks the types of the output files, and the options of level sets. SDM_E_ARG. */
+sdm_status cli_fit_check_types(const cli_args *args, sdm_error *err);
+
 /* Before any work: checks the types of the output files and that they can be written.
  * SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err);

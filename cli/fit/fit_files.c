@@ -17,7 +17,7 @@ static bool is_image(const char *path)
 
 /* ---- before any work ---- */
 
-sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err)
+sdm_status cli_fit_check_types(const cli_args *args, sdm_error *err)
 {
     const char *label = args->fit.label_out;
     sdm_status s = SDM_OK;
@@ -27,7 +27,12 @@ sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err)
     if (!s && label && !cli_ends_with_any(label, CLI_VOLUME_ENDINGS))
         s = sdm_fail(err, SDM_E_ARG,
                      "--label-out '%s': its name must end in .nii .nii.gz .nrrd or .mha", label);
-    if (!s) s = cli_check_vdb_options(args, err);
+    return s ? s : cli_check_vdb_options(args, err);
+}
+
+sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err)
+{
+    const sdm_status s = cli_fit_check_types(args, err);
     return s ? s : cli_check_files(args, NULL, err);
 }
 

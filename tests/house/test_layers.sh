@@ -66,7 +66,7 @@ check() {
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit/judge fit vdb")
         rooms("trainer/", "numerics ssm data state pod fine template direct .")
-        rooms("cli/", "args slicer report inputs measure shapes phantom fit ssm study page .")
+        rooms("cli/", "args slicer report inputs measure shapes phantom fit cohort ssm study page .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", "."); rooms("shapes/", ".")
         while ((getline line < files) > 0) {
             exists[line] = 1

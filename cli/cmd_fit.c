@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "fit/fit_command.h"
+#include "page/page.h"
 #include "report/progress_bar.h"
 #include "report/terminal.h"
 
@@ -72,7 +73,10 @@ static sdm_status check_arguments(cli_fit *f, sdm_error *err)
                         "fit: a MODEL and an IMAGE are needed, or --shape NAME and an IMAGE");
     f->model_path = with_model ? args->files.items[0] : NULL;
     f->path = args->files.items[with_model];
-    return cli_fit_check_files(args, err);
+    if (args->report && !with_model)
+        return sdm_fail(err, SDM_E_ARG, "fit: --report needs a MODEL: a page runs its network");
+    const sdm_status s = cli_page_check_option(args, err);
+    return s ? s : cli_fit_check_files(args, err);
 }
 
 /* Runs the fit. Returns SDM_OK also for a fit that is not trustworthy (f->doubt): its result is
@@ -127,6 +131,15 @@ static sdm_status print_result(const cli_fit *f, sdm_error *err)
     return cli_print_json(&json, err);
 }
 
+static sdm_status write_page(const cli_fit *f, sdm_error *err)
+{
+    sdm_json json = {0};
+    cli_fit_json(f, &json);
+    const sdm_status s = cli_page_report_fit(f->args, &json, f->args->report, err);
+    sdm_json_dispose(&json);
+    return s;
+}
+
 /* Prints the result and writes the files; if the fit is not trustworthy, fails with the reason. */
 static sdm_status show_result(cli_fit *f, sdm_error *err)
 {
@@ -138,6 +151,7 @@ static sdm_status show_result(cli_fit *f, sdm_error *err)
         s = cli_fit_make_map(f, err);
         if (!s) s = cli_fit_compare(f, err);
         if (!s && write) s = cli_fit_write_files(f, err);
+        if (!s && f->args->report) s = write_page(f, err);
         if (!s) s = print_result(f, err);
         if (!s) s = cli_fit_write_results(f, err);
     }

@@ -121,4 +121,9 @@ fi
 "$baseline" $model native.npy rx=2.6 rz=3.1 >/dev/null
 "$baseline" $model beyond.npy rx=4.6 >/dev/null
 node --no-warnings "$source_folder/tests/cli/page.mjs" "$chromium" || bad 'the page in the browser: see above'
+if firefox=$(command -v firefox-esr || command -v firefox); then
+    node "$source_folder/tests/cli/firefox.mjs" "$firefox" || bad 'the page in Firefox: see above'
+else
+    echo 'not tested in Firefox: firefox-esr is not installed'
+fi
 finish

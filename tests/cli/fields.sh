@@ -45,8 +45,8 @@ expect 0 - sdmgen generate $model -p a=4.2 --points points.csv --columns distanc
 [ "$(head -n 1 at.csv)" = distance,gradient_x,gradient_y,gradient_z ] || bad 'points: wrong header'
 [ "$(wc -l <at.csv)" -eq 3 ] || bad 'points: wrong number of rows'
 expect 0 - sdmgen generate $model -p a=4.2 --points points.csv -o one.csv --outside bound
-printf '90,1,1\n' >far.csv
-expect 5 'point 0 .*outside of the box' sdmgen generate $model --points far.csv -o x.csv
+printf 'x,y,z\n0,0,0\n\n90,1,1\n' >far.csv
+expect 5 'far\.csv:4: point 2 of 2 \(90, 1, 1\) mm lies outside of the box' sdmgen generate $model --points far.csv -o x.csv
 expect 2 'distance and gradient only' sdmgen generate $model --points points.csv --columns triangle -o x.csv
 expect 2 'do not apply' sdmgen generate $model --points points.csv --spacing 0.45 -o x.csv
 expect 2 'an output is needed' sdmgen generate $model --points points.csv

@@ -92,7 +92,7 @@ has '^ellipsoid fitted to ct.nii.gz$'
 has 'rx +3\.[0-9]+ \+- 0\.0'
 has 'reference: Dice 0.9'
 has 'converged after'
-has 'voxels of the maps, 0.35 mm, are coarse.*; a fit with --spacing 0.1[0-9]* has'
+has '^  map voxels   doubtful  0.35, limit 0.1.*coarse beside the point spread of the image: .*with voxels of 0.1[0-9]* mm \(--exact --spacing\)'
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --blur 0.3 --keep blur
 has 'point spread 0.3 mm'
 ! grep -q 'are coarse' out || bad 'maps of 0.35 mm are fine beside a point spread of 0.3 mm'
@@ -135,7 +135,7 @@ voxels=$(($(wc -c <label.nii) - 352))
     tail -c +$((353 + voxels / 2)) label.nii | tr '\001' '\002'
 } >two.nii
 for labels in '--label 1 --label 77' '--label 77 --label 1'; do
-    expect 3 "two.nii: no voxel has the label '77'" sdmgen fit $fit two.nii $labels
+    expect 3 "two.nii: no voxel has the label '77'; its labels are 1 2$" sdmgen fit $fit two.nii $labels
 done
 expect 0 - sdmgen fit $fit two.nii --label 1 --label 2 --rotation 0,0,0 --spacing 0.5 --json
 near "$(param rx)" "$rx" 0.001

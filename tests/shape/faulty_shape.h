@@ -17,7 +17,7 @@ static const sdm_param FAULTY_PARAMS[] = {{"size", "mm", 1, 3, 2.5, "edge of the
 static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
-     "exit|trained",
+     "exit|trained|metres",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -77,6 +77,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         static const uint32_t OTHER[6] = {0, 2, 1, 1, 2, 3};
         memcpy(out->tri, OTHER, sizeof OTHER);
     }
+    for (size_t i = 0; i < 24 * boxes && !strcmp(fault, "metres"); i++) out->vert[i] /= 1000;
     return 0;
 }
 

@@ -6,6 +6,7 @@
 #include "cohort/cohort.h"
 #include "commands.h"
 #include "fit/fit_command.h"
+#include "page/page.h"
 #include "report/json_values.h"
 #include "report/progress_bar.h"
 #include "report/terminal.h"
@@ -79,7 +80,10 @@ static sdm_status check_arguments(cli_fit *f, sdm_error *err)
                         "fit: a MODEL and an IMAGE are needed, or --shape NAME and an IMAGE");
     f->model_path = with_model ? args->files.items[0] : NULL;
     f->path = args->files.items[with_model];
-    return cli_fit_check_files(args, err);
+    if (args->report && !with_model)
+        return sdm_fail(err, SDM_E_ARG, "fit: --report needs a MODEL: a page runs its network");
+    const sdm_status s = cli_page_check_option(args, err);
+    return s ? s : cli_fit_check_files(args, err);
 }
 
 /* Runs the fit. Returns SDM_OK also for a fit that is not trustworthy (f->doubt): its result is
@@ -144,6 +148,15 @@ static sdm_status write_json(const cli_fit *f, const char *path, sdm_error *err)
     return s;
 }
 
+static sdm_status write_page(const cli_fit *f, sdm_error *err)
+{
+    sdm_json json = {0};
+    cli_fit_json(f, &json);
+    const sdm_status s = cli_page_report_fit(f->args, &json, f->args->report, err);
+    sdm_json_dispose(&json);
+    return s;
+}
+
 /* Prints the result and writes the files; if the fit is not trustworthy, fails with the reason. */
 static sdm_status show_result(cli_fit *f, const char *json, sdm_error *err)
 {
@@ -157,6 +170,7 @@ static sdm_status show_result(cli_fit *f, const char *json, sdm_error *err)
         if (!s) s = cli_fit_compare(f, err);
         if (!s && write) s = cli_fit_write_files(f, err);
         if (!s) s = write_json(f, json, err);
+        if (!s && f->args->report) s = write_page(f, err);
         if (!s) s = print_result(f, err);
         if (!s) s = cli_fit_write_results(f, err);
         if (!s) s = measured;

@@ -61,12 +61,16 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "exact engine: errors of the distance, overlap of the volumes inside (Dice), distances\n"
      "between the zero surfaces, and the time per map on one core.",
      "sdmgen eval runs/cochlea/model.sdm --samples 100 --json", 1, 1},
-    {"report", "MODEL | RUN -o FILE.html", "make a page with the model, for a browser",
+    {"report", "MODEL | RUN | FIT.json -o FILE.html",
+     "make a page of a model or of a fit, for a browser",
      "Writes one HTML file that needs no network and no other file. It holds the model and\n"
      "the runtime as WebAssembly: a slider for each parameter, the surface, three slices,\n"
      "volume and area, which follow at once; the errors of the network; and, of the folder of\n"
      "a run, plots of its training. Beyond the trained range the exact engine computes the\n"
-     "map, if the shape is a built-in one without data files.",
+     "map, if the shape is a built-in one without data files. FIT.json (of `sdmgen fit`):\n"
+     "the image with the contour of the fit and its standard deviation, the verdict, and\n"
+     "what the image does not determine; model and image are read from where the fit found\n"
+     "them, or from the folder of the file.",
      "sdmgen report runs/cochlea -o cochlea.html", 1, 1},
     {"shapes", "[NAME] | new NAME | check NAME|CONFIG",
      "list the shapes, describe one, begin a new one, or check one",
@@ -267,7 +271,8 @@ const cli_option cli_options[] = {
 
     /* the output */
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(outputs),
-     "output: .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl .obj .off .vtk .vtp .png .svg .pdf; may "
+     "output: .vdb .nii .nii.gz .nrrd .seg.nrrd (the inside as a segment of 3D Slicer) .mha .npy "
+     ".ply .stl .obj .off .vtk .vtp .png .svg .pdf; may "
      "be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_PHANTOM), AT(outputs),
      "the image: .nii .nii.gz .nrrd .mha .npy; may be repeated"},
@@ -285,7 +290,9 @@ const cli_option cli_options[] = {
      "check: a picture of nine shapes: .png .svg .pdf; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_REPORT), AT(outputs), "the page: .html"},
     {"no-model", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_REPORT), AT(no_model),
-     "leave out the model and the runtime: pictures at the default parameters alone"},
+     "leave out the model and the runtime: pictures alone"},
+    {"report", 0, CLI_TEXT, "FILE.html", NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_FIT), AT(report),
+     "also write a page of the result for a browser (see `sdmgen report`)"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_IMPORT), AT(outputs), "output: .ssm"},
     {"modes", 0, CLI_INT, "N", NULL, 1, 1048576, ON(CLI_IMPORT), AT(import.modes),
      "keep the first N modes (default: all, at most 64)"},
@@ -412,7 +419,8 @@ const cli_option cli_options[] = {
     {"type", 0, CLI_CHOICE, NULL, "int16|float32", 0, 0, ON(CLI_PHANTOM), AT(phantom.type),
      "type of the voxels: int16, rounded to whole HU (default), or float32; .npy is float32"},
     {"label", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.label),
-     "also write the labels, 1 inside and 0 outside: .nii .nii.gz .nrrd .mha"},
+     "also write the labels, 1 inside and 0 outside: .nii .nii.gz .nrrd .seg.nrrd "
+     ".mha"},
     {"truth", 0, CLI_TEXT, "FILE.json", NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.truth),
      "also write the truth: shape, parameters, pose, grid and the settings of the image"},
 
@@ -520,7 +528,7 @@ const cli_option cli_options[] = {
      "union"},
     {"label-out", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(fit.label_out),
      "also write the fitted shape as labels on the grid of the image, 1 inside and 0 outside: .nii "
-     ".nii.gz .nrrd .mha"},
+     ".nii.gz .nrrd .seg.nrrd .mha"},
 
     {"measure", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(measure),
      "print the measures of the shape: its own (sdmgen shapes NAME lists them), volume, area and "

@@ -155,6 +155,7 @@ struct cli_args {
     double narrow;                   /* exact: voxels; 0: option missing */
     double tolerance;                /* exact: mm; 0: option missing */
     bool no_model;                   /* report */
+    const char *report;              /* train, fit: file of a page */
     bool dump;                       /* config */
     bool keys;                       /* config, experiment */
     bool markdown;                   /* config, experiment, help */

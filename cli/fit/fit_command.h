@@ -173,6 +173,10 @@ sdm_status cli_fit_write_files(const cli_fit *f, sdm_error *err);
  * reference where --reference gives one. */
 sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *err);
 
+/* values[g] at a point of the world, by trilinear interpolation; voxels outside of the grid count
+ * as 0. */
+double cli_fit_interpolate(const sdm_grid *g, const float *values, const double world[3]);
+
 /* Prints the result as text on stdout. */
 void cli_fit_print(const cli_fit *f);
 

@@ -75,10 +75,10 @@ static sdm_status write_labels(const cli_fit *f, const sdm_grid *g, const float 
     const size_t n = sdm_grid_count(g);
     uint8_t *labels = NULL;
     char text[120];
+    snprintf(text, sizeof text, "sdmgen %s: %s, fitted", SDM_VERSION_TEXT, f->shape_name);
     sdm_status s = SDM_ALLOC(&labels, n, "labels", err);
     for (size_t i = 0; i < n && !s; i++) labels[i] = values[i] < 0;
-    snprintf(text, sizeof text, "sdmgen %s: %s, fitted", SDM_VERSION_TEXT, f->shape_name);
-    if (!s) s = sdm_volume_write(f->args->fit.label_out, g, labels, SDM_VOXEL_UINT8, text, err);
+    if (!s) s = cli_write_labels(f->args->fit.label_out, g, labels, f->shape_name, text, err);
     sdm_free(labels);
     return s;
 }

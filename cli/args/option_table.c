@@ -517,6 +517,13 @@ const cli_option cli_options[] = {
     /* all commands */
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
      "load shapes from a shared object; may be repeated"},
+    {"isolate", 0, CLI_FLAG, NULL, NULL, 0, 0, WITH_SHAPES, AT(isolate),
+     "run the callbacks of plug-ins in processes of their own: one that crashes, hangs, exits or "
+     "takes all memory is an error with its name; results have the same bits"},
+    {"isolate-seconds", 0, CLI_REAL, "S", NULL, 0.01, 1e6, WITH_SHAPES, AT(isolate_seconds),
+     "with --isolate: longest time of a call, by the clock (default 10)"},
+    {"isolate-memory", 0, CLI_REAL, "GB", NULL, 0.05, 1e6, WITH_SHAPES, AT(isolate_memory),
+     "with --isolate: memory of a plug-in in each of its processes (default 2)"},
     {"expect", 0, CLI_TEXT, "SHA256", NULL, 0, 0, WITH_MODELS, AT(expect),
      "refuse a model file with another SHA-256 than this (sdmgen info prints it)"},
     {"max-memory", 0, CLI_REAL, "GB", NULL, 0.1, 1e6, ALL & ~ON(CLI_HELP), AT(max_memory),

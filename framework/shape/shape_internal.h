@@ -33,6 +33,13 @@ const char *sdm_registry_kept(const sdm_registry *r, size_t index);
 /* registry.c: adds a message to those of sdm_registry_skipped(). SDM_E_NOMEM. */
 sdm_status sdm_registry_skip(sdm_registry *r, const char *message, sdm_error *err);
 
+/* registry.c: how plug-ins are isolated; NULL: they run in this process. */
+const struct sdm_isolation *sdm_registry_isolation(const sdm_registry *r);
+
+/* registry.c: plug-ins that are loaded from now on are isolated as *how says. SDM_E_NOMEM. */
+sdm_status sdm_registry_set_isolation(sdm_registry *r, const struct sdm_isolation *how,
+                                      sdm_error *err);
+
 /* options.c: converts the given texts to values[shape->n_options]; the texts of the values are
  * stored in the new block *text, which the caller frees with sdm_free(). SDM_E_ARG, SDM_E_CONFIG,
  * SDM_E_NOMEM. */
@@ -45,6 +52,7 @@ sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text 
  * blocks of the call. */
 typedef struct host_call {
     sdm_host host;
+    const sdm_shape *shape; /* in create(): the table as the instance has it */
     sdm_mesh *mesh;
     bool files;
     struct host_block *blocks;
@@ -65,6 +73,10 @@ sdm_status sdm_host_call_failed(const host_call *c, const char *callback, int re
 void sdm_callback_begin(const sdm_instance *s, const char *function, const double *p);
 void sdm_callback_end(void);
 
+/* callback.c: from now on place[size] holds the name of the callback that the process is in, "" for
+ * none; for processes with one thread that calls. */
+void sdm_callback_show(char *place, size_t size);
+
 /* velocity.c: sdm_instance_velocity() by differences of meshes, whatever callbacks the shape has.
  */
 sdm_status sdm_velocity_by_differences(const sdm_instance *s, const double *p, size_t n_vert,
@@ -79,6 +91,14 @@ struct sdm_instance {
     sdm_option_value *options;
     char *text;
 };
+
+/* instance.c: makes an instance with the values options[shape->n_options], whose texts are in the
+ * block `text`. Takes both, also after an error. Errors of sdm_instance_create(). */
+sdm_status sdm_instance_start(const sdm_shape *shape, sdm_option_value *options, char *text,
+                              sdm_instance **out, sdm_error *err);
+
+/* instance.c: SDM_E_PLUGIN: `out` is not what reserve() has given to mesh(). */
+sdm_status sdm_mesh_out_check(const sdm_mesh_out *out, const sdm_mesh_out *given, sdm_error *err);
 
 /* instance.c: inserts "shape 'NAME' at a=4.4 alpha=0.5 ...: " before the text of *err and returns
  * `status`. */

@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -17,7 +18,7 @@ static const sdm_param FAULTY_PARAMS[] = {{"size", "mm", 1, 3, 2.5, "edge of the
 static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
-     "exit|trained",
+     "exit|trained|hang|flood|heap|beyond|before|print|write",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -35,6 +36,35 @@ static inline void faulty_box(sdm_mesh_out *out, size_t box, const double low[3]
     }
 }
 
+/* Faults that a process of its own keeps from the program. */
+static inline void faulty_process(const char *fault)
+{
+    if (!strcmp(fault, "crash")) raise(SIGSEGV);
+    if (!strcmp(fault, "abort")) abort();
+    if (!strcmp(fault, "exit")) exit(0);
+    if (!strcmp(fault, "print")) puts("a line for the user");
+    while (!strcmp(fault, "hang")) pause();
+    while (!strcmp(fault, "flood")) {
+        char *volatile block = (char *)malloc(1 << 20);
+        memset(block, 1, 1 << 20);
+    }
+    if (!strcmp(fault, "heap")) {
+        char *volatile block = (char *)malloc(24);
+        volatile char *byte = block;
+        for (int i = -8; i < 0; i++) byte[i] = -1; // where malloc() keeps the size
+        free(block);
+    }
+}
+
+/* Faults with the arrays of the host. */
+static inline void faulty_arrays(const char *fault, const double *p, sdm_mesh_out *out)
+{
+    double *volatile vert = out->vert;
+    if (!strcmp(fault, "beyond")) vert[3 * out->n_vert + 2] = 1;
+    if (!strcmp(fault, "before")) vert[-1] = 1;
+    if (!strcmp(fault, "write")) *(double *)p = 1;
+}
+
 static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                        const double *p, sdm_mesh_out *out)
 {
@@ -46,9 +76,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "fail") && is_large) return (host->fail)(host, "too large");
     if (!strcmp(fault, "trained") && !access("trained/model.sdm", F_OK))
         return (host->fail)(host, "a model is there");
-    if (!strcmp(fault, "crash") && is_large) raise(SIGSEGV);
-    if (!strcmp(fault, "abort") && is_large) abort();
-    if (!strcmp(fault, "exit") && is_large) exit(0);
+    if (is_large) faulty_process(fault);
     const size_t boxes = !strcmp(fault, "sizes") && is_large ? 3 : 2;
     const size_t less = !strcmp(fault, "open");
     const int failed = host->reserve(host, out, 8 * boxes, 12 * boxes - less);
@@ -77,6 +105,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         static const uint32_t OTHER[6] = {0, 2, 1, 1, 2, 3};
         memcpy(out->tri, OTHER, sizeof OTHER);
     }
+    if (is_large) faulty_arrays(fault, p, out);
     return 0;
 }
 

@@ -68,8 +68,8 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "a run, plots of its training. Beyond the trained range the exact engine computes the\n"
      "map, if the shape is a built-in one without data files.",
      "sdmgen report runs/cochlea -o cochlea.html", 1, 1},
-    {"shapes", "[NAME] | new NAME | check NAME|CONFIG",
-     "list the shapes, describe one, begin a new one, or check one",
+    {"shapes", "[NAME] | new NAME | check NAME|CONFIG | test NAME|PLUGIN",
+     "list the shapes, describe one, begin a new one, check or test one",
      "Without NAME: lists the shapes. NAME: prints the parameters and options of one.\n"
      "new NAME: writes the folder NAME (or that of --out) with a shape of this name as a\n"
      "plug-in: C source, CMakeLists.txt, a configuration and tests. It builds and passes its\n"
@@ -78,7 +78,11 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "and trainings: broken meshes, parts that are inside out, vertices that jump, numbers of\n"
      "vertices that change, a grid that cuts the shapes (with a CONFIG, whose key=value\n"
      "overrides may follow), wrong velocities, results that differ from call to call. -o FILE\n"
-     "draws nine shapes. Exit code 3: meshes are broken; 4: maps or trainings suffer.",
+     "draws nine shapes. Exit code 3: meshes are broken; 4: maps or trainings suffer.\n"
+     "test: tests whether a shape keeps the contract of sdm/shape.h, a plug-in isolated as by\n"
+     "--isolate: valid, closed and oriented meshes, the same triangles, no jumps, velocities,\n"
+     "the same bits from call to call and from many threads, parameters outside the ranges,\n"
+     "options. One line for each test; exit codes as for check.",
      "sdmgen shapes check cochlea -o cochlea.png", 0, SIZE_MAX},
     {"info", "FILE", "describe the content of a model, level set, image, mesh file or shape model",
      NULL, "sdmgen info runs/cochlea/model.sdm", 1, 1},
@@ -331,7 +335,7 @@ const cli_option cli_options[] = {
     {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_VERIFY), AT(samples),
      "number of random shapes (default 20)"},
     {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_SHAPES), AT(samples),
-     "check: number of random shapes (default 128)"},
+     "check, test: number of random shapes (default 128; test: 64)"},
     {"naive", 0, CLI_INT, "N", NULL, 0, 1000, ON(CLI_EVAL), AT(naive),
      "number of shapes on which the naive method is timed (default 2; 0: none)"},
     {"max-mse", 0, CLI_REAL, "MM2", NULL, 0, 1e12, ON(CLI_EVAL), AT(max_mse),

@@ -206,9 +206,15 @@ static sdm_status mesh_check(const sdm_mesh *m, const sdm_mesh_out *out, sdm_err
 
 sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *out, sdm_error *err)
 {
-    sdm_status status = sdm_instance_check(s, p, err);
+    const sdm_status status = sdm_instance_check(s, p, err);
     if (status) return status;
     if (!out) return sdm_fail(err, SDM_E_ARG, "the address of the mesh must not be NULL");
+    return sdm_instance_mesh_anywhere(s, p, out, err);
+}
+
+sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sdm_mesh *out,
+                                      sdm_error *err)
+{
     out->n_vert = out->n_tri = 0;
     sdm_mesh_out filled = {0};
     host_call call;
@@ -216,8 +222,9 @@ sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *o
     sdm_callback_begin(s, "mesh", p);
     const int failed = s->shape->mesh(s->self, &call.host, s->options, p, &filled);
     sdm_callback_end();
-    status = failed ? sdm_host_call_failed(&call, "mesh", failed, SDM_E_PLUGIN, err)
-                    : mesh_check(out, &filled, err);
+    const sdm_status status = failed
+                                  ? sdm_host_call_failed(&call, "mesh", failed, SDM_E_PLUGIN, err)
+                                  : mesh_check(out, &filled, err);
     sdm_host_call_end(&call);
     if (!status) return SDM_OK;
     out->n_vert = out->n_tri = 0;

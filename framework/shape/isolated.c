@@ -45,7 +45,8 @@ typedef struct pool {
     sdm_distribution *distributions;
     pthread_mutex_t lock; // of the members below
     isolated_worker *idle;
-    int late; // calls that did not end in time
+    int late;    // calls that did not end in time
+    size_t ends; // calls that ended a worker
 } pool;
 
 /* What the callbacks of an instance get: they may not change it, but take workers from the pool. */
@@ -70,9 +71,10 @@ static sdm_status ask(pool *at, isolated_worker *w, const isolated_request *q, c
                       isolated_answer *a, isolated_bytes *said, sdm_error *err)
 {
     const sdm_status s = sdm_worker_ask(w, q, text, a, said, err);
-    if (w->late) {
+    if (w->ended) {
         pthread_mutex_lock(&at->lock);
-        at->late++;
+        at->late += w->late;
+        at->ends++;
         pthread_mutex_unlock(&at->lock);
     }
     if (!w->ended) tell(at->shape->plugin, w);
@@ -210,7 +212,8 @@ static void distributions(const void *self, sdm_distribution *out)
     memcpy(out, at->distributions, at->n_params * sizeof *out);
 }
 
-/* The callbacks destroy() of the workers run, too; a failure there is told, as it can hurt nobody. */
+/* The callbacks destroy() of the workers run, too; a failure there is told, as it can hurt nobody.
+ */
 static void destroy(void *self)
 {
     pool *at = pool_of(self);
@@ -311,6 +314,37 @@ static const sdm_shape CALLBACKS = {.abi = SDM_SHAPE_ABI,
                                     .velocity = velocity,
                                     .distance = distance,
                                     .distributions = distributions};
+
+bool sdm_is_isolated(const sdm_instance *s) { return s->shape->mesh == mesh; }
+
+size_t sdm_isolated_ends(const sdm_instance *s)
+{
+    pool *at = pool_of(s->self);
+    pthread_mutex_lock(&at->lock);
+    const size_t ends = at->ends;
+    pthread_mutex_unlock(&at->lock);
+    return ends;
+}
+
+sdm_status sdm_isolated_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
+                               size_t *unlike, size_t *first, sdm_error *err)
+{
+    pool *at = pool_of(s->self);
+    isolated_worker *w = NULL;
+    isolated_bytes text = {0};
+    isolated_answer a = {0};
+    sdm_bytes_put_count(&text, (size_t)n_threads);
+    sdm_bytes_put_reals(&text, p, n * s->n_params);
+    const isolated_request q = {.task = ISOLATED_REPEAT, .length = (uint32_t)text.size};
+    sdm_status status =
+        text.failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for parameters") : take(at, &w, err);
+    if (!status) status = ask(at, w, &q, text.data, &a, NULL, err);
+    if (w) give_back(at, w);
+    sdm_free(text.data);
+    *unlike = (size_t)a.n_vert;
+    *first = (size_t)a.n_tri;
+    return status;
+}
 
 /* ---- plug-ins ---- */
 

@@ -19,6 +19,8 @@ typedef enum isolated_task {
     ISOLATED_MESH,     /* at p; n_vert, n_tri: what there is in the memory */
     ISOLATED_VELOCITY, /* at p, for n_vert vertices: n_vert * n_params * 3 numbers */
     ISOLATED_DISTANCE, /* at p and x */
+    ISOLATED_REPEAT,   /* text: number of threads and parameter vectors; answers with the number of
+                          meshes with other bits and the first of them */
     ISOLATED_DESTROY
 } isolated_task;
 
@@ -32,9 +34,9 @@ typedef struct isolated_request {
 } isolated_request;
 
 typedef struct isolated_answer {
-    sdm_status status; /* not SDM_OK: the text is the message */
-    uint32_t length;   /* bytes of text */
-    uint64_t n_vert, n_tri;
+    sdm_status status;      /* not SDM_OK: the text is the message */
+    uint32_t length;        /* bytes of text */
+    uint64_t n_vert, n_tri; /* MESH; REPEAT: how many, and the first */
     double distance;
 } isolated_answer;
 
@@ -60,6 +62,7 @@ void sdm_bytes_put_distributions(isolated_bytes *b, const sdm_distribution *d, s
 void sdm_bytes_put_options(isolated_bytes *b, const sdm_option_value *options, size_t n);
 void sdm_bytes_put_shape(isolated_bytes *b, const sdm_shape *shape);
 void sdm_bytes_put_count(isolated_bytes *b, size_t n);
+void sdm_bytes_put_reals(isolated_bytes *b, const double *x, size_t n);
 
 /* Texts that are read point into b->data; the arrays are new and freed with sdm_free(). b->failed:
  * these are not bytes that were put. */
@@ -67,6 +70,9 @@ size_t sdm_bytes_get_count(isolated_bytes *b, size_t most);
 sdm_param *sdm_bytes_get_params(isolated_bytes *b, uint32_t *n);
 sdm_distribution *sdm_bytes_get_distributions(isolated_bytes *b, size_t n);
 sdm_option_value *sdm_bytes_get_options(isolated_bytes *b, size_t n);
+
+/* A new array of the rest. */
+double *sdm_bytes_get_reals(isolated_bytes *b, size_t *n);
 
 /* Reads a table: its callbacks are those of `callbacks`, as far as the shape that was put has them;
  * params and options are new arrays. */
@@ -105,8 +111,8 @@ struct isolated_worker {
 };
 
 /* Starts a process that has loaded the plug-in `path`; *tables: what it has, freed with
- * sdm_free(tables->data). `how` and `path` stay valid as long as the worker. SDM_E_PLUGIN, SDM_E_IO:
- * no process, SDM_E_NOMEM. */
+ * sdm_free(tables->data). `how` and `path` stay valid as long as the worker. SDM_E_PLUGIN,
+ * SDM_E_IO: no process, SDM_E_NOMEM. */
 sdm_status sdm_worker_start(const sdm_isolation *how, const char *path, isolated_worker **out,
                             isolated_bytes *tables, sdm_error *err);
 
@@ -119,7 +125,8 @@ void sdm_worker_free(isolated_worker *w);
 sdm_status sdm_worker_ask(isolated_worker *w, const isolated_request *q, const void *text,
                           isolated_answer *a, isolated_bytes *said, sdm_error *err);
 
-/* The numbers and indices of an answer in the memory of the worker. SDM_E_PLUGIN: there are less. */
+/* The numbers and indices of an answer in the memory of the worker. SDM_E_PLUGIN: there are less.
+ */
 sdm_status sdm_worker_data(isolated_worker *w, size_t n_real, size_t n_index, const double **real,
                            const uint32_t **index, sdm_error *err);
 

@@ -25,6 +25,8 @@ void sdm_bytes_put_count(isolated_bytes *b, size_t n)
     put(b, &count, sizeof count);
 }
 
+void sdm_bytes_put_reals(isolated_bytes *b, const double *x, size_t n) { put(b, x, n * sizeof *x); }
+
 static void put_real(isolated_bytes *b, double x) { put(b, &x, sizeof x); }
 
 /* A NULL is told from an empty text. */
@@ -114,6 +116,15 @@ static double get_real(isolated_bytes *b)
 {
     double x;
     get(b, &x, sizeof x);
+    return x;
+}
+
+double *sdm_bytes_get_reals(isolated_bytes *b, size_t *n)
+{
+    double *x = NULL;
+    *n = (b->size - b->at) / sizeof *x;
+    b->failed = b->failed || SDM_ALLOC(&x, *n, "numbers", NULL);
+    if (!b->failed) get(b, x, *n * sizeof *x);
     return x;
 }
 

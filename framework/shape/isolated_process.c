@@ -21,6 +21,9 @@
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
 
+/* A process starts within this time also on a busy machine, s. */
+#define START_SECONDS 30
+
 /* ---- start and end ---- */
 
 /* The child's ends of what it shares with the program; -1: not open. */
@@ -40,11 +43,10 @@ static sdm_status open_ends(isolated_worker *w, child_ends *child, sdm_error *er
 {
     int sockets[2] = {-1, -1}, pipe_ends[2] = {-1, -1};
     w->memory = memfd_create("sdmgen shape", MFD_CLOEXEC | MFD_ALLOW_SEALING);
-    const bool failed =
-        w->memory < 0 || fcntl(w->memory, F_ADD_SEALS, F_SEAL_SHRINK) ||
-        ftruncate(w->memory, (off_t)sdm_isolated_layout(0, 0).size) ||
-        socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets) ||
-        pipe2(pipe_ends, O_CLOEXEC | O_NONBLOCK);
+    const bool failed = w->memory < 0 || fcntl(w->memory, F_ADD_SEALS, F_SEAL_SHRINK) ||
+                        ftruncate(w->memory, (off_t)sdm_isolated_layout(0, 0).size) ||
+                        socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets) ||
+                        pipe2(pipe_ends, O_CLOEXEC | O_NONBLOCK);
     const int reason = errno;
     w->socket = sockets[0];
     w->output = pipe_ends[0];
@@ -57,7 +59,6 @@ static sdm_status open_ends(isolated_worker *w, child_ends *child, sdm_error *er
 /* The descriptors keep their numbers, which the program gets as arguments. */
 static int spawn(isolated_worker *w, const child_ends *child)
 {
-    extern char **environ;
     char name[] = "sdmgen", command[] = SDM_ISOLATION_COMMAND, socket_text[16], memory_text[16];
     char *argv[] = {name, command, socket_text, memory_text, NULL};
     snprintf(socket_text, sizeof socket_text, "%d", child->socket);
@@ -235,8 +236,9 @@ static sdm_status explain(isolated_worker *w, isolated_task task, sdm_error *err
     const bool inside = state.running[0];
     last_words(w, words, sizeof words);
     if (late)
-        snprintf(reason, sizeof reason, "the plug-in did not come to an end within %s s",
-                 sdm_format_real(w->how->seconds, number));
+        snprintf(
+            reason, sizeof reason, "the plug-in did not come to an end within %s s",
+            sdm_format_real(w->how->seconds + (task == ISOLATED_LOAD ? START_SECONDS : 0), number));
     else if (WIFSIGNALED(status) && state.memory > w->how->bytes / 8 * 7)
         snprintf(reason, sizeof reason, "the plug-in needs more than %s GB of memory",
                  sdm_format_real((double)w->how->bytes / 1e9, number));
@@ -276,7 +278,7 @@ sdm_status sdm_worker_ask(isolated_worker *w, const isolated_request *q, const v
 {
     bool complete = false;
     sdm_status s = SDM_OK;
-    w->deadline = sdm_clock() + w->how->seconds;
+    w->deadline = sdm_clock() + w->how->seconds + (q->task == ISOLATED_LOAD ? START_SECONDS : 0);
     w->late = false;
     w->said[0] = '\0';
     if (sdm_socket_send(w->socket, q, sizeof *q) && sdm_socket_send(w->socket, text, q->length))

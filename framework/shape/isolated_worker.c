@@ -24,7 +24,7 @@
 #endif
 
 #define ARRAY_MAX ((size_t)1 << 31) // vertices, triangles
-#define UNUSED 0xA5 // the bytes around the arrays that a callback gets
+#define UNUSED 0xA5                 // the bytes around the arrays that a callback gets
 
 typedef struct worker {
     int socket, memory;
@@ -215,6 +215,9 @@ static int reserve(const sdm_host *host, sdm_mesh_out *out, size_t n_vert, size_
                               .tri = indices_of(c->worker),
                               .n_vert = n_vert,
                               .n_tri = n_tri};
+    // what the callback does not write is found
+    memset(c->given.vert, 0xFF, 3 * n_vert * sizeof *c->given.vert);
+    memset(c->given.tri, 0xFF, 3 * n_tri * sizeof *c->given.tri);
     *out = c->given;
     return 0;
 }
@@ -238,9 +241,8 @@ static sdm_status make_mesh(worker *w, const isolated_request *q, isolated_answe
     sdm_host_call_begin(&c.call, NULL, false);
     c.call.host.reserve = reserve;
     const int failed = s->shape->mesh(s->self, &c.call.host, s->options, p, &filled);
-    sdm_status status =
-        failed ? sdm_host_call_failed(&c.call, "mesh", failed, SDM_E_PLUGIN, err)
-               : sdm_mesh_out_check(&filled, &c.given, err);
+    sdm_status status = failed ? sdm_host_call_failed(&c.call, "mesh", failed, SDM_E_PLUGIN, err)
+                               : sdm_mesh_out_check(&filled, &c.given, err);
     if (!status) status = check_params(w, p, q->p, err);
     if (!status) status = check_around(w, err);
     sdm_host_call_end(&c.call);
@@ -258,8 +260,8 @@ static sdm_status make_velocity(worker *w, const isolated_request *q, sdm_error 
     if (q->n_vert > ARRAY_MAX || !lay_out(w, 3 * (size_t)q->n_vert * s->n_params, 0))
         return sdm_fail(err, SDM_E_PLUGIN, "velocity(): there is no memory for it");
     sdm_host_call_begin(&call, NULL, false);
-    const int failed = s->shape->velocity(s->self, &call.host, s->options, p, (size_t)q->n_vert,
-                                          reals_of(w));
+    const int failed =
+        s->shape->velocity(s->self, &call.host, s->options, p, (size_t)q->n_vert, reals_of(w));
     sdm_status status =
         failed ? sdm_host_call_failed(&call, "velocity", failed, SDM_E_PLUGIN, err) : SDM_OK;
     if (!status) status = check_params(w, p, q->p, err);
@@ -300,8 +302,7 @@ static sdm_status load(worker *w, const isolated_request *q, const char *path,
 
 static sdm_status create(worker *w, isolated_bytes *text, isolated_bytes *answer, sdm_error *err)
 {
-    const sdm_shape *shape =
-        sdm_registry_at(w->registry, sdm_bytes_get_count(text, UINT32_MAX));
+    const sdm_shape *shape = sdm_registry_at(w->registry, sdm_bytes_get_count(text, UINT32_MAX));
     if (!shape || w->instance) return sdm_fail(err, SDM_E_INTERNAL, "a worker has one instance");
     sdm_option_value *options = sdm_bytes_get_options(text, shape->n_options);
     // the instance takes the text, in which those of the options are
@@ -312,6 +313,20 @@ static sdm_status create(worker *w, isolated_bytes *text, isolated_bytes *answer
     sdm_bytes_put_params(answer, w->instance->params, w->instance->n_params);
     sdm_bytes_put_distributions(answer, w->instance->distributions, w->instance->n_params);
     return SDM_OK;
+}
+
+static sdm_status repeat(worker *w, isolated_bytes *text, isolated_answer *a, sdm_error *err)
+{
+    size_t n, unlike = 0, first = 0;
+    const size_t n_threads = sdm_bytes_get_count(text, 1024);
+    double *p = sdm_bytes_get_reals(text, &n);
+    const sdm_status s = text->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for parameters")
+                                      : sdm_shape_repeat(w->instance, p, n / w->instance->n_params,
+                                                         (int)n_threads, &unlike, &first, err);
+    sdm_free(p);
+    a->n_vert = unlike;
+    a->n_tri = first;
+    return s;
 }
 
 static sdm_status destroy(worker *w)
@@ -331,6 +346,7 @@ static sdm_status work(worker *w, const isolated_request *q, isolated_bytes *tex
     if (q->task == ISOLATED_CREATE && w->registry) return create(w, text, answer, err);
     if (!w->instance) return sdm_fail(err, SDM_E_INTERNAL, "a worker without an instance");
     if (q->task == ISOLATED_DESTROY) return destroy(w);
+    if (q->task == ISOLATED_REPEAT) return repeat(w, text, a, err);
     static const char *const names[] = {[ISOLATED_MESH] = "mesh",
                                         [ISOLATED_VELOCITY] = "velocity",
                                         [ISOLATED_DISTANCE] = "distance"};

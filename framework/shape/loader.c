@@ -12,9 +12,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "isolated.h"
 #include "sdm/internal/file.h"
 #include "sdm/memory.h"
-#include "isolated.h"
 
 #define FILE_SHAPES_MAX 256
 #define FILE_BYTES_MAX (UINT64_C(1) << 28)

@@ -97,6 +97,28 @@ struct sdm_instance {
 sdm_status sdm_instance_start(const sdm_shape *shape, sdm_option_value *options, char *text,
                               sdm_instance **out, sdm_error *err);
 
+/* instance.c: sdm_instance_mesh() without a check of the parameters, which a shape need not bear.
+ */
+sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sdm_mesh *out,
+                                      sdm_error *err);
+
+/* shape_repeat.c: makes the meshes at p[n][n_params] one after the other, then again: backwards for
+ * one thread, else all at once on n_threads for a quarter of a second. *unlike: how many of the n
+ * had other bits; *first: the first of them. Runs in one worker process if the shape is isolated.
+ * SDM_E_PLUGIN: a mesh cannot be made. */
+sdm_status sdm_shape_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
+                            size_t *unlike, size_t *first, sdm_error *err);
+
+/* isolated.c: the callbacks of the shape run in worker processes. */
+bool sdm_is_isolated(const sdm_instance *s);
+
+/* isolated.c: how many calls have ended a worker of an isolated shape. */
+size_t sdm_isolated_ends(const sdm_instance *s);
+
+/* isolated.c: sdm_shape_repeat() in a worker of an isolated shape. */
+sdm_status sdm_isolated_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
+                               size_t *unlike, size_t *first, sdm_error *err);
+
 /* instance.c: SDM_E_PLUGIN: `out` is not what reserve() has given to mesh(). */
 sdm_status sdm_mesh_out_check(const sdm_mesh_out *out, const sdm_mesh_out *given, sdm_error *err);
 

@@ -4,15 +4,15 @@
 plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
 isolated=(--plugin "$plugin" --isolate)
 
-# fault FAULT REASON: the fault of mesh() is named with plug-in, callback and parameters
+# fault FAULT REASON [SECONDS]: the fault of mesh() is named with plug-in, callback and parameters
 fault() {
     expect 3 "error: shape 'faulty' at size=2.5 reach=1.5: $2" \
-        sdmgen exact --shape faulty -O fault="$1" "${isolated[@]}" --isolate-seconds 2 --isolate-memory 0.2 -o ended.nrrd
+        sdmgen exact --shape faulty -O fault="$1" "${isolated[@]}" --isolate-seconds "${3:-60}" --isolate-memory 0.2 -o ended.nrrd
     expect 0 - sdmgen exact --shape faulty -O fault="$1" -p size=1.5 --size 8,8,8 "${isolated[@]}" -q -o fine.nrrd
 }
 fault crash '.*/faulty\.so: mesh\(\): the plug-in used memory that is not its own'
 fault exit '.*/faulty\.so: mesh\(\): the plug-in called exit\(0\)'
-fault hang '.*/faulty\.so: mesh\(\): the plug-in did not come to an end within 2 s'
+fault hang '.*/faulty\.so: mesh\(\): the plug-in did not come to an end within 1 s' 1
 fault flood '.*/faulty\.so: mesh\(\): the plug-in needs more than 0\.2 GB of memory'
 fault heap '.*/faulty\.so: mesh\(\): the plug-in called abort\(\), or damaged memory'
 absent ended.nrrd

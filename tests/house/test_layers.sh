@@ -45,7 +45,7 @@ check() {
         own("nn", "model")
         own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template")
         own("io", "glb image meshfile npy picture ssm volume")
-        own("shape", "callback isolation registry shape_box shape_survey")
+        own("shape", "callback conformance isolation registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
          own("all", "sdmgen") # the header that includes all public ones

@@ -18,7 +18,8 @@ static const sdm_param FAULTY_PARAMS[] = {{"size", "mm", 1, 3, 2.5, "edge of the
 static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
-     "exit|trained|hang|flood|heap|beyond|before|print|write",
+     "exit|trained|hang|flood|heap|beyond|before|print|write|shared|"
+     "edge",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -72,6 +73,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     (void)self;
     const char *fault = options[0].text;
     const int is_large = p[0] > 2;
+    if (!strcmp(fault, "edge") && !(p[0] >= 1 && p[0] <= 3)) abort();
     // in parentheses: cmocka defines a macro fail()
     if (!strcmp(fault, "fail") && is_large) return (host->fail)(host, "too large");
     if (!strcmp(fault, "trained") && !access("trained/model.sdm", F_OK))
@@ -85,7 +87,11 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "jump")) shift = is_large ? 0.125 : 0;
     if (!strcmp(fault, "kink")) shift = fabs(p[0] - 2) / 4;
     if (!strcmp(fault, "unlike")) shift = 1e-6 * ++calls;
-    const double body[2][3] = {{-p[0], -p[0], -p[0]}, {p[0], p[0], p[0]}};
+    static volatile double shared; // for threads that call at once
+    shared = p[0];
+    for (int i = 0; i < 20000 && !strcmp(fault, "shared"); i++) shift += 0 * shared;
+    const double r = !strcmp(fault, "shared") ? shared : p[0];
+    const double body[2][3] = {{-r, -r, -r}, {r, r, r}};
     const double handle[2][3] = {{p[0] - 0.5, -0.25, -0.25 + shift},
                                  {p[0] + p[1], 0.25, 0.25 + shift}};
     if (boxes == 3) {

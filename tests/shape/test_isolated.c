@@ -258,8 +258,7 @@ static void bad_files_and_arguments_are_refused(void **state)
     // a program that is no worker
     how.program = "/bin/false";
     assert_int_equal(sdm_registry_isolate(r, &how, &err), SDM_OK);
-    assert_int_equal(sdm_registry_load(r, PLUGIN_FOLDER "/good/octahedron.so", &err),
-                     SDM_E_PLUGIN);
+    assert_int_equal(sdm_registry_load(r, PLUGIN_FOLDER "/good/octahedron.so", &err), SDM_E_PLUGIN);
     sdm_registry_free(r);
     no_child_is_left();
 }

@@ -1,5 +1,5 @@
-/* Plug-ins in processes of their own: a plug-in that crashes, hangs, exits, floods or damages memory
- * gives an error there, and the program goes on. */
+/* Plug-ins in processes of their own: a plug-in that crashes, hangs, exits, floods or damages
+ * memory gives an error there, and the program goes on. */
 #pragma once
 
 #include "sdm/registry.h"
@@ -13,7 +13,7 @@ typedef struct sdm_isolation {
     /* path of a program that gives its arguments to sdm_isolation_worker() when the first one is
      * SDM_ISOLATION_COMMAND; stays valid as long as the registry */
     const char *program;
-    double seconds; /* longest time of a callback, and of loading the plug-in */
+    double seconds; /* longest time of a callback; loading a plug-in may take 30 s more */
     uint64_t bytes; /* memory of each worker process beyond that of the program */
     /* Called once for each plug-in that prints something; any thread. May be NULL. */
     void (*notice)(const char *text);

@@ -2,6 +2,7 @@
 #include "commands.h"
 #include "inputs/setup.h"
 #include "report/files.h"
+#include "report/terminal.h"
 #include "sdm/internal/model_onnx.h"
 #include "shapes/shape_targets.h"
 
@@ -28,6 +29,9 @@ static sdm_status export_model(const cli_args *args, sdm_error *err)
 {
     sdm_model *m;
     sdm_status s = cli_open_model(args, args->files.items[0], &m, err);
+    if (!s && sdm_model_get_info(m)->fine_width)
+        cli_notice("%s: ONNX holds the map on the grid of the model; its fine level is left out",
+                   args->files.items[0]);
     for (size_t i = 0; i < args->outputs.n && !s; i++)
         s = sdm_model_write_onnx(m, args->outputs.items[i], err);
     sdm_model_free(m);

@@ -93,6 +93,11 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
                        : o->kind == CLI_REAL9 ? "nine numbers"
                                               : "one number or three";
     char low[32], high[32];
+    if (o->max == CLI_TURN)
+        return sdm_fail(err, SDM_E_ARG,
+                        "--%s '%s': need %s in radians, at most a turn of 6.2832 (90 degrees are "
+                        "1.5708)",
+                        o->name, value, form);
     return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s in %s .. %s", o->name, value, form,
                     sdm_format_real(o->min, low), sdm_format_real(o->max, high));
 }

@@ -15,10 +15,18 @@ static size_t structure_length(const char *at)
                : 0;
 }
 
+/* The option of the command line for the grid of a fit's exact maps. */
+static const char GRID[] = "sdm_fit_source.grid", GRID_OPTIONS[] = "--exact --spacing";
+
 void cli_name_options(char *text)
 {
     char *to = text;
     for (const char *at = text; *at;) {
+        if (!strncmp(at, GRID, sizeof GRID - 1)) {
+            at += sizeof GRID - 1;
+            for (const char *o = GRID_OPTIONS; *o;) *to++ = *o++;
+            continue;
+        }
         const size_t skip = structure_length(at);
         if (!skip) {
             *to++ = *at++;

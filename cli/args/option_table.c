@@ -362,7 +362,7 @@ const cli_option cli_options[] = {
      "exact: times for three sizes of the grid and three of the mesh"},
 
     /* phantoms */
-    {"rotation", 0, CLI_REAL3, "X,Y,Z", NULL, -1000, 1000, ON(CLI_PHANTOM) | ON(CLI_FIT),
+    {"rotation", 0, CLI_REAL3, "X,Y,Z", NULL, -CLI_TURN, CLI_TURN, ON(CLI_PHANTOM) | ON(CLI_FIT),
      AT(pose.rotation),
      "rotation of the shape about the origin of its frame: rotation vector, rad (fit: at the "
      "start)"},
@@ -373,7 +373,7 @@ const cli_option cli_options[] = {
      "random rotation and translation up to these values, applied after the given ones"},
     {"random-params", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.random_params),
      "draw the parameters without -p from their distributions"},
-    {"frame", 0, CLI_REAL3, "X,Y,Z", NULL, -1000, 1000, ON(CLI_PHANTOM), AT(phantom.frame),
+    {"frame", 0, CLI_REAL3, "X,Y,Z", NULL, -CLI_TURN, CLI_TURN, ON(CLI_PHANTOM), AT(phantom.frame),
      "rotation of the axes of the image: rotation vector, rad"},
     {"crop", 0, CLI_REAL3, "X,Y,Z", NULL, -0.95, 0.95, ON(CLI_PHANTOM), AT(phantom.crop),
      "end the grid this fraction of the shape's extent before the far end of the shape; negative: "
@@ -464,7 +464,7 @@ const cli_option cli_options[] = {
     {"prior-sd", 0, CLI_REAL, "F", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_sd),
      "standard deviation of the prior of a parameter, in halves of its range or, if its "
      "distribution is normal, in deviations (default 1; 0: no prior)"},
-    {"prior-rotation", 0, CLI_REAL, "RAD", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_rotation),
+    {"prior-rotation", 0, CLI_REAL, "RAD", NULL, 0, CLI_TURN, ON(CLI_FIT), AT(fit.prior_rotation),
      "standard deviation of the prior of the rotation from the start (default 0: no prior)"},
     {"prior-translation", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_translation),
      "standard deviation of the prior of the translation from the start (default 0: no prior)"},

@@ -35,6 +35,9 @@ typedef enum cli_kind {
     CLI_REAL13  /* double[3], comma separated; a single number fills all three */
 } cli_kind;
 
+/* A whole turn, rad: the largest value of an option that is an angle. */
+#define CLI_TURN 6.283185307179586
+
 typedef struct cli_option {
     const char *name; /* without the dashes */
     char letter;      /* short form, 0: none */

@@ -47,71 +47,6 @@ static void print_law(const char *side, const sdm_fit_law *law)
     printf("  %-12s %.4g (sd %.3g)", side, law->mean, law->sd);
 }
 
-/* If the voxels of the maps are larger than this factor times the sd of the point spread, the
- * standard deviations of weakly determined parameters come out too small. */
-#define VOXEL_OVER_SPREAD_MAX 1.5
-
-/* Labels: the same factor times the voxels of the labels. */
-#define VOXEL_OVER_LABEL_MAX 1.5
-
-static void print_spread(const cli_fit *f)
-{
-    const double blur = f->result.blur, voxel = cli_fit_map_voxel(f);
-    printf("  point spread %.3g mm\n", blur);
-    if (f->opts.keep_params || !(voxel > VOXEL_OVER_SPREAD_MAX * blur)) return;
-    printf(
-        "  the voxels of the maps, %.3g mm, are coarse compared with it: standard deviations may "
-        "be too small; a fit with %s--spacing %.2g has finer maps\n",
-        voxel, f->source.model ? "--exact " : "", blur);
-}
-
-/* Shortest gradient of a distance whose details are shown, and largest share of the surface with a
- * shorter one that gives no notice. */
-#define GRADIENT_MIN 0.8
-#define DETAILS_MAX 0.1
-
-/* Share of the surface beside details that the voxels of the maps do not show: there the gradient
- * of the distance, by differences over two voxels, is clearly shorter than 1. */
-static double detail_share(const cli_fit *f)
-{
-    const sdm_grid *g = &f->map_grid;
-    const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]};
-    double all = 0, bent = 0;
-    for (int64_t k = 1; k + 1 < g->n[2]; k++)
-        for (int64_t j = 1; j + 1 < g->n[1]; j++)
-            for (int64_t i = 1; i + 1 < g->n[0]; i++) {
-                const float *d = f->map + k * step[2] + j * step[1] + i;
-                double square = 0;
-                if (fabs((double)*d) > 0.5 * cli_fit_map_voxel(f)) continue;
-                for (int a = 0; a < 3; a++)
-                    square +=
-                        pow(((double)d[step[a]] - (double)d[-step[a]]) / (2 * g->spacing[a]), 2);
-                all++;
-                bent += square < GRADIENT_MIN * GRADIENT_MIN;
-            }
-    return all > 0 ? bent / all : 0;
-}
-
-/* A notice where the voxels of the maps are larger than half of the largest ball in the shape, or
- * than those of the labels, or where they do not show the details of much of the surface. */
-static void print_coarse(const cli_fit *f)
-{
-    const double *h = f->target.grid.spacing, voxel = cli_fit_map_voxel(f);
-    double fine = INFINITY, inside = 0;
-    for (size_t i = 0; i < sdm_grid_count(&f->map_grid); i++)
-        inside = fmin(inside, (double)f->map[i]);
-    const char *beside = "the details of the shape";
-    if (detail_share(f) > DETAILS_MAX) fine = 0.5 * voxel;
-    if (voxel > -0.5 * inside) fine = -0.4 * inside, beside = "the thickness of the shape";
-    if (f->target.kind == SDM_FIT_LABEL &&
-        voxel > VOXEL_OVER_LABEL_MAX * fmax(h[0], fmax(h[1], h[2])) && h[0] < fine)
-        fine = fmin(h[0], fmin(h[1], h[2])), beside = "those of the labels";
-    if (f->opts.keep_params || !isfinite(fine) || !(fine > 0)) return;
-    printf("  the voxels of the maps, %.3g mm, are coarse compared with %s: the estimates are less "
-           "exact than they can be; a fit with %s--spacing %.2g has finer maps\n",
-           voxel, beside, f->source.model ? "--exact " : "", fine);
-}
-
 /* Least share of outliers that is printed. */
 #define OUTLIERS_SHOWN 0.005
 
@@ -127,7 +62,6 @@ static void print_target(const cli_fit *f)
             (double)r->n_used / fmax(r->noise_factor, 1), r->point_sd);
         if (r->outliers >= OUTLIERS_SHOWN) printf(", %.0f %% outliers", 100 * r->outliers);
         printf("\n");
-        print_coarse(f);
         return;
     }
     // voxels
@@ -138,10 +72,7 @@ static void print_target(const cli_fit *f)
     if (!isnan(r->inside_share))
         printf(", %.0f %% of the shape in the image", 100 * r->inside_share);
     printf("\n");
-    if (f->target.kind != SDM_FIT_IMAGE) {
-        print_coarse(f);
-        return;
-    }
+    if (f->target.kind != SDM_FIT_IMAGE) return;
     // values of the tissues
     print_law("inside", &r->appearance.inside[0]);
     printf("\n");
@@ -151,7 +82,7 @@ static void print_target(const cli_fit *f)
         printf(r->appearance.n_outside > 1 ? ", share %.2g\n" : "\n",
                r->appearance.outside[i].weight);
     }
-    if (r->blur > 0) print_spread(f);
+    if (r->blur > 0) printf("  point spread %.3g mm\n", r->blur);
     if (!isnan(r->evidence))
         printf("  evidence     %.4g (log-likelihood relative to an image without the shape)\n",
                r->evidence);

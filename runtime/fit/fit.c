@@ -436,7 +436,7 @@ static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
     return kept ? kept : s;
 }
 
-// computes the covariance, the share of the shape in the image, and the evidence
+// computes the covariance, the share of the shape in the image, and what the image says without it
 static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     sdm_status s = sdm_fit_posterior(p, out, err);
@@ -446,13 +446,6 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         const sdm_status found =
             sdm_fit_shapeless_log_likelihood(p, &out->log_likelihood_without, err);
         if (found) return found;
-        // gain in log-likelihood, as of independent samples, less the cost of the unknowns (Schwarz
-        // 1978)
-        const double factor = fmax(out->noise_factor, 1), n = (double)p->samples.n / factor;
-        const double unknowns =
-            (p->opts->keep_params ? 0 : (double)p->n_params) + (p->opts->keep_pose ? 0 : 6);
-        out->evidence = (p->information.log_likelihood - out->log_likelihood_without) / factor -
-                        0.5 * unknowns * log(n);
     }
     return s;
 }
@@ -491,8 +484,8 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     if (!s) s = start_find(&p, out, err);
     if (!s) s = maximise(&p, out, err);
 
-    // 6. covariance and evidence; 7. report the result, also of a fit that failed with
-    // SDM_E_QUALITY; 8. judge it
+    // 6. covariance; 7. report the result, also of a fit that failed with
+    // SDM_E_QUALITY; 8. judge it, with the evidence
     if (!s) s = assess(&p, out, err);
     if (!s) sdm_fit_accept_small_steps(&p, out);
     if (out->n_params && (!s || s == SDM_E_QUALITY)) report(&p, out);

@@ -72,6 +72,10 @@ assert dims == [["N", size[0]], ["N", *size[1:]]], dims' $name.onnx "$size"
     compare $name 5 $limit
 done
 
+# a fine level is no part of the file, which a notice tells
+expect 0 'pod_fine.sdm: ONNX holds the map on the grid of the model; its fine level is left out' \
+    sdmgen export "$source_folder/tests/golden/pod_fine.sdm" -o fine.onnx
+
 # the same bytes each time
 for name in pod warp; do
     expect 0 - sdmgen export $name/model.sdm -o again.onnx

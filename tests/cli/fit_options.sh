@@ -39,13 +39,17 @@ expect 1 'missing.csv: ' sdmgen fit $shape points.csv --ras --start-points missi
 # a mesh in metres or micrometres
 sed 's/\([0-9.-]\{1,\}\)/\1e-3/g; 1s/.*/x,y,z/' points.csv >metres.csv
 sed 's/\([0-9.-]\{1,\}\)/\1e3/g; 1s/.*/x,y,z/' points.csv >micro.csv
-sdmgen fit $shape metres.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
+sdmgen fit $shape metres.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err && bad 'points in metres are accepted'
 grep -q 'warning: metres.csv: the points measure 0.00[0-9]* mm across, the start shape [0-9.]* mm: are they in m? lengths are mm' err || bad "metres: $(cat err)"
 sdmgen fit $shape micro.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
 grep -q 'are they in um?' err || bad "micrometres: $(cat err)"
 sdmgen fit $shape points.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
 grep -q 'lengths are mm' err && bad "millimetres: $(cat err)"
+# degrees where radians are wanted, and fewer points than unknowns
+expect 2 "--rotation '0,0,90': need three numbers X,Y,Z in radians, .* \(90 degrees are 1.5708\)" sdmgen fit $shape points.csv --rotation 0,0,90
+expect 4 'points.csv: 4 points cannot determine [6-9] unknowns' sdmgen fit $shape points.csv --rotation 0,0,0 --quiet
 # options have the names of the command line
+sdmgen fit $shape image.nii --rotation 0,0,0 --spacing 0.8 --max-iterations 1 --quiet >out 2>err
 grep -q -- '(--max-iterations)' err || bad "no option in: $(cat err)"
-grep -q 'sdm_fit_opts' out err && bad "names of C: $(cat out err)"
+grep -qE 'sdm_fit_(opts|source)' out err && bad "names of C: $(cat out err)"
 finish

@@ -13,9 +13,9 @@ FOLDER = SOURCE / "examples/python"
 @pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.py")))
 def test_example(name, model_file, tmp_path):
     words = [sys.executable, FOLDER / f"{name}.py"]
-    if name == "torch_fit":
+    if name in ("torch_fit", "first_network"):
         pytest.importorskip("torch")
-        words.append(model_file)
+        words.append(model_file if name == "torch_fit" else "0.02")
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
     pictures = list(tmp_path.glob("*.png"))
     if importlib.util.find_spec("matplotlib"):

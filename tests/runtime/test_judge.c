@@ -1,6 +1,6 @@
 /* The verdict of a fit: robust noise, right fits that pass, wrong ones that are refused with a
  * reason, the mirror image.
- * Tests: blob.c judgement.c mirror.c misfit.c noise.c residuals.c */
+ * Tests: blob.c finding.c judgement.c mirror.c misfit.c noise.c residuals.c suffice.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -142,6 +142,24 @@ static void test_right_fits_pass(void **state)
         }
 }
 
+// An image without noise shows the shape beyond doubt.
+static void test_an_image_without_noise_passes(void **state)
+{
+    (void)state;
+    sdm_instance *torus = shape_of("torus");
+    const sdm_grid g = cube(5.5, 0.35);
+    float *v = image_of_shape(torus, &g, 0, false, 5);
+    const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = v};
+    sdm_fit_result r;
+    sdm_error err;
+    (void)fit_of(torus, &t, 0, &r, &err);
+    if (!(r.evidence > 1000)) fail_msg("evidence %g: %s", r.evidence, err.text);
+    assert_int_equal(finding(&r, SDM_FIT_CHECK_NO_SHAPE)->grade, SDM_FIT_PASSED);
+    sdm_fit_dispose(&r);
+    free(v);
+    sdm_instance_free(torus);
+}
+
 static void test_wrong_shapes_are_refused(void **state)
 {
     (void)state;
@@ -255,6 +273,102 @@ static void test_strays_are_refused_if_many(void **state)
     sdm_instance_free(round);
 }
 
+// Fits the ellipsoid to the n given points.
+static sdm_status fit_to(const double *x, size_t n, sdm_fit_result *r, sdm_error *err)
+{
+    sdm_instance *round = shape_of("ellipsoid");
+    const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = x, .n_points = n};
+    const sdm_status s = fit_of(round, &t, 0, r, err);
+    sdm_instance_free(round);
+    return s;
+}
+
+// Fewer points than unknowns are refused; a few more leave doubt, because nothing tests the fit.
+static void test_few_points_are_refused(void **state)
+{
+    (void)state;
+    size_t n;
+    double *x = points_with_strays(SIZE_MAX, &n), few[3 * 24];
+    for (size_t i = 0; i < 24; i++) memcpy(few + 3 * i, x + 3 * (i * n / 24), 3 * sizeof *few);
+    sdm_fit_result r;
+    sdm_error err;
+    assert_int_equal(fit_to(few, 3, &r, &err), SDM_E_QUALITY);
+    const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_DATA);
+    if (!f) fail_msg("not judged: %s", err.text);
+    assert_true(f->grade == SDM_FIT_FAILED && f->figure == 3);
+    assert_true(f->limit > 3 && f->limit <= 9);
+    assert_non_null(strstr(err.text, "3 points cannot determine"));
+    sdm_fit_dispose(&r);
+    (void)fit_to(few, 24, &r, &err);
+    assert_int_equal(finding(&r, SDM_FIT_CHECK_DATA)->grade, SDM_FIT_PASSED);
+    sdm_fit_dispose(&r);
+    free(x);
+}
+
+// Points in metres: all of them lie close together, and an ellipsoid passes through them.
+static void test_points_in_metres_are_refused(void **state)
+{
+    (void)state;
+    size_t n;
+    double *x = points_with_strays(SIZE_MAX, &n);
+    for (size_t i = 0; i < 3 * n; i++)
+        x[i] = POSE.translation[i % 3] + 1e-3 * (x[i] - POSE.translation[i % 3]);
+    sdm_fit_result r;
+    sdm_error err;
+    assert_int_equal(fit_to(x, n, &r, &err), SDM_E_QUALITY);
+    assert_int_equal(finding(&r, SDM_FIT_CHECK_SIZE)->grade, SDM_FIT_FAILED);
+    assert_non_null(strstr(err.text, "unit is not mm"));
+    sdm_fit_dispose(&r);
+    free(x);
+}
+
+// A capsule fitted to the labels of an ellipsoid: alike, but not the same.
+static void test_labels_of_a_similar_shape_are_refused(void **state)
+{
+    (void)state;
+    sdm_instance *round = shape_of("ellipsoid"), *capsule = shape_of("capsule");
+    const sdm_grid g = cube(5.5, 0.35);
+    float *v = image_of_shape(round, &g, 1, true, 3);
+    const sdm_fit_target t = {.kind = SDM_FIT_LABEL, .grid = g, .values = v};
+    sdm_fit_result r;
+    sdm_error err;
+    assert_int_equal(fit_of(capsule, &t, 0, &r, &err), SDM_E_QUALITY);
+    const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_RESIDUALS);
+    assert_int_equal(f->grade, SDM_FIT_FAILED);
+    assert_true(f->figure > 3 * f->limit);
+    sdm_fit_dispose(&r);
+    free(v);
+    sdm_instance_free(round);
+    sdm_instance_free(capsule);
+}
+
+// Maps whose voxels are as large as the shape's largest ball: doubt, with the edge that is needed.
+static void test_coarse_maps_are_told(void **state)
+{
+    (void)state;
+    sdm_instance *round = shape_of("ellipsoid");
+    for (int coarse = 0; coarse < 2; coarse++) {
+        const double voxel = coarse ? 1.5 : 0.25;
+        const int64_t n = coarse ? 9 : 50;
+        float *v = phantom(TRUTH, &POSE, 1, 4);
+        const sdm_fit_target t = image_of(v);
+        sdm_fit_opts o = near_start();
+        const sdm_fit_source source = {
+            .shape = round,
+            .grid = sdm_grid_centred((int64_t[3]){n, n, n}, voxel, (double[3]){0, 0, 0})};
+        sdm_fit_result r;
+        sdm_error err = {0};
+        const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);
+        const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_VOXELS);
+        if (!f || f->figure != voxel) fail_msg("%g mm: status %d: %s", voxel, (int)s, err.text);
+        assert_int_equal(f->grade, coarse ? SDM_FIT_DOUBTFUL : SDM_FIT_PASSED);
+        if (coarse) assert_true(f->limit < 1 && strstr(f->text, "sdm_fit_source.grid"));
+        sdm_fit_dispose(&r);
+        free(v);
+    }
+    sdm_instance_free(round);
+}
+
 // The grid of the maps is narrower than the shape: refused for this reason, whatever else is wrong.
 static void test_a_grid_that_cuts_is_refused(void **state)
 {
@@ -309,9 +423,14 @@ int main(void)
         cmocka_unit_test(test_noise_is_robust),
         cmocka_unit_test(test_findings_are_sorted),
         cmocka_unit_test(test_right_fits_pass),
+        cmocka_unit_test(test_an_image_without_noise_passes),
         cmocka_unit_test(test_wrong_shapes_are_refused),
         cmocka_unit_test(test_points_of_another_shape_are_refused),
         cmocka_unit_test(test_strays_are_refused_if_many),
+        cmocka_unit_test(test_few_points_are_refused),
+        cmocka_unit_test(test_points_in_metres_are_refused),
+        cmocka_unit_test(test_labels_of_a_similar_shape_are_refused),
+        cmocka_unit_test(test_coarse_maps_are_told),
         cmocka_unit_test(test_a_grid_that_cuts_is_refused),
         cmocka_unit_test(test_mirror_of_an_ellipsoid),
     };

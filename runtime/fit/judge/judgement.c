@@ -3,13 +3,14 @@
 #include "judgement.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "blob.h"
+#include "finding.h"
 #include "misfit.h"
 #include "sdm/internal/shared.h"
+#include "suffice.h"
 
 // the sd of a tissue may exceed the robust sd by this factor where the shape is right; the sd of
 // the texture and the tails of a distribution that is not Gaussian make up the difference
@@ -23,6 +24,8 @@
 #define SERIOUS_MIN 0.02
 // voxels larger than this share of the radius of the largest ball inside explain residuals
 #define COARSE 0.5
+// labels and points: residuals beyond this multiple of their limit refuse the fit
+#define FAR_BEYOND 3.0
 // largest share of points that may belong to another surface
 #define STRAY_MAX 0.35
 // part of a voxel by which the border of the maps may be inside the shape
@@ -31,57 +34,6 @@
 #define CUT_MAX 0.05
 // A shape that has this Dice coefficient with its blob cannot be told from one: no comparison.
 #define BLOB_ALIKE 0.9
-
-const char *sdm_fit_check_name(sdm_fit_check_kind kind)
-{
-    static const char *const names[SDM_FIT_N_CHECKS] = {[SDM_FIT_CHECK_CONVERGED] = "convergence",
-                                                        [SDM_FIT_CHECK_NO_SHAPE] = "no shape",
-                                                        [SDM_FIT_CHECK_CONTRAST] = "contrast",
-                                                        [SDM_FIT_CHECK_CAVITY] = "cavity",
-                                                        [SDM_FIT_CHECK_IN_IMAGE] = "in the image",
-                                                        [SDM_FIT_CHECK_RESIDUALS] = "residuals",
-                                                        [SDM_FIT_CHECK_BESIDE] = "beside",
-                                                        [SDM_FIT_CHECK_EMPTY] = "empty",
-                                                        [SDM_FIT_CHECK_MISSING] = "missing",
-                                                        [SDM_FIT_CHECK_INSIDE] = "inside",
-                                                        [SDM_FIT_CHECK_OUTSIDE] = "outside",
-                                                        [SDM_FIT_CHECK_GIVEN] = "given values",
-                                                        [SDM_FIT_CHECK_BOUNDS] = "bounds",
-                                                        [SDM_FIT_CHECK_BLOB] = "blob",
-                                                        [SDM_FIT_CHECK_KEPT_POSE] = "kept pose",
-                                                        [SDM_FIT_CHECK_MIRROR] = "mirror image",
-                                                        [SDM_FIT_CHECK_GRID] = "grid",
-                                                        [SDM_FIT_CHECK_NETWORK] = "network"};
-    return kind >= 0 && kind < SDM_FIT_N_CHECKS ? names[kind] : NULL;
-}
-
-void sdm_fit_verdict_add(sdm_fit_verdict *v, const sdm_fit_finding *finding)
-{
-    size_t at = 0;
-    while (at < v->n_findings && v->findings[at].kind < finding->kind) at++;
-    if (at == v->n_findings || v->findings[at].kind != finding->kind) {
-        for (size_t i = v->n_findings++; i > at; i--) v->findings[i] = v->findings[i - 1];
-    }
-    v->findings[at] = *finding;
-    v->grade = SDM_FIT_PASSED;
-    for (size_t i = 0; i < v->n_findings; i++)
-        if (v->findings[i].grade > v->grade) v->grade = v->findings[i].grade;
-}
-
-// adds a finding: passed, or `grade` with a text
-static void add(sdm_fit_verdict *v, sdm_fit_check_kind kind, bool passed, sdm_fit_grade grade,
-                double figure, double limit, const char *fmt, ...) SDM_PRINTF(7, 8);
-static void add(sdm_fit_verdict *v, sdm_fit_check_kind kind, bool passed, sdm_fit_grade grade,
-                double figure, double limit, const char *fmt, ...)
-{
-    sdm_fit_finding f = {
-        .kind = kind, .grade = passed ? SDM_FIT_PASSED : grade, .figure = figure, .limit = limit};
-    va_list args;
-    va_start(args, fmt);
-    if (!passed) vsnprintf(f.text, sizeof f.text, fmt, args);
-    va_end(args);
-    sdm_fit_verdict_add(v, &f);
-}
 
 // the tissue with the largest weight
 static const sdm_fit_law *main_law(const sdm_fit_law *law, size_t n)
@@ -97,6 +49,17 @@ static bool is_image(const fit_problem *p)
     return p->target->kind == SDM_FIT_IMAGE && !p->given_labels;
 }
 
+// Gain in log-likelihood by the shape, as of independent voxels, less the cost of its unknowns
+// (Schwarz 1978). The covariance of the score, which noise_factor belongs to, is that of the few
+// voxels at the surface; the robust correlations of all others are the steadier measure.
+static double evidence_of(const fit_problem *p, const sdm_fit_result *r, double factor)
+{
+    const double unknowns =
+        (p->opts->keep_params ? 0 : (double)p->n_params) + (p->opts->keep_pose ? 0 : 6);
+    return (p->information.log_likelihood - r->log_likelihood_without) / factor -
+           0.5 * unknowns * log((double)p->samples.n / factor);
+}
+
 // evidence, contrast, cavities, field of view, convergence
 static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)
 {
@@ -106,61 +69,82 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
                  out = main_law(a->outside, a->n_outside)->mean;
     const bool darker =
         main_law(b->inside, b->n_inside)->mean < main_law(b->outside, b->n_outside)->mean;
-    add(v, SDM_FIT_CHECK_CONVERGED, r->converged, SDM_FIT_FAILED, (double)r->n_iterations, NAN,
+    sdm_fit_judge_add(
+        v, SDM_FIT_CHECK_CONVERGED, r->converged, SDM_FIT_FAILED, (double)r->n_iterations, NAN,
         "not converged after %zu iterations (%.120s); allow more of them, or give a nearer start",
         r->n_iterations, r->reason);
     if (is_image(p)) {
-        add(v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > SDM_FIT_PREFERRED, SDM_FIT_FAILED, r->evidence,
+        sdm_fit_judge_add(
+            v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > SDM_FIT_PREFERRED, SDM_FIT_FAILED, r->evidence,
             SDM_FIT_PREFERRED,
             "the image shows no such shape near the start: explaining it without one is %s by %.3g "
             "(log-likelihood of independent voxels); check the start pose, and whether the inside "
             "is %s than the outside in this image",
             r->evidence < 0 ? "better" : "worse only", fabs(r->evidence),
             darker ? "darker" : "brighter");
-        add(v, SDM_FIT_CHECK_CONTRAST, (in < out) == darker, SDM_FIT_FAILED, in - out, 0,
+        sdm_fit_judge_add(
+            v, SDM_FIT_CHECK_CONTRAST, (in < out) == darker, SDM_FIT_FAILED, in - out, 0,
             "the contrast is the opposite of the start's: inside %.4g, outside %.4g, but the start "
             "says that the inside is %s; give tissue values of this kind of image",
             in, out, darker ? "darker" : "brighter");
     }
     const double widest = sdm_fit_inradius(&p->maps);
     if (r->n_cavity)
-        add(v, SDM_FIT_CHECK_CAVITY, widest < o->cavity, SDM_FIT_FAILED, widest, o->cavity,
+        sdm_fit_judge_add(
+            v, SDM_FIT_CHECK_CAVITY, widest < o->cavity, SDM_FIT_FAILED, widest, o->cavity,
             "the fitted shape holds a ball of %.3g mm, but spaces that hold one of %.3g mm were "
             "left out (sdm_fit_opts.cavity): give a radius above that of the shape",
             widest, o->cavity);
     if (p->target->kind != SDM_FIT_POINTS)
-        add(v, SDM_FIT_CHECK_IN_IMAGE, r->inside_share >= o->least_inside, SDM_FIT_FAILED,
+        sdm_fit_judge_add(
+            v, SDM_FIT_CHECK_IN_IMAGE, r->inside_share >= o->least_inside, SDM_FIT_FAILED,
             r->inside_share, o->least_inside,
             "only %.0f %% of the shape lies in the image, need %.0f %% (sdm_fit_opts.least_inside)",
             100 * r->inside_share, 100 * o->least_inside);
     size_t bounds = 0;
     for (size_t k = 0; k < p->n_params && !o->keep_params; k++) bounds += r->at_bound[k];
-    add(v, SDM_FIT_CHECK_BOUNDS, !bounds, SDM_FIT_DOUBTFUL, (double)bounds, 0,
-        "%zu of %zu parameters at an end of their range", bounds, p->n_params);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, !bounds, SDM_FIT_DOUBTFUL, (double)bounds, 0,
+                      "%zu of %zu parameters at an end of their range", bounds, p->n_params);
 }
 
-// the residuals on both sides of the surface. The older observation model (labels) is biased in
-// blurred images, so that its residuals are not noise alone
+// The residuals on both sides of the surface. The older observation model is biased in blurred
+// images, and labels and points show a surface with errors of their own: their residuals are not
+// noise alone, so that only a multiple of the limit refuses the fit.
 static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
 {
-    const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps);
-    const bool exact = is_image(p) && p->maps.share && !(p->opts->tolerance > 0),
-               serious = m->empty + m->missing > SERIOUS_MIN || voxel > COARSE * radius;
+    const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
+                 contradicted = m->empty + m->missing;
+    const bool coarse = voxel > COARSE * radius, image = is_image(p),
+               exact = image && p->maps.share && !(p->opts->tolerance > 0),
+               far = !image && !(p->opts->tolerance > 0) && contradicted > SERIOUS_MIN,
+               points = p->target->kind == SDM_FIT_POINTS;
+    const sdm_fit_grade inside = (exact && (contradicted > SERIOUS_MIN || coarse)) ||
+                                         (far && m->chi_square[1] > FAR_BEYOND * m->limit[1])
+                                     ? SDM_FIT_FAILED
+                                     : SDM_FIT_DOUBTFUL;
+    if (points && !m->n_units[1]) {
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL, 0, NAN,
+                          "the points lie too far apart to tell their scatter from errors of the "
+                          "shape: nothing tests this fit");
+        return;
+    }
     char cause[200] = "another shape lies there, or the organ differs from the model (then say by "
                       "how much it may: sdm_fit_opts.tolerance)";
-    if (voxel > COARSE * radius)
+    if (coarse)
         snprintf(cause, sizeof cause,
                  "the voxels of the maps, %.2g mm, are coarse for a shape whose largest ball has a "
-                 "radius of %.2g mm: finer ones are needed, or "
-                 "sdm_fit_opts.tolerance",
-                 voxel, radius);
-    add(v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1],
-        exact && serious ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, m->chi_square[1], m->limit[1],
+                 "radius of %.2g mm: exact maps with voxels of %.2g mm are needed "
+                 "(sdm_fit_source.grid)",
+                 voxel, radius, sdm_fit_voxel_for_thickness(&p->maps));
+    sdm_fit_judge_add(
+        v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1], inside, m->chi_square[1],
+        m->limit[1],
         "the residuals inside the shape are not noise: neighbourhoods deviate by %.2g times what "
         "noise explains; %s",
         sqrt(m->chi_square[1]), cause);
-    if (p->target->kind == SDM_FIT_POINTS) return;
-    add(v, SDM_FIT_CHECK_BESIDE, m->chi_square[0] <= m->limit[0], SDM_FIT_DOUBTFUL,
+    if (points) return;
+    sdm_fit_judge_add(
+        v, SDM_FIT_CHECK_BESIDE, m->chi_square[0] <= m->limit[0], SDM_FIT_DOUBTFUL,
         m->chi_square[0], m->limit[0],
         "the residuals beside the shape are not noise: neighbourhoods deviate by %.2g times what "
         "noise explains",
@@ -176,18 +160,19 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
     const bool biased = is_image(p) && !p->maps.share;
     const double most = fmax(p->opts->tolerance, biased ? VOLUME_MIN_BIASED : VOLUME_MIN),
                  beside = is_image(p) ? fmax(p->opts->beside, most) : most;
-    add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
-        "%.0f %% of the volume of the shape is empty in the %s, allowed %.0f %% "
-        "(sdm_fit_opts.tolerance)",
-        100 * m->empty, what, 100 * most);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
+                      "%.0f %% of the volume of the shape is empty in the %s, allowed %.0f %% "
+                      "(sdm_fit_opts.tolerance)",
+                      100 * m->empty, what, 100 * most);
     const double stray = fmax(p->opts->tolerance, STRAY_MAX);
     if (points && r->outliers > stray)
-        add(v, SDM_FIT_CHECK_MISSING, false, SDM_FIT_FAILED, r->outliers, stray,
-            "%.0f %% of the points lie on no surface of the shape, allowed %.0f %% "
-            "(sdm_fit_opts.tolerance)",
-            100 * r->outliers, 100 * stray);
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_MISSING, false, SDM_FIT_FAILED, r->outliers, stray,
+                          "%.0f %% of the points lie on no surface of the shape, allowed %.0f %% "
+                          "(sdm_fit_opts.tolerance)",
+                          100 * r->outliers, 100 * stray);
     else
-        add(v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED, m->missing, beside,
+        sdm_fit_judge_add(
+            v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED, m->missing, beside,
             "beside the shape the %s hold%s as much of its material as %.0f %% of its volume, "
             "allowed %.0f %% (%s)",
             what, is_image(p) ? "s" : "", 100 * m->missing, 100 * beside,
@@ -205,29 +190,32 @@ static void check_tissues(const fit_problem *p, const fit_residuals *s, const sd
     for (int side = 1; side >= 0; side--) {
         const double wider = law[side]->sd / s->spread[side];
         if (!isfinite(wider) || (side ? a->n_inside : a->n_outside) > 2) continue;
-        add(v, side ? SDM_FIT_CHECK_INSIDE : SDM_FIT_CHECK_OUTSIDE, wider <= WIDER_MAX,
+        sdm_fit_judge_add(
+            v, side ? SDM_FIT_CHECK_INSIDE : SDM_FIT_CHECK_OUTSIDE, wider <= WIDER_MAX,
             SDM_FIT_DOUBTFUL, wider, WIDER_MAX,
             "the values %s spread by %.3g, but most of them by %.3g only: a second material lies "
             "there",
             side ? "inside" : "outside", law[side]->sd, s->spread[side]);
     }
     const double off = fabs(law[1]->mean - given->mean) / given->sd;
-    add(v, SDM_FIT_CHECK_GIVEN, off <= FIT_GIVEN_MAX, SDM_FIT_DOUBTFUL, off, FIT_GIVEN_MAX,
+    sdm_fit_judge_add(
+        v, SDM_FIT_CHECK_GIVEN, off <= FIT_GIVEN_MAX, SDM_FIT_DOUBTFUL, off, FIT_GIVEN_MAX,
         "the inside has the mean %.4g, the start %.4g: other values than those of this kind of "
         "image were given",
         law[1]->mean, given->mean);
 }
 
 // the blob must be worse by more than the cost of the unknowns that the shape has beyond its nine
-static sdm_status check_blob(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v,
+static sdm_status check_blob(const fit_problem *p, double factor, sdm_fit_verdict *v,
                              sdm_error *err)
 {
     double gain, alike;
     if (!p->maps.share) return SDM_OK;
     const sdm_status s = sdm_fit_against_blob(p, &gain, &alike, err);
     if (s || alike > BLOB_ALIKE) return s;
-    gain /= fmax(r->noise_factor, 1);
-    add(v, SDM_FIT_CHECK_BLOB, gain > SDM_FIT_PREFERRED, SDM_FIT_FAILED, gain, SDM_FIT_PREFERRED,
+    gain /= factor;
+    sdm_fit_judge_add(
+        v, SDM_FIT_CHECK_BLOB, gain > SDM_FIT_PREFERRED, SDM_FIT_FAILED, gain, SDM_FIT_PREFERRED,
         "a blob of the same size in its place explains the image as well as the shape does");
     return s;
 }
@@ -252,7 +240,8 @@ static void check_maps(const fit_problem *p, sdm_fit_verdict *v)
 {
     const double depth = border_depth(&p->maps),
                  most = BORDER_MAX * fit_longest_edge(&p->maps.grid);
-    add(v, SDM_FIT_CHECK_GRID, depth <= most, SDM_FIT_FAILED, depth, most,
+    sdm_fit_judge_add(
+        v, SDM_FIT_CHECK_GRID, depth <= most, SDM_FIT_FAILED, depth, most,
         "the grid of the %s cuts the fitted shape, its surface ends open there: a grid that "
         "reaches at least %.2g mm farther is needed%s",
         p->source->model ? "model" : "maps", depth,
@@ -261,10 +250,26 @@ static void check_maps(const fit_problem *p, sdm_fit_verdict *v)
     const sdm_model_quality *q = &sdm_model_get_info(p->source->model)->quality;
     if (!*q->grade) return;
     const bool poor = !strcmp(q->grade, "poor");
-    add(v, SDM_FIT_CHECK_NETWORK, !poor && !(q->cut > CUT_MAX), SDM_FIT_DOUBTFUL, q->cut, CUT_MAX,
+    sdm_fit_judge_add(
+        v, SDM_FIT_CHECK_NETWORK, !poor && !(q->cut > CUT_MAX), SDM_FIT_DOUBTFUL, q->cut, CUT_MAX,
         "the training graded this network %s, and its grid cuts %.0f %% of the shapes of its "
         "family: train it again (docs/symptoms.md)",
         q->grade, 100 * q->cut);
+}
+
+// The finding that explains a refusal: the first one that failed. Points that show too little come
+// before it, and, where the image shows a shape, a grid that cuts it. NULL: none failed.
+static const sdm_fit_finding *reason(const sdm_fit_verdict *v)
+{
+    const sdm_fit_finding *why = NULL;
+    for (size_t i = 0; i < v->n_findings; i++) {
+        const sdm_fit_finding *x = &v->findings[i];
+        if (x->grade != SDM_FIT_FAILED) continue;
+        if (x->kind == SDM_FIT_CHECK_DATA || x->kind == SDM_FIT_CHECK_SIZE) return x;
+        const bool cut = x->kind == SDM_FIT_CHECK_GRID && why && why->kind > SDM_FIT_CHECK_CONTRAST;
+        if (!why || cut) why = x;
+    }
+    return why;
 }
 
 sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err)
@@ -272,9 +277,12 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err
     sdm_fit_verdict *v = &r->verdict;
     fit_residuals residuals;
     fit_misfit misfit;
+    sdm_status s = sdm_fit_residuals_create(p, &residuals, err);
+    const double robust = s ? 0 : sdm_fit_residual_correlation(&residuals),
+                 factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
+    if (is_image(p)) r->evidence = evidence_of(p, r, factor);
     check_basics(p, r, v);
     check_maps(p, v);
-    sdm_status s = sdm_fit_residuals_create(p, &residuals, err);
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     if (!s) {
         check_residuals(p, &misfit, v);
@@ -282,17 +290,12 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err
         v->n_units = misfit.n_units[0] + misfit.n_units[1];
         v->chi_square = misfit.noise_chi_square;
     }
+    if (!s && p->target->kind == SDM_FIT_POINTS) sdm_fit_check_points(p, &residuals, v);
     if (!s && is_image(p)) check_tissues(p, &residuals, r, v);
+    if (!s) sdm_fit_check_voxels(p, is_image(p) ? r->blur : 0, v);
     sdm_fit_residuals_dispose(&residuals);
-    if (!s && is_image(p)) s = check_blob(p, r, v, err);
-    // the first one that failed; but where the image shows a shape, a grid that cuts it is the
-    // reason
-    const sdm_fit_finding *why = NULL;
-    for (size_t i = 0; i < v->n_findings; i++) {
-        const sdm_fit_finding *x = &v->findings[i];
-        const bool cut = x->kind == SDM_FIT_CHECK_GRID && why && why->kind > SDM_FIT_CHECK_CONTRAST;
-        if (x->grade == SDM_FIT_FAILED && (!why || cut)) why = x;
-    }
+    if (!s && is_image(p)) s = check_blob(p, factor, v, err);
+    const sdm_fit_finding *why = s ? NULL : reason(v);
     return s || !why ? s : sdm_fail(err, SDM_E_QUALITY, "%s", why->text);
 }
 

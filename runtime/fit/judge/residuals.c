@@ -329,6 +329,22 @@ sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sd
     return s;
 }
 
+// A larger correlation at the last lag is that of an image without noise, or of noise that reaches
+// farther than the lags.
+#define CORRELATION_LAST_MAX 0.5
+
+double sdm_fit_residual_correlation(const fit_residuals *r)
+{
+    double product = 1;
+    for (int a = 0; a < 3; a++) {
+        double sum = 1;
+        if (r->correlation[a][FIT_RESIDUAL_LAGS] > CORRELATION_LAST_MAX) return 0;
+        for (int lag = 1; lag <= FIT_RESIDUAL_LAGS; lag++) sum += 2 * r->correlation[a][lag];
+        product *= sum;
+    }
+    return product > 1 ? product : 0;
+}
+
 void sdm_fit_residuals_dispose(fit_residuals *r)
 {
     sdm_free(r->expected);

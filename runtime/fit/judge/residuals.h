@@ -43,4 +43,8 @@ typedef struct fit_residuals {
 /* Computes the residuals at problem->state from its samples. Call sdm_fit_residuals_dispose() even
  * after an error. */
 sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sdm_error *err);
+/* Number of correlated voxels that carry as much information as one independent one: the product
+   over the axes of the sums of all correlations, 1 or more. 0: nothing is correlated, too few
+   voxels lie away from the surface, or the correlation reaches farther than the lags. */
+double sdm_fit_residual_correlation(const fit_residuals *r);
 void sdm_fit_residuals_dispose(fit_residuals *r);

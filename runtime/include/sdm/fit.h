@@ -259,7 +259,9 @@ typedef enum sdm_fit_check_kind {
     /* Residuals of whole neighbourhoods inside the surface, half as large as the shape is thick,
        against the noise: mean of (mean residual)^2 / variance. 1 where the residuals are noise.
        Size and correlation of the noise are robust statistics far from the surface (Hampel 1974;
-       Genton 1998); the limit is one that noise exceeds once in a thousand fits */
+       Genton 1998); the limit is one that noise exceeds once in a thousand fits. Labels and points
+       are no more exact than their voxels and scatter: three times the limit refuses the fit, and
+       points too far apart to tell scatter from errors leave doubt */
     SDM_FIT_CHECK_RESIDUALS,
     /* the same outside of the surface, where other spaces of the same material may lie */
     SDM_FIT_CHECK_BESIDE,
@@ -294,6 +296,17 @@ typedef enum sdm_fit_check_kind {
     /* network: fraction of the held-out shapes of its training that the grid cut; not passed also
        where the training graded the network poor, see sdm_model_quality */
     SDM_FIT_CHECK_NETWORK,
+    /* points: their number, at least that of the unknowns: the pose, and the parameters without a
+       normal distribution */
+    SDM_FIT_CHECK_DATA,
+    /* points: rms distance from their centroid of those that lie on the surface, mm; limit: a tenth
+       of the reach of the shape. Points within less show too little of it, or are not in mm */
+    SDM_FIT_CHECK_SIZE,
+    /* Longest edge of the voxels of the maps, mm. The limit is the edge that would show the
+       thickness of the shape (2/5 of the radius of its largest ball), its edges and corners (the
+       distance bends within a voxel on at most a tenth of the surface), the voxels of the labels or
+       the point spread of the image */
+    SDM_FIT_CHECK_VOXELS,
     SDM_FIT_N_CHECKS
 } sdm_fit_check_kind;
 
@@ -383,9 +396,10 @@ typedef struct sdm_fit_result {
        which the outside tissues keep the relative weights in space of the fit; other targets:
        NaN */
     double log_likelihood_without;
-    /* image: evidence of the shape: its gain in log-likelihood, corrected for correlated voxels,
-       less the cost of its unknowns (Schwarz 1978). At most 0: the image shows no such shape. Other
-       targets: NaN */
+    /* image: evidence of the shape: its gain in log-likelihood, as of independent voxels, less the
+       cost of its unknowns (Schwarz 1978). How many voxels count as one independent one follows
+       from the robust correlations of SDM_FIT_CHECK_RESIDUALS or, where these cannot be measured,
+       is noise_factor. At most 0: the image shows no such shape. Other targets: NaN */
     double evidence;
     /* share of the volume of the shape that lies in the image; 1 for points; NaN if the fit failed
        before computing it; the same holds for the figures marked "NaN as inside_share" */

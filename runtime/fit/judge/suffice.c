@@ -1,0 +1,126 @@
+/* Number and extent of the points of a fit; size of the voxels of its maps. */
+#include "suffice.h"
+
+#include <math.h>
+
+#include "finding.h"
+
+// smallest rms distance of the points from their centroid, over the reach of the shape
+#define SPREAD_MIN 0.1
+
+// edge of a voxel that shows the thickness, over the radius of the largest ball inside
+#define VOXEL_OVER_RADIUS 0.4
+// the same for voxels that are noticed
+#define VOXEL_OVER_RADIUS_MAX 0.5
+// larger voxels bias the standard deviations: edge over the sd of the point spread
+#define VOXEL_OVER_BLUR_MAX 1.5
+// labels: edge over that of a voxel of the labels
+#define VOXEL_OVER_LABEL_MAX 1.5
+// shortest gradient of a distance whose details are shown
+#define GRADIENT_MIN 0.8
+// largest share of the surface with a shorter gradient
+#define DETAILS_MAX 0.1
+
+// largest number of rigid motions that leave a surface in place: the rotations of a ball
+#define SYMMETRIES_MAX 3
+
+/* Number of unknowns that the data alone determine: parameters without a distribution of their own,
+ * and the pose. Motions that the data leave open count as symmetries of the shape. */
+static size_t free_unknowns(const fit_problem *p)
+{
+    const sdm_fit_opts *o = p->opts;
+    size_t n = 0, pose = 0;
+    for (size_t k = 0; k < p->n_params && !o->keep_params; k++)
+        n += p->distribution[k].kind != SDM_DISTRIBUTION_NORMAL || !(o->prior_sd > 0);
+    if (!o->keep_pose && !(o->prior_rotation_sd > 0)) pose += 3;
+    if (!o->keep_pose && !(o->prior_translation_sd > 0)) pose += 3;
+    size_t open = p->n_motions < SYMMETRIES_MAX ? p->n_motions : SYMMETRIES_MAX;
+    if (open > pose) open = pose;
+    return n + pose - open;
+}
+
+/* rms distance (mm) from their centroid of the points that belong to the surface. */
+static double spread(const fit_problem *p, const fit_residuals *s)
+{
+    double n = 0, sum[3] = {0}, square = 0;
+    for (size_t i = 0; i < s->n; i++) {
+        n += s->used[i];
+        for (size_t a = 0; a < 3 && s->used[i]; a++) {
+            sum[a] += p->samples.world[3 * i + a];
+            square += p->samples.world[3 * i + a] * p->samples.world[3 * i + a];
+        }
+    }
+    if (!(n > 0)) return 0;
+    for (size_t a = 0; a < 3; a++) square -= sum[a] * sum[a] / n;
+    return sqrt(fmax(square / n, 0));
+}
+
+void sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sdm_fit_verdict *v)
+{
+    const size_t n = p->target->n_points, unknowns = free_unknowns(p);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, n >= unknowns, SDM_FIT_FAILED, (double)n,
+                      (double)unknowns,
+                      "%zu points cannot determine %zu unknowns: give at least as many points, or "
+                      "keep the parameters or the pose",
+                      n, unknowns);
+    fit_extent e;
+    if (sdm_fit_extent(&p->maps, &e, NULL)) return;
+    const double wide = spread(p, s);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_SIZE, wide >= SPREAD_MIN * e.reach, SDM_FIT_FAILED, wide,
+                      SPREAD_MIN * e.reach,
+                      "the points lie within %.2g mm of their middle, but the fitted shape reaches "
+                      "%.3g mm from its own: they show too little of it, or their unit is not mm",
+                      wide, e.reach);
+}
+
+double sdm_fit_voxel_for_thickness(const fit_maps *maps)
+{
+    return VOXEL_OVER_RADIUS * sdm_fit_inradius(maps);
+}
+
+/* Share of the surface beside details that the voxels of the maps do not show: there the gradient
+ * of the distance, by differences over two voxels, is clearly shorter than 1. */
+static double detail_share(const fit_maps *m)
+{
+    const sdm_grid *g = &m->grid;
+    const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]};
+    const double near = 0.5 * fit_longest_edge(g);
+    double all = 0, bent = 0;
+    for (int64_t k = 1; k + 1 < g->n[2]; k++)
+        for (int64_t j = 1; j + 1 < g->n[1]; j++)
+            for (int64_t i = 1; i + 1 < g->n[0]; i++) {
+                const double *d = m->distance + k * step[2] + j * step[1] + i;
+                double square = 0;
+                if (fabs(*d) > near) continue;
+                for (int a = 0; a < 3; a++)
+                    square += pow((d[step[a]] - d[-step[a]]) / (2 * g->spacing[a]), 2);
+                all++;
+                bent += square < GRADIENT_MIN * GRADIENT_MIN;
+            }
+    return all > 0 ? bent / all : 0;
+}
+
+void sdm_fit_check_voxels(const fit_problem *p, double blur, sdm_fit_verdict *v)
+{
+    if (p->opts->keep_params) return;
+    const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
+                 details = detail_share(&p->maps);
+    double fine = INFINITY;
+    const char *beside = "";
+    if (details > DETAILS_MAX) // edges: the share grows with the voxel
+        fine = voxel * DETAILS_MAX / details, beside = "the details of the shape";
+    if (voxel > VOXEL_OVER_RADIUS_MAX * radius && sdm_fit_voxel_for_thickness(&p->maps) < fine)
+        fine = sdm_fit_voxel_for_thickness(&p->maps), beside = "the thickness of the shape";
+    const bool labels = p->given_labels || p->target->kind == SDM_FIT_LABEL;
+    const double label = labels ? fit_longest_edge(&p->target->grid) : INFINITY;
+    if (voxel > VOXEL_OVER_LABEL_MAX * label && label < fine)
+        fine = label, beside = "the voxels of the labels";
+    if (blur > 0 && voxel > VOXEL_OVER_BLUR_MAX * blur && blur < fine)
+        fine = blur, beside = "the point spread of the image";
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_VOXELS, !isfinite(fine), SDM_FIT_DOUBTFUL, voxel,
+                      fmin(fine, voxel),
+                      "the voxels of the maps are coarse beside %s: estimates are less exact, and "
+                      "standard deviations too small; exact maps with voxels of %.2g mm "
+                      "(sdm_fit_source.grid) show it",
+                      beside, fine);
+}

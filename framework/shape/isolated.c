@@ -1,5 +1,5 @@
 /* Shapes whose callbacks run in worker processes: their tables hold callbacks that ask a worker. */
-#include "isolated.h"
+#include "isolated_protocol.h"
 
 #include <pthread.h>
 #include <stdatomic.h>

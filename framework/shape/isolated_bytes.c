@@ -1,7 +1,7 @@
 /* Tables, parameters and options as bytes, for the way between the program and a worker. */
 #include <string.h>
 
-#include "isolated.h"
+#include "isolated_protocol.h"
 #include "sdm/internal/heap.h"
 
 /* ---- writing ---- */

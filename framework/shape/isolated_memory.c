@@ -4,7 +4,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "isolated.h"
+#include "isolated_protocol.h"
 
 /* Callbacks get arrays that are aligned as those of malloc(). */
 #define ALIGNMENT 16

@@ -15,7 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "isolated.h"
+#include "isolated_protocol.h"
 #include "sdm/internal/callback.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/text.h"

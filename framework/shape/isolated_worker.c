@@ -12,16 +12,9 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "isolated.h"
+#include "isolated_protocol.h"
+#include "sdm/internal/sanitized.h"
 #include "sdm/memory.h"
-
-#if defined(__SANITIZE_ADDRESS__)
-#define SANITIZED 1 // gcc
-#elif defined(__has_feature)
-#define SANITIZED __has_feature(address_sanitizer) // clang
-#else
-#define SANITIZED 0
-#endif
 
 #define ARRAY_MAX ((size_t)1 << 31) // vertices, triangles
 #define UNUSED 0xA5                 // the bytes around the arrays that a callback gets
@@ -79,7 +72,7 @@ static void watch_crashes(worker *w)
     action.sa_handler = on_crash;
     action.sa_flags = SA_ONSTACK;
     sigemptyset(&action.sa_mask);
-    for (size_t i = 0; i < sizeof signals / sizeof *signals && !SANITIZED; i++)
+    for (size_t i = 0; i < sizeof signals / sizeof *signals && !SDM_SANITIZED; i++)
         sigaction(signals[i], &action, NULL);
 }
 
@@ -89,7 +82,7 @@ static void limit_memory(uint64_t bytes)
     struct rlimit limit;
     const struct rlimit none = {0, 0};
     setrlimit(RLIMIT_CORE, &none);
-    if (SANITIZED || getrlimit(RLIMIT_AS, &limit)) return;
+    if (SDM_SANITIZED || getrlimit(RLIMIT_AS, &limit)) return;
     const rlim_t most = (rlim_t)(bytes_now() + bytes);
     if (limit.rlim_max != RLIM_INFINITY && limit.rlim_max < most) return;
     limit.rlim_cur = limit.rlim_max = most;
@@ -259,6 +252,7 @@ static sdm_status make_velocity(worker *w, const isolated_request *q, sdm_error 
     memcpy(p, q->p, sizeof p);
     if (q->n_vert > ARRAY_MAX || !lay_out(w, 3 * (size_t)q->n_vert * s->n_params, 0))
         return sdm_fail(err, SDM_E_PLUGIN, "velocity(): there is no memory for it");
+    memset(reals_of(w), 0xFF, 3 * (size_t)q->n_vert * s->n_params * sizeof(double));
     sdm_host_call_begin(&call, NULL, false);
     const int failed =
         s->shape->velocity(s->self, &call.host, s->options, p, (size_t)q->n_vert, reals_of(w));

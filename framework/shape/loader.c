@@ -12,7 +12,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "isolated.h"
+#include "isolated_protocol.h"
 #include "sdm/internal/file.h"
 #include "sdm/memory.h"
 

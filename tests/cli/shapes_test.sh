@@ -1,5 +1,6 @@
 #!/bin/bash
 # sdmgen shapes test: one line for each test, the verdict as exit code, JSON, and mistakes on the command line.
+# Tests: shapes_test.c only_shape.c
 . "$(dirname "$0")/common.sh"
 plugins=$(cd ../../plugins && pwd)
 unfit=$plugins/unfit/unfit.so

@@ -205,7 +205,7 @@ typedef sdm_status (*command_function)(const cli_args *args, sdm_error *err);
 static const struct {
     const char *word;
     command_function run;
-} subcommands[] = {{"new", cli_shapes_new}, {"check", cli_shapes_check}};
+} subcommands[] = {{"new", cli_shapes_new}, {"check", cli_shapes_check}, {"test", cli_shapes_test}};
 enum { N_SUBCOMMANDS = sizeof subcommands / sizeof *subcommands };
 
 /* The subcommand that the first word names; NULL: none. */

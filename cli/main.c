@@ -15,6 +15,7 @@
 #include "commands.h"
 #include "report/crash_guard.h"
 #include "report/terminal.h"
+#include "sdm/internal/isolation.h"
 #include "slicer/slicer.h"
 
 /* The functions of the commands, by index into cli_commands. */
@@ -101,6 +102,8 @@ static void open_standard_files(void)
 
 int main(int argc, char **argv)
 {
+    if (argc > 1 && !strcmp(argv[1], SDM_ISOLATION_COMMAND))
+        return sdm_isolation_worker(argc - 1, argv + 1);
     open_standard_files();
     keep_memory();
     if (argc == 2 && !strcmp(argv[1], "--version")) {

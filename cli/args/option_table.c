@@ -72,8 +72,8 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "what the image does not determine; model and image are read from where the fit found\n"
      "them, or from the folder of the file.",
      "sdmgen report runs/cochlea -o cochlea.html", 1, 1},
-    {"shapes", "[NAME] | new NAME | check NAME|CONFIG",
-     "list the shapes, describe one, begin a new one, or check one",
+    {"shapes", "[NAME] | new NAME | check NAME|CONFIG | test NAME|PLUGIN",
+     "list the shapes, describe one, begin a new one, check or test one",
      "Without NAME: lists the shapes. NAME: prints the parameters and options of one.\n"
      "new NAME: writes the folder NAME (or that of --out) with a shape of this name as a\n"
      "plug-in: C source, CMakeLists.txt, a configuration and tests. It builds and passes its\n"
@@ -82,7 +82,11 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "and trainings: broken meshes, parts that are inside out, vertices that jump, numbers of\n"
      "vertices that change, a grid that cuts the shapes (with a CONFIG, whose key=value\n"
      "overrides may follow), wrong velocities, results that differ from call to call. -o FILE\n"
-     "draws nine shapes. Exit code 3: meshes are broken; 4: maps or trainings suffer.",
+     "draws nine shapes. Exit code 3: meshes are broken; 4: maps or trainings suffer.\n"
+     "test: tests whether a shape keeps the contract of sdm/shape.h, a plug-in isolated as by\n"
+     "--isolate: valid, closed and oriented meshes, the same triangles, no jumps, velocities,\n"
+     "the same bits from call to call and from many threads, parameters outside the ranges,\n"
+     "options. One line for each test; exit codes as for check.",
      "sdmgen shapes check cochlea -o cochlea.png", 0, SIZE_MAX},
     {"info", "FILE", "describe the content of a model, level set, image, mesh file or shape model",
      NULL, "sdmgen info runs/cochlea/model.sdm", 1, 1},
@@ -353,7 +357,7 @@ const cli_option cli_options[] = {
     {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_VERIFY), AT(samples),
      "number of random shapes (default 20)"},
     {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_SHAPES), AT(samples),
-     "check: number of random shapes (default 128)"},
+     "check, test: number of random shapes (default 128; test: 64)"},
     {"naive", 0, CLI_INT, "N", NULL, 0, 1000, ON(CLI_EVAL), AT(naive),
      "number of shapes on which the naive method is timed (default 2; 0: none)"},
     {"max-mse", 0, CLI_REAL, "MM2", NULL, 0, 1e12, ON(CLI_EVAL), AT(max_mse),
@@ -560,6 +564,13 @@ const cli_option cli_options[] = {
     /* all commands */
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
      "load shapes from a shared object; may be repeated"},
+    {"isolate", 0, CLI_FLAG, NULL, NULL, 0, 0, WITH_SHAPES, AT(isolate),
+     "run the callbacks of plug-ins in processes of their own: one that crashes, hangs, exits or "
+     "takes all memory is an error with its name; results have the same bits"},
+    {"isolate-seconds", 0, CLI_REAL, "S", NULL, 0.01, 1e6, WITH_SHAPES, AT(isolate_seconds),
+     "with --isolate: longest time of a call, by the clock (default 10)"},
+    {"isolate-memory", 0, CLI_REAL, "GB", NULL, 0.05, 1e6, WITH_SHAPES, AT(isolate_memory),
+     "with --isolate: memory of a plug-in in each of its processes (default 2)"},
     {"expect", 0, CLI_TEXT, "SHA256", NULL, 0, 0, WITH_MODELS, AT(expect),
      "refuse a model file with another SHA-256 than this (sdmgen info prints it)"},
     {"max-memory", 0, CLI_REAL, "GB", NULL, 0.1, 1e6, ALL & ~ON(CLI_HELP), AT(max_memory),

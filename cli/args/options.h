@@ -144,6 +144,8 @@ struct cli_args {
     const char *expect;   /* generate, eval, report, info, verify, bench, fit, export */
     const char *progress; /* train, generate, exact, eval, verify, experiment, fit */
     double max_memory;    /* GB; 0: option missing */
+    bool isolate;         /* commands with --plugin */
+    double isolate_seconds, isolate_memory; /* s, GB; 0: option missing */
     int64_t threads, seed;
     bool resume;                     /* train */
     bool force;                      /* train, experiment, fit */

@@ -21,8 +21,9 @@ typedef struct isolated_shape {
     char name[SDM_NAME_LENGTH_MAX + 1];
     isolated_plugin *plugin;
     uint32_t index;
-    const sdm_param *params;   // owned, of the table
-    const sdm_option *options; // owned, of the table
+    const sdm_param *params;     // owned, of the table
+    const sdm_option *options;   // owned, of the table
+    const sdm_measure *measures; // owned, of the table
     uint32_t n_options;
 } isolated_shape;
 
@@ -288,21 +289,38 @@ static int velocity(const void *self, const sdm_host *host, const sdm_option_val
     return s ? give_reason(host, &err) : 0;
 }
 
+/* A request whose answer is one number. */
+static int ask_value(pool *at, const isolated_request *q, const sdm_host *host, double *out)
+{
+    isolated_worker *w = NULL;
+    isolated_answer a = {0};
+    sdm_error err = {0};
+    sdm_status s = take(at, &w, &err);
+    if (!s) s = ask(at, w, q, NULL, &a, NULL, &err);
+    if (w) give_back(at, w);
+    *out = a.value;
+    return s ? give_reason(host, &err) : 0;
+}
+
 static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
                     const double *p, const double x[3], double *out)
 {
     (void)options;
     pool *at = pool_of(self);
-    isolated_worker *w = NULL;
-    isolated_answer a = {0};
-    sdm_error err = {0};
     isolated_request q = request_at(at, ISOLATED_DISTANCE, p);
     memcpy(q.x, x, sizeof q.x);
-    sdm_status s = take(at, &w, &err);
-    if (!s) s = ask(at, w, &q, NULL, &a, NULL, &err);
-    if (w) give_back(at, w);
-    *out = a.distance;
-    return s ? give_reason(host, &err) : 0;
+    return ask_value(at, &q, host, out);
+}
+
+static int measure(const void *self, const sdm_host *host, const sdm_option_value *options,
+                   const double *p, uint32_t index, double depth, double *value)
+{
+    (void)options;
+    pool *at = pool_of(self);
+    isolated_request q = request_at(at, ISOLATED_MEASURE, p);
+    q.measure = index;
+    q.x[0] = depth;
+    return ask_value(at, &q, host, value);
 }
 
 static const sdm_shape CALLBACKS = {.abi = SDM_SHAPE_ABI,
@@ -313,7 +331,8 @@ static const sdm_shape CALLBACKS = {.abi = SDM_SHAPE_ABI,
                                     .mesh = mesh,
                                     .velocity = velocity,
                                     .distance = distance,
-                                    .distributions = distributions};
+                                    .distributions = distributions,
+                                    .measure = measure};
 
 bool sdm_is_isolated(const sdm_instance *s) { return s->shape->mesh == mesh; }
 
@@ -362,6 +381,7 @@ void sdm_isolated_close(void *object)
     for (size_t i = 0; i < plugin->n_shapes; i++) {
         sdm_free((void *)plugin->shapes[i].params);
         sdm_free((void *)plugin->shapes[i].options);
+        sdm_free((void *)plugin->shapes[i].measures);
     }
     sdm_free(plugin->shapes);
     sdm_free(plugin->tables.data);
@@ -377,6 +397,7 @@ static sdm_status add_shape(sdm_registry *r, isolated_plugin *plugin, size_t i, 
     shape->index = (uint32_t)i;
     shape->params = table.params;
     shape->options = table.options;
+    shape->measures = table.measures;
     shape->n_options = table.n_options;
     if (plugin->tables.failed || !sdm_is_name(table.name))
         return sdm_fail(err, SDM_E_PLUGIN, "plug-in %s: its process answers nonsense",

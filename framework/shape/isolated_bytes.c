@@ -89,6 +89,13 @@ void sdm_bytes_put_shape(isolated_bytes *b, const sdm_shape *s)
         put_real(b, o->max);
         put_real(b, o->def);
     }
+    sdm_bytes_put_count(b, s->n_measures);
+    for (size_t i = 0; i < s->n_measures; i++) {
+        put_text(b, s->measures[i].name);
+        put_text(b, s->measures[i].unit);
+        put_text(b, s->measures[i].help);
+        sdm_bytes_put_count(b, s->measures[i].of_depth != 0);
+    }
 }
 
 /* ---- reading ---- */
@@ -198,6 +205,20 @@ static sdm_option *get_options(isolated_bytes *b, uint32_t *n)
     return options;
 }
 
+static sdm_measure *get_measures(isolated_bytes *b, uint32_t *n)
+{
+    sdm_measure *measures = NULL;
+    *n = (uint32_t)sdm_bytes_get_count(b, SHAPE_MEASURES_MAX);
+    b->failed = b->failed || SDM_ALLOC(&measures, *n, "measures", NULL);
+    for (size_t i = 0; !b->failed && i < *n; i++) {
+        measures[i].name = get_text(b);
+        measures[i].unit = get_text(b);
+        measures[i].help = get_text(b);
+        measures[i].of_depth = (int)sdm_bytes_get_count(b, 1);
+    }
+    return measures;
+}
+
 sdm_shape sdm_bytes_get_shape(isolated_bytes *b, const sdm_shape *callbacks)
 {
     sdm_shape s = *callbacks;
@@ -210,5 +231,7 @@ sdm_shape sdm_bytes_get_shape(isolated_bytes *b, const sdm_shape *callbacks)
     if (!sdm_bytes_get_count(b, 1)) s.distributions = NULL;
     s.params = sdm_bytes_get_params(b, &s.n_params);
     s.options = get_options(b, &s.n_options);
+    s.measures = get_measures(b, &s.n_measures);
+    if (!s.n_measures) s.measure = NULL;
     return s;
 }

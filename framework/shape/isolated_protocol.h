@@ -19,6 +19,7 @@ typedef enum isolated_task {
     ISOLATED_MESH,     /* at p; n_vert, n_tri: what there is in the memory */
     ISOLATED_VELOCITY, /* at p, for n_vert vertices: n_vert * n_params * 3 numbers */
     ISOLATED_DISTANCE, /* at p and x */
+    ISOLATED_MEASURE,  /* number `measure` at p and x[0], its depth */
     ISOLATED_REPEAT,   /* text: number of threads and parameter vectors; answers with the number of
                           meshes with other bits and the first of them */
     ISOLATED_DESTROY
@@ -29,15 +30,16 @@ typedef struct isolated_request {
     uint32_t length;            /* bytes of text */
     uint64_t memory;            /* LOAD: limit, bytes */
     uint64_t n_vert;            /* VELOCITY */
-    double p[SHAPE_PARAMS_MAX]; /* MESH, VELOCITY, DISTANCE */
-    double x[3];                /* DISTANCE */
+    uint32_t measure;           /* MEASURE */
+    double p[SHAPE_PARAMS_MAX]; /* MESH, VELOCITY, DISTANCE, MEASURE */
+    double x[3];                /* DISTANCE, MEASURE */
 } isolated_request;
 
 typedef struct isolated_answer {
     sdm_status status;      /* not SDM_OK: the text is the message */
     uint32_t length;        /* bytes of text */
     uint64_t n_vert, n_tri; /* MESH; REPEAT: how many, and the first */
-    double distance;
+    double value;           /* DISTANCE, MEASURE */
 } isolated_answer;
 
 /* The first page of the memory. The worker writes it at any time, the program reads it when the
@@ -75,7 +77,7 @@ sdm_option_value *sdm_bytes_get_options(isolated_bytes *b, size_t n);
 double *sdm_bytes_get_reals(isolated_bytes *b, size_t *n);
 
 /* Reads a table: its callbacks are those of `callbacks`, as far as the shape that was put has them;
- * params and options are new arrays. */
+ * params, options and measures are new arrays. */
 sdm_shape sdm_bytes_get_shape(isolated_bytes *b, const sdm_shape *callbacks);
 
 /* ---- isolated_memory.c: the memory that both share ---- */

@@ -270,10 +270,25 @@ static sdm_status make_distance(worker *w, const isolated_request *q, isolated_a
     const sdm_instance *s = w->instance;
     host_call call;
     sdm_host_call_begin(&call, NULL, false);
-    const int failed =
-        s->shape->distance(s->self, &call.host, s->options, q->p, q->x, &a->distance);
+    const int failed = s->shape->distance(s->self, &call.host, s->options, q->p, q->x, &a->value);
     const sdm_status status =
         failed ? sdm_host_call_failed(&call, "distance", failed, SDM_E_PLUGIN, err) : SDM_OK;
+    sdm_host_call_end(&call);
+    return status;
+}
+
+static sdm_status make_measure(worker *w, const isolated_request *q, isolated_answer *a,
+                               sdm_error *err)
+{
+    const sdm_instance *s = w->instance;
+    host_call call;
+    if (q->measure >= s->shape->n_measures)
+        return sdm_fail(err, SDM_E_INTERNAL, "no measure %u", (unsigned)q->measure);
+    sdm_host_call_begin(&call, NULL, false);
+    const int failed =
+        s->shape->measure(s->self, &call.host, s->options, q->p, q->measure, q->x[0], &a->value);
+    const sdm_status status =
+        failed ? sdm_host_call_failed(&call, "measure", failed, SDM_E_PLUGIN, err) : SDM_OK;
     sdm_host_call_end(&call);
     return status;
 }
@@ -343,10 +358,12 @@ static sdm_status work(worker *w, const isolated_request *q, isolated_bytes *tex
     if (q->task == ISOLATED_REPEAT) return repeat(w, text, a, err);
     static const char *const names[] = {[ISOLATED_MESH] = "mesh",
                                         [ISOLATED_VELOCITY] = "velocity",
-                                        [ISOLATED_DISTANCE] = "distance"};
+                                        [ISOLATED_DISTANCE] = "distance",
+                                        [ISOLATED_MEASURE] = "measure"};
     sdm_callback_begin(w->instance, names[q->task], q->p);
     const sdm_status s = q->task == ISOLATED_MESH       ? make_mesh(w, q, a, err)
                          : q->task == ISOLATED_VELOCITY ? make_velocity(w, q, err)
+                         : q->task == ISOLATED_MEASURE  ? make_measure(w, q, a, err)
                                                         : make_distance(w, q, a, err);
     sdm_callback_end();
     return s;

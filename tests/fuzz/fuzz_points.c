@@ -11,7 +11,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     double *x = NULL;
     size_t n = 0;
     sdm_error err = {0};
-    const sdm_status s = cli_read_points(fuzz_file("fuzz.csv", data, size), &x, &n, &err);
+    const sdm_status s = cli_read_points(fuzz_file("fuzz.csv", data, size), &x, NULL, &n, &err);
     fuzz_check_status(s, &err);
     fuzz_require((s == SDM_OK) == (x != NULL));
     for (size_t i = 0; !s && i < 3 * n; i++) fuzz_require(isfinite(x[i]));

@@ -145,6 +145,7 @@ void sdm_volume_dispose(sdm_volume *v);
 bool sdm_volume_knows(const char *path);
 sdm_status sdm_volume_find_segment(const sdm_volume *v, const char *name, const sdm_segment **out, sdm_error *err);
 sdm_status sdm_volume_write(const char *path, const sdm_grid *grid, const void *values, sdm_voxel_type type, const char *text, sdm_error *err);
+sdm_status sdm_segmentation_write(const char *path, const sdm_grid *grid, const uint8_t *labels, const sdm_segment *segments, size_t n, const char *text, sdm_error *err);
 sdm_status sdm_builtin_shapes_add(sdm_registry *registry, sdm_error *err);
 enum { SDM_CHECK_POINTS = 1000 };
 typedef struct sdm_check { double mean_mm, rmse_mm, q95_mm, max_mm; double bias_mm; size_t used; size_t outside; } sdm_check;

@@ -16,7 +16,7 @@ documented() {
     "$@" >out 2>err || bad "$*: exit code $? ($(cat err))"
     [ -n "$(words "$row")" ] || bad "no row '$row'"
     { words "$row" && words 'all'; } | sort -u >known
-    sed -E 's/"(parameters|parameters_sd|options|at)": *\{[^}]*\}/"\1": 0/g' out | grep -oE '"[A-Za-z_0-9]+": ' | tr -d '": ' | sort -u >printed
+    sed -E 's/"(parameters|parameters_sd|options|at|figures)": *\{[^}]*\}/"\1": 0/g' out | grep -oE '"[A-Za-z_0-9]+": ' | tr -d '": ' | sort -u >printed
     [ "$(wc -l <printed)" -ge 3 ] || bad "$*: few keys: $(cat out)"
     [ -z "$(comm -13 known printed)" ] || bad "not in the row '$row' of docs/command-line.md: $(comm -13 known printed | tr '\n' ' ')"
 }
@@ -40,6 +40,9 @@ documented verify sdmgen verify map.nrrd --json
 documented phantom sdmgen phantom --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 --spacing 0.8 -o ct.nii --label label.nii --json
 sdmgen info ct.nii --json | grep -q volume_mm3 && bad 'an image of a scanner has a volume'
 documented fit sdmgen fit --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 label.nii --label 1 --rotation 0,0,0 --spacing 0.8 --measure --json
+printf 'id,image,label\na,label.nii,1\n' >cohort.csv
+documented 'fit --cases' sdmgen fit --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 --rotation 0,0,0 --spacing 0.8 --cases cohort.csv -o cohort --json
+documented collect sdmgen collect cohort --json
 for rx in 2 3 4; do sdmgen mesh --shape ellipsoid -O edge=1 -p rx=$rx -o m$rx.ply -q; done
 mkdir meshes && mv m?.ply meshes
 documented 'import ssm, info of a shape model' sdmgen import ssm meshes -o model.ssm --json

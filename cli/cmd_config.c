@@ -28,7 +28,10 @@ sdm_status cmd_config(const cli_args *args, sdm_error *err)
         sdm_config_dump(config, &text);
         s = cli_print_text(&text, err);
     } else if (!s) {
-        printf("%s: no mistakes\n", args->files.items[0]);
+        const size_t n = cli_warnings();
+        printf("%s: no mistakes", args->files.items[0]);
+        if (n) printf(", %zu warning%s", n, n > 1 ? "s" : "");
+        printf("\n");
     }
     sdm_instance_free(shape);
     sdm_registry_free(registry);

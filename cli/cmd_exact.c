@@ -128,7 +128,7 @@ static sdm_status run_engine(job *j, sdm_error *err)
     const double query = sdm_clock();
     if (!s && blocks_suffice(j)) s = make_blocks(j, j->engine, err);
     if (!s && !j->blocks.tile) {
-        s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
+        s = cli_allocate_map(&j->grid, &j->values, err);
         if (!s) s = cli_layers_map(&j->layers, j->args, j->engine, &j->grid, j->values, err);
     }
     j->ms_build = 1e3 * (built - start);
@@ -148,7 +148,7 @@ static sdm_status run_points(job *j, sdm_error *err)
     sdm_exact *engine = NULL;
     double *x = NULL;
     size_t n = 0;
-    sdm_status s = cli_read_points(j->args->points, &x, &n, err);
+    sdm_status s = cli_read_points(j->args->points, &x, NULL, &n, err);
     if (!s) s = cli_points_allocate(&j->points, n, err);
     if (!s) s = sdm_exact_create(&j->mesh, &opts, &engine, err);
     if (!s) j->report = *sdm_exact_get_report(engine);
@@ -178,7 +178,7 @@ static sdm_status run_method(job *j, sdm_error *err)
     sdm_audit audit;
     sdm_status s = sdm_mesh_audit(&j->mesh, &audit, err);
     if (!s) s = cli_grid_for_box(j->args, audit.min, audit.max, &j->grid, err);
-    if (!s) s = SDM_ALLOC(&j->values, sdm_grid_count(&j->grid), "distance map", err);
+    if (!s) s = cli_allocate_map(&j->grid, &j->values, err);
     if (s) return s;
 
     // the map

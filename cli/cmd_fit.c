@@ -159,6 +159,7 @@ sdm_status cmd_fit(const cli_args *args, sdm_error *err)
     if (!s) s = cli_fit_read_reference(&f, err);
     if (!s) s = cli_fit_read_start(&f, err);
     if (!s) s = cli_fit_warn_size(&f, err);
+    if (!s) cli_fit_notice_tissues(&f);
     if (!s) s = fit_shape(&f, err);
     if (!s) s = show_result(&f, err);
     cli_fit_dispose(&f);

@@ -21,6 +21,7 @@
 #include "sdm/internal/clock.h"
 #include "sdm/internal/config.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/threads.h"
 #include "sdm/map.h"
 #include "slicer/results_file.h"
@@ -154,18 +155,12 @@ static sdm_status choose_grid(job *j, sdm_error *err)
     return j->banded ? cli_blocks_band(&j->grid, args, &j->width, err) : SDM_OK;
 }
 
-static sdm_status allocate_values(job *j, sdm_error *err)
-{
-    return sdm_alloc_unset((void **)&j->values, sdm_grid_count(&j->grid), sizeof *j->values,
-                           "distance map", err);
-}
-
 static sdm_status allocate_maps(job *j, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&j->grid);
     size_t count;
     if (j->banded) return SDM_OK;
-    sdm_status s = allocate_values(j, err);
+    sdm_status s = cli_allocate_map(&j->grid, &j->values, err);
     if (!s && j->args->gradient) s = SDM_ALLOC(&j->gradient, 3 * n, "gradient", err);
     if (s || !j->args->jacobian) return s;
     s = sdm_mul(n, j->info->n_params, &count, err);
@@ -339,7 +334,7 @@ static sdm_status make_band(job *j, const double *p, const sdm_generate_opts *op
         return SDM_OK;
     }
     sdm_blocks_dispose(b);
-    return j->values ? SDM_OK : allocate_values(j, err);
+    return j->values ? SDM_OK : cli_allocate_map(&j->grid, &j->values, err);
 }
 
 /* Computes the map or the band at the parameters p and adds it to the hash. */
@@ -452,7 +447,8 @@ static sdm_status write_results(const job *j, sdm_error *err)
 
 /* The points of --points and what the network says there. */
 typedef struct point_answers {
-    double *x; /* [n][3] */
+    double *x;     /* [n][3] */
+    size_t *lines; /* [n] in the table of --points; NULL: no table */
     size_t n;
     float *values, *gradient, *slopes; /* [n], [n][3], [n][n_params]; NULL: not wanted */
 } point_answers;
@@ -473,6 +469,15 @@ static sdm_status compute_points(job *j, point_answers *a, sdm_result *result, s
     return s ? s
              : sdm_generate_points(j->model, j->rows, &opts, a->x, a->n, a->values, a->gradient,
                                    a->slopes, result, err);
+}
+
+/* Puts the line of the first point outside of the model's grid before the message. */
+static sdm_status fail_point(const job *j, const point_answers *a, sdm_status s, sdm_error *err)
+{
+    for (size_t i = 0; i < a->n; i++)
+        if (sdm_grid_beyond(&j->info->grid, a->x + 3 * i, NULL) > 0)
+            return sdm_fail_in(err, s, "%s:%zu", j->args->points, a->lines[i]);
+    return s;
 }
 
 static sdm_status write_points(const job *j, const point_answers *a, cli_points_table *t,
@@ -501,8 +506,9 @@ static sdm_status run_points(job *j, sdm_error *err)
     if (!s) s = read_rows(j, err);
     if (!s) s = open_shape(j, err);
     if (!s) s = check_rows(j, err);
-    if (!s) s = cli_read_points(j->args->points, &a.x, &a.n, err);
+    if (!s) s = cli_read_points(j->args->points, &a.x, &a.lines, &a.n, err);
     if (!s) s = compute_points(j, &a, &result, err);
+    if (s == SDM_E_RANGE && a.lines) s = fail_point(j, &a, s, err);
     if (!s && result.clamped) notice_clamped(j, 0);
     if (!s) notice_row(j, 0, &result);
     if (!s) s = write_points(j, &a, &table, err);
@@ -510,6 +516,7 @@ static sdm_status run_points(job *j, sdm_error *err)
     sdm_free(a.slopes);
     sdm_free(a.gradient);
     sdm_free(a.values);
+    sdm_free(a.lines);
     sdm_free(a.x);
     return s;
 }
@@ -533,8 +540,8 @@ static void notice_between(const job *j)
                    rmse, 0.866 * own_voxel(j));
     else
         cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
-                   "between them linear interpolation of exact maps misses the surface by %.2g mm "
-                   "RMS; --check measures this map",
+                   "cubic splines between them add to it, mostly less than linear interpolation of "
+                   "exact maps, which misses the surface by %.2g mm RMS; --check measures this map",
                    rmse, between);
 }
 

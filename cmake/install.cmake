@@ -133,6 +133,12 @@ if(TARGET sdmgen_training)
   sdm_pkgconfig(sdmgen-training sdmgen_training "Training of networks for signed distance maps" sdmgen)
 endif()
 
+# the Python package: it finds libsdmgen.so in the folder lib that it lies in, or on the system's path
+if(SDM_SHARED)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/python/sdmgen DESTINATION lib/python3/dist-packages
+    FILES_MATCHING PATTERN "*.py" PATTERN py.typed PATTERN __pycache__ EXCLUDE)
+endif()
+
 # the documentation and the examples, whose links lead to installed files
 file(RELATIVE_PATH SDM_DOC_TO_DATA ${CMAKE_INSTALL_FULL_DOCDIR} ${CMAKE_INSTALL_FULL_DATADIR}/sdmgen)
 file(RELATIVE_PATH SDM_DATA_TO_DOC ${CMAKE_INSTALL_FULL_DATADIR}/sdmgen ${CMAKE_INSTALL_FULL_DOCDIR})

@@ -47,6 +47,16 @@ static sdm_status unknown_option(const cli_args *args, const char *word, size_t 
                     command);
 }
 
+/* -o is most often meant for --out where a command writes a folder. */
+static sdm_status unknown_letter(const cli_args *args, char letter, sdm_error *err)
+{
+    const char *command = args->command->name;
+    if (letter == 'o' && cli_find_option(command_index(args), "out", 3))
+        return sdm_fail(err, SDM_E_ARG, "%s: unknown option -o; did you mean --out DIR?", command);
+    return sdm_fail(err, SDM_E_ARG, "%s: unknown option -%c; see sdmgen %s --help", command, letter,
+                    command);
+}
+
 const cli_option *cli_find_option(size_t command, const char *name, size_t length)
 {
     for (size_t i = 0; i < cli_n_options; i++) {
@@ -197,9 +207,7 @@ static sdm_status parse_option(int argc, char **argv, int *i, cli_args *args, sd
         if (equals) value = equals + 1;
     } else {
         o = find_letter(args, word[1]);
-        if (!o)
-            return sdm_fail(err, SDM_E_ARG, "%s: unknown option -%c; see sdmgen %s --help",
-                            args->command->name, word[1], args->command->name);
+        if (!o) return unknown_letter(args, word[1], err);
         if (word[2]) value = word + 2;
     }
     if (o->kind == CLI_FLAG && value)

@@ -87,9 +87,14 @@ void cli_fit_default_lengths(cli_fit *f);
  * with the options that apply. */
 sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err);
 
-/* Warns if labels or points are more than five times as large as the start shape, or as small, and
- * names the unit that would explain it. Errors of making the shape. */
+/* Warns if labels or points are more than five times as large as the start shape, or as small, or
+ * if an image is too small or too coarse for the shape, and names the unit that would explain it.
+ * Errors of making the shape. */
 sdm_status cli_fit_warn_size(const cli_fit *f, sdm_error *err);
+
+/* Images: says which values of the tissues a fit starts from if the command line does not give
+ * them, unless the shape is the one for which they are made. */
+void cli_fit_notice_tissues(const cli_fit *f);
 
 /* Sets the start pose and the rotations to try. SDM_E_ARG; SDM_E_FORMAT: a bad file of points. */
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);
@@ -99,6 +104,10 @@ sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);
  * no such label; SDM_E_FORMAT: no voxel has the label. */
 sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_list *words,
                               float *values, sdm_error *err);
+
+/* found[] = the different values of the volume, ascending; returns their number, or most + 1 if
+ * there are more than `most` or one is no whole number. NaN does not count. */
+size_t cli_fit_distinct(const sdm_volume *v, size_t most, float *found);
 
 /* With --label-close: morphological closing of values[grid] (1 and 0) by a ball of that radius. */
 sdm_status cli_fit_close_labels(const cli_fit *f, const sdm_grid *grid, float *values,

@@ -1,8 +1,12 @@
 /* Selects labels of a label map or a segmentation as a mask of 1 and 0. */
 #include <math.h>
+#include <stdio.h>
 
 #include "fit_command.h"
 #include "sdm/memory.h"
+
+/* Most labels that a message lists. */
+enum { LABELS_TOLD = 16 };
 
 /* A label: a value in one layer or in all layers. */
 typedef struct label {
@@ -56,6 +60,49 @@ static void add_all(const sdm_volume *v, float *mask)
         if (v->values[i] > 0 || v->values[i] < 0) mask[i % n] = 1;
 }
 
+size_t cli_fit_distinct(const sdm_volume *v, size_t most, float *found)
+{
+    const size_t n_values = sdm_grid_count(&v->grid) * v->n_layers;
+    size_t n = 0;
+    for (size_t i = 0; i < n_values; i++) {
+        const float x = v->values[i];
+        // neighbours mostly have the same value
+        if (isnan(x) || (i > 0 && x - v->values[i - 1] == 0)) continue;
+        size_t low = 0, high = n; // the first value found that is not below x
+        while (low < high) {
+            const size_t middle = (low + high) / 2;
+            if (found[middle] < x)
+                low = middle + 1;
+            else
+                high = middle;
+        }
+        if (low < n && found[low] <= x) continue;
+        if (n == most || rintf(x) - x != 0) return most + 1;
+        for (size_t k = n++; k > low; k--) found[k] = found[k - 1];
+        found[low] = x;
+    }
+    return n;
+}
+
+/* The message where a label is missing: the labels that are there, or that there are none. */
+static sdm_status missing_label(const char *path, const sdm_volume *v, const char *word,
+                                sdm_error *err)
+{
+    float found[LABELS_TOLD];
+    const size_t n = cli_fit_distinct(v, LABELS_TOLD, found);
+    char list[16 * LABELS_TOLD] = "";
+    for (size_t i = 0, used = 0; i < n && n <= LABELS_TOLD; i++)
+        if (found[i] < 0 || found[i] > 0)
+            used += (size_t)snprintf(list + used, sizeof list - used, " %g", (double)found[i]);
+    if (n <= LABELS_TOLD)
+        return sdm_fail(err, SDM_E_FORMAT, "%s: no voxel has the label '%.100s'; its labels are%s",
+                        path, word, list);
+    return sdm_fail(err, SDM_E_FORMAT,
+                    "%s: no voxel has the label '%.100s' (values %g to %g, over %d different ones, "
+                    "or fractions): if it is an image, leave --label out",
+                    path, word, (double)v->min, (double)v->max, LABELS_TOLD);
+}
+
 sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_list *words,
                               float *values, sdm_error *err)
 {
@@ -66,10 +113,7 @@ sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_l
         label l;
         const sdm_status s = find_label(path, v, words->items[w], &l, err);
         if (s) return s;
-        if (!add_label(v, &l, values))
-            return sdm_fail(err, SDM_E_FORMAT,
-                            "%s: no voxel has the label '%.100s' (values %g to %g)", path,
-                            words->items[w], (double)v->min, (double)v->max);
+        if (!add_label(v, &l, values)) return missing_label(path, v, words->items[w], err);
     }
     size_t inside = 0;
     for (size_t i = 0; i < n; i++) inside += values[i] > 0;

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "fit_command.h"
+#include "report/terminal.h"
 
 static sdm_fit_law make_law(const double given[2], double weight)
 {
@@ -22,6 +23,26 @@ static sdm_status read_appearance(const cli_fit_args *a, sdm_fit_appearance *t, 
         return SDM_OK;
     return sdm_fail(err, SDM_E_ARG,
                     "fit: --inside, --outside and --air need standard deviations above 0");
+}
+
+/* The shape that the default tissues belong to: in CT it is fluid in bone. */
+#define SHAPE_OF_TISSUES "cochlea"
+
+void cli_fit_notice_tissues(const cli_fit *f)
+{
+    const bool inside = isnan(f->args->fit.inside[0]), outside = isnan(f->args->fit.outside[0]);
+    const sdm_fit_appearance *t = &f->opts.appearance;
+    if (f->target.kind != SDM_FIT_IMAGE || (!inside && !outside) ||
+        !strcmp(f->shape_name, SHAPE_OF_TISSUES))
+        return;
+    cli_notice("%s not given: the fit starts from inside %g +- %g, outside %g +- %g, of which the "
+               "default is fluid in bone in CT; give MEAN,SD of the values of this image, which "
+               "has %.6g to %.6g",
+               inside && outside ? "--inside and --outside are"
+               : inside          ? "--inside is"
+                                 : "--outside is",
+               t->inside[0].mean, t->inside[0].sd, t->outside[0].mean, t->outside[0].sd,
+               (double)f->image.min, (double)f->image.max);
 }
 
 static sdm_status read_keep(const cli_list *words, sdm_fit_opts *o, sdm_error *err)

@@ -6,11 +6,17 @@
 #include "fit_command.h"
 #include "report/terminal.h"
 #include "sdm/internal/box.h"
+#include "sdm/internal/units.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
 
 /* Largest ratio of the two sizes, either way, that gives no warning. */
 #define RATIO_MAX 5.0
+
+/* A shape that is larger than its image by the first factor does not fit into it; by the second,
+ * the image is in m. */
+#define IMAGE_MAX 2.0
+#define IMAGE_IN_M 30.0
 
 /* Length of the diagonal, mm. */
 static double box_size(const sdm_box *b)
@@ -62,34 +68,37 @@ static sdm_status shape_size(const cli_fit *f, double *size, sdm_error *err)
     return s;
 }
 
-/* The unit whose length in mm is nearest to `ratio`; NULL: none is within a factor of 2.5. */
-static const char *unit_of(double ratio)
+/* Warns if the image is too small to hold the shape, or has voxels larger than the shape. An image
+ * may be much larger than the shape, so its unit is named only where it is clear. */
+static void warn_image(const cli_fit *f, double shape)
 {
-    static const struct {
-        const char *name;
-        double mm;
-    } units[] = {{"m", 1000}, {"inches", 25.4}, {"cm", 10}, {"um", 1e-3}};
-    const char *best = NULL;
-    double least = log(2.5);
-    for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
-        const double off = fabs(log(ratio / units[i].mm));
-        if (off < least) best = units[i].name, least = off;
+    const sdm_grid *g = &f->target.grid;
+    double square = 0, voxel = 0;
+    for (int i = 0; i < 3; i++) {
+        square += pow(g->spacing[i] * (double)g->n[i], 2);
+        voxel = fmax(voxel, g->spacing[i]);
     }
-    return best;
+    const double image = sqrt(square);
+    const char *unit = shape > IMAGE_IN_M * image ? "m" : voxel > shape ? "um" : NULL;
+    if (!unit && shape <= IMAGE_MAX * image) return;
+    cli_warn("%s: the image measures %.3g mm across, its voxels %.3g mm, the start shape %.3g mm: "
+             "%s%s%slengths are mm",
+             f->path, image, voxel, shape, unit ? "are they in " : "", unit ? unit : "",
+             unit ? "? " : "");
 }
 
 sdm_status cli_fit_warn_size(const cli_fit *f, sdm_error *err)
 {
-    if (f->target.kind == SDM_FIT_IMAGE) return SDM_OK;
     sdm_box b = SDM_BOX_EMPTY;
     double shape = 0;
     for (size_t i = 0; i < f->target.n_points && f->points; i++) sdm_box_add(&b, f->points + 3 * i);
     if (f->mask) add_voxels(&f->target.grid, f->mask, 1, 0.5f, &b);
     const sdm_status s = shape_size(f, &shape, err);
     const double target = box_size(&b), ratio = shape / target;
+    if (!s && f->target.kind == SDM_FIT_IMAGE) warn_image(f, shape);
     if (s || !(shape > 0) || !(target > 0)) return s;
     if (ratio <= RATIO_MAX && ratio >= 1 / RATIO_MAX) return SDM_OK;
-    const char *unit = unit_of(ratio);
+    const char *unit = sdm_unit_near(ratio, NULL);
     char advice[80] = "lengths are mm";
     if (unit) snprintf(advice, sizeof advice, "are they in %s? lengths are mm", unit);
     cli_warn("%s: the %s measure %.3g mm across, the start shape %.3g mm: %s", f->path,

@@ -13,6 +13,10 @@
 /* Number of points on the surface of a mesh: more make a fit slower but hardly more precise. */
 enum { SURFACE_POINTS = 20000 };
 
+/* An image with as few different values looks like labels, labels with more values like an image.
+ */
+enum { FEW_VALUES = 16, MANY_VALUES = 1000 };
+
 void cli_fit_negate_xy(double *points, size_t n)
 {
     for (size_t i = 0; i < n; i++) {
@@ -22,6 +26,32 @@ void cli_fit_negate_xy(double *points, size_t n)
 }
 
 /* ---- images ---- */
+
+/* A notice where an image looks like labels. */
+static void notice_few_values(const cli_fit *f)
+{
+    float found[FEW_VALUES];
+    const size_t n = f->image.stored > SDM_VOXEL_INT64
+                         ? FEW_VALUES + 1
+                         : cli_fit_distinct(&f->image, FEW_VALUES, found);
+    if (n > FEW_VALUES || n < 2 || found[0] < 0) return;
+    cli_notice("%s holds only %zu different values, %g to %g: if it is a label map, give --label "
+               "with the value of the shape, e.g. --label %g",
+               f->path, n, (double)found[0], (double)found[n - 1], (double)found[n - 1]);
+}
+
+/* A warning where labels look like an image. */
+static sdm_status warn_many_values(const cli_fit *f, sdm_error *err)
+{
+    float *found = NULL;
+    const sdm_status s = SDM_ALLOC(&found, MANY_VALUES, "labels", err);
+    if (!s && cli_fit_distinct(&f->image, MANY_VALUES, found) > MANY_VALUES)
+        cli_warn("%s holds over %d different values, or fractions: if it is an image, leave "
+                 "--label out",
+                 f->path, MANY_VALUES);
+    sdm_free(found);
+    return s;
+}
 
 static sdm_status use_image(cli_fit *f, sdm_error *err)
 {
@@ -34,8 +64,7 @@ static sdm_status use_image(cli_fit *f, sdm_error *err)
     if (v->n_layers > 1)
         return sdm_fail(err, SDM_E_FORMAT, "%s has %zu layers, need one image", f->path,
                         v->n_layers);
-    if (v->stored <= SDM_VOXEL_INT64 && v->min >= 0 && v->max <= 1)
-        cli_notice("%s holds only 0 and 1: if it is a label map, give --label 1", f->path);
+    notice_few_values(f);
     f->target.kind = SDM_FIT_IMAGE;
     f->target.values = v->values;
     return SDM_OK;
@@ -45,6 +74,7 @@ static sdm_status use_labels(cli_fit *f, sdm_error *err)
 {
     sdm_status s = SDM_ALLOC(&f->mask, sdm_grid_count(&f->image.grid), "labels", err);
     if (!s) s = cli_fit_label_mask(f->path, &f->image, &f->args->fit.labels, f->mask, err);
+    if (!s && !f->image.n_segments) s = warn_many_values(f, err);
     if (!s) s = cli_fit_close_labels(f, &f->image.grid, f->mask, err);
     f->target.kind = SDM_FIT_LABEL;
     f->target.values = f->mask;
@@ -104,7 +134,7 @@ static sdm_status read_points(cli_fit *f, sdm_error *err)
                         f->path);
     const sdm_status s = cli_ends_with_any(f->path, CLI_MESH_ENDINGS)
                              ? read_mesh(f, err)
-                             : cli_read_points(f->path, &f->points, &f->target.n_points, err);
+                             : cli_read_points(f->path, &f->points, NULL, &f->target.n_points, err);
     if (s) return s;
     for (size_t i = 0; i < 3 * f->target.n_points; i++)
         if (!isfinite(f->points[i]))

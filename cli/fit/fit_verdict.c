@@ -21,7 +21,8 @@ void cli_fit_print_verdict(const cli_fit *f)
     printf("verdict: %s\n", cli_fit_grade_name(v->grade));
     for (size_t i = 0; i < v->n_findings; i++) {
         const sdm_fit_finding *x = &v->findings[i];
-        printf("  %-12s %-9s %.3g", sdm_fit_check_name(x->kind), GRADES[x->grade], x->figure);
+        // + 0: no negative zero
+        printf("  %-12s %-9s %.3g", sdm_fit_check_name(x->kind), GRADES[x->grade], x->figure + 0);
         if (!isnan(x->limit)) printf(", limit %.3g", x->limit);
         printf("%s%s\n", *x->text ? ": " : "", x->text);
     }
@@ -38,7 +39,7 @@ void cli_fit_json_verdict(const cli_fit *f, sdm_json *j)
         sdm_json_open(j, NULL, '{');
         sdm_json_text(j, "name", sdm_fit_check_name(x->kind));
         sdm_json_text(j, "grade", cli_fit_grade_name(x->grade));
-        sdm_json_real(j, "figure", x->figure);
+        sdm_json_real(j, "figure", x->figure + 0);
         sdm_json_real(j, "limit", x->limit);
         sdm_json_text(j, "text", x->text);
         sdm_json_close(j, '}');

@@ -78,13 +78,14 @@ static sdm_status read_line(const char *path, size_t number, char *line, bool he
                     number, n);
 }
 
-static sdm_status read_csv(const char *path, double **x, size_t *n, sdm_error *err)
+static sdm_status read_csv(const char *path, double **x, size_t **places, size_t *n, sdm_error *err)
 {
     char *text = NULL;
     size_t size, lines, number = 0;
     sdm_status s = sdm_file_read_text(path, MAX_BYTES, &text, &size, &lines, err);
     if (s) return s;
     s = SDM_ALLOC(x, 3 * lines, "points", err);
+    if (!s && places) s = SDM_ALLOC(places, lines, "lines of points", err);
     // spreadsheets begin the file with a byte order mark
     char *at = size >= 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? text + 3 : text;
     bool header = true;
@@ -99,6 +100,7 @@ static sdm_status read_csv(const char *path, double **x, size_t *n, sdm_error *e
         if (!*line || *line == '#') continue;
         bool is_point;
         s = read_line(path, number, line, header, &order, *x + 3 * *n, &is_point, err);
+        if (is_point && places) (*places)[*n] = number;
         *n += is_point;
         header = false;
     }
@@ -133,13 +135,14 @@ static sdm_status read_vertices(const char *path, double **x, size_t *n, sdm_err
     return s;
 }
 
-sdm_status cli_read_points(const char *path, double **x, size_t *n, sdm_error *err)
+sdm_status cli_read_points(const char *path, double **x, size_t **lines, size_t *n, sdm_error *err)
 {
     sdm_status s;
     *x = NULL;
+    if (lines) *lines = NULL;
     *n = 0;
     if (cli_ends_with(path, ".csv"))
-        s = read_csv(path, x, n, err);
+        s = read_csv(path, x, lines, n, err);
     else if (cli_ends_with(path, ".npy"))
         s = read_npy(path, x, n, err);
     else if (cli_ends_with_any(path, CLI_MESH_ENDINGS))
@@ -154,5 +157,9 @@ sdm_status cli_read_points(const char *path, double **x, size_t *n, sdm_error *e
     if (!s) return SDM_OK;
     sdm_free(*x);
     *x = NULL;
+    if (lines) {
+        sdm_free(*lines);
+        *lines = NULL;
+    }
     return s;
 }

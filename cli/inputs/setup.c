@@ -9,6 +9,7 @@
 #include "report/files.h"
 #include "report/terminal.h"
 #include "sdm/builtin_shapes.h"
+#include "sdm/internal/heap.h"
 #include "sdm/internal/isolation.h"
 #include "sdm/internal/model_hash.h"
 #include "sdm/memory.h"
@@ -326,6 +327,18 @@ void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm
 }
 
 /* ---- grids ---- */
+
+sdm_status cli_allocate_map(const sdm_grid *grid, float **values, sdm_error *err)
+{
+    const size_t n = sdm_grid_count(grid);
+    const sdm_status s = sdm_alloc_unset((void **)values, n, sizeof **values, "distance map", NULL);
+    if (!s) return SDM_OK;
+    return sdm_fail(err, s,
+                    "no memory for a map of %lld x %lld x %lld voxels, %.3g GB: a larger --spacing "
+                    "or a smaller --size makes fewer",
+                    (long long)grid->n[0], (long long)grid->n[1], (long long)grid->n[2],
+                    1e-9 * (double)n * sizeof **values);
+}
 
 sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const double max[3],
                             sdm_grid *out, sdm_error *err)

@@ -87,6 +87,10 @@ bool cli_clamp(const char *begin, const sdm_param *params, size_t n, double *val
 /* Appends the values as "a=4.4 alpha=0.5". */
 void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out);
 
+/* *values = new memory for a map of the grid, to be freed with sdm_free(); its values are not set.
+ * SDM_E_NOMEM: names the voxels and the options that make fewer. */
+sdm_status cli_allocate_map(const sdm_grid *grid, float **values, sdm_error *err);
+
 /* *out = the axis-aligned grid of --size, --spacing and --origin. Missing options are chosen so
  * that the grid covers the box min .. max (mm) with a margin of 0.1 times its longest edge;
  * without --size and --spacing it has 64 voxels along that edge, margins included. SDM_E_ARG. */

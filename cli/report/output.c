@@ -215,7 +215,7 @@ sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *a
     case KIND_IMAGE:
         // the parameters come last: NIfTI files keep only 79 characters
         describe_method(map, made);
-        snprintf(text, sizeof text, "sdmgen %s: mm, negative inside; %s: %s %s", SDM_VERSION_TEXT,
+        snprintf(text, sizeof text, "sdmgen %s: " SDM_MAP_TEXT "; %s: %s %s", SDM_VERSION_TEXT,
                  made, map->shape, map->params);
         return sdm_image_write(path, map->grid, map->values, text, err);
     case KIND_SURFACE:

@@ -7,6 +7,9 @@
 #include "sdm/grid.h"
 #include "sdm/runtime.h"
 
+/* Part of the text in the header of an image file that holds a distance map. */
+#define SDM_MAP_TEXT "mm, negative inside"
+
 /* A map with the facts that go into the metadata of its file. */
 typedef struct cli_map {
     const sdm_grid *grid;

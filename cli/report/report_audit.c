@@ -131,7 +131,8 @@ void cli_warn_audit(const sdm_audit *a)
     if (a->duplicate > 0) cli_notice("%zu duplicate triangles", a->duplicate);
 }
 
-void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
+/* "part 2 of 3 (12 triangles, vertices 8 .. 15, box ...) " */
+static void name_part(const sdm_part_audit *a, size_t index, sdm_text *text)
 {
     const sdm_part *p = &a->part[index];
     sdm_text_add(text,
@@ -139,6 +140,28 @@ void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
                  "%.4g %.4g mm) ",
                  index + 1, a->n, p->n_tri, p->first_vert, p->last_vert, p->min[0], p->min[1],
                  p->min[2], p->max[0], p->max[1], p->max[2]);
+}
+
+void cli_describe_open(const sdm_part_audit *a, sdm_text *text)
+{
+    size_t most = 0;
+    for (size_t i = 1; i < a->n; i++)
+        if (a->part[i].open_edges > a->part[most].open_edges) most = i;
+    if (!a->n || !a->part[most].open_edges) return;
+    const double *x = a->part[most].open_at;
+    name_part(a, most, text);
+    sdm_text_add(text,
+                 "has %zu edges on which not as many triangles run in one direction as in the "
+                 "other, the first at %.4g %.4g %.4g mm: add the triangles that are missing there, "
+                 "let neighbours run the same way around, and give vertices that are the same "
+                 "point exactly the same coordinates",
+                 a->part[most].open_edges, x[0], x[1], x[2]);
+}
+
+void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
+{
+    const sdm_part *p = &a->part[index];
+    name_part(a, index, text);
     if (p->volume > 0)
         sdm_text_add(text, "runs the other way than the rest, which is inside out: ");
     else
@@ -192,12 +215,16 @@ sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_erro
         encloses = encloses || a->part[i].state == SDM_PART_SOLID;
         if (a->part[i].state == SDM_PART_INSIDE_OUT) first = i;
     }
-    if (open > 0)
-        return sdm_fail(err, SDM_E_MESH,
-                        "the mesh is not closed: on %zu edges not as many triangles run in one "
-                        "direction as in the other; maps take for inside where the winding number "
-                        "exceeds 1/2",
-                        open);
+    if (open > 0) {
+        sdm_text text = {0};
+        cli_describe_open(a, &text);
+        const sdm_status s = sdm_fail(err, SDM_E_MESH,
+                                      "the mesh is not closed: %s; maps take for inside where the "
+                                      "winding number exceeds 1/2",
+                                      text.failed ? "edges are open" : text.data);
+        sdm_text_dispose(&text);
+        return s;
+    }
     if (first < a->n) {
         sdm_text text = {0};
         cli_describe_part(a, first, &text);

@@ -20,6 +20,10 @@ void cli_warn_audit(const sdm_audit *a);
  * and what becomes of it. */
 void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text);
 
+/* Writes one line about the part with most open edges to `text`: where it is, where its first open
+ * edge is, and what to do; nothing if the mesh is closed. */
+void cli_describe_open(const sdm_part_audit *a, sdm_text *text);
+
 /* Judges the mesh. SDM_E_MESH: it is not closed; SDM_E_QUALITY: parts are inside out and not turned
  * by the engine, or it encloses no volume. The message says what is wrong and what the user can do
  * (mend, for parts that are inside out). */

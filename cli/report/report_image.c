@@ -1,9 +1,13 @@
 /* Prints the grid, the range of values and the segments of an image file. */
 #include "report_image.h"
 
+#include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "json_values.h"
+#include "output.h"
+#include "sdm/map.h"
 #include "terminal.h"
 
 static void print_grid(const sdm_grid *g)
@@ -20,6 +24,14 @@ static void print_grid(const sdm_grid *g)
                g->dir[3 + a], g->dir[6 + a]);
 }
 
+/* Volume inside the zero level set, mm^3; NaN: the file is no distance map of this program. */
+static double map_volume(const sdm_volume *v)
+{
+    double volume = NAN;
+    const bool map = strstr(v->text, ": " SDM_MAP_TEXT) && v->n_layers == 1 && !v->n_nan;
+    return !map || sdm_map_volume(&v->grid, v->values, 0, &volume, NULL) ? NAN : volume;
+}
+
 void cli_print_volume(const char *path, const sdm_volume *v)
 {
     cli_print("%s: image of %s voxels", path, sdm_voxel_name(v->stored));
@@ -30,6 +42,8 @@ void cli_print_volume(const char *path, const sdm_volume *v)
         cli_print(
             "             the file states no frame: axes and origin are defaults of its format\n");
     cli_print("values       %.9g .. %.9g\n", (double)v->min, (double)v->max);
+    const double volume = map_volume(v);
+    if (isfinite(volume)) cli_print("volume       %.6g mm^3 inside the surface\n", volume);
     if (v->n_nan > 0 || v->n_inf > 0)
         cli_print("             %zu are NaN, %zu infinite\n", v->n_nan, v->n_inf);
     for (size_t i = 0; i < v->n_segments; i++) {
@@ -51,6 +65,8 @@ void cli_json_volume(sdm_json *j, const char *path, const sdm_volume *v)
     sdm_json_int(j, "layers", (int64_t)v->n_layers);
     sdm_json_real(j, "min", (double)v->min);
     sdm_json_real(j, "max", (double)v->max);
+    const double volume = map_volume(v);
+    if (isfinite(volume)) sdm_json_real(j, "volume_mm3", volume);
     sdm_json_int(j, "nan", (int64_t)v->n_nan);
     sdm_json_int(j, "infinite", (int64_t)v->n_inf);
     sdm_json_open(j, "segments", '[');

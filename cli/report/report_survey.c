@@ -83,11 +83,17 @@ static void tell_failed(teller *t)
 static void tell_open(teller *t)
 {
     sdm_text text = {0};
-    if (!t->s->found.open.shapes) return;
-    add_count(t->s, &t->s->found.open, "open or badly oriented edges", &text);
-    sdm_text_add(&text, ": on every edge as many triangles must run in one direction as in the "
-                        "other");
+    const sdm_survey_count *c = &t->s->found.open;
+    sdm_mesh mesh = {0};
+    sdm_part_audit audit = {0};
+    if (!c->shapes) return;
+    add_count(t->s, c, "open or badly oriented edges", &text);
+    sdm_text_add(&text, ": ");
+    if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL))
+        cli_describe_open(&audit, &text);
     tell(t, SDM_E_MESH, &text);
+    sdm_part_audit_dispose(&audit);
+    sdm_mesh_dispose(&mesh);
 }
 
 static void tell_inside_out(teller *t)
@@ -215,6 +221,24 @@ static void tell_cut(teller *t)
     tell(t, f->cut.shapes ? SDM_E_QUALITY : SDM_OK, &text);
 }
 
+/* One line if the vertices are hardly in mm. */
+static void tell_unit(teller *t)
+{
+    const sdm_survey_scale *c = &t->s->found.scale;
+    sdm_text text = {0};
+    if (!c->odd_size && !c->odd_speed) return;
+    if (c->odd_size) sdm_text_add(&text, "the shape is %.3g mm in size", c->size);
+    if (c->odd_speed)
+        sdm_text_add(&text, "%s1 mm of the parameter '%s' moves its vertices by %.2g mm",
+                     c->odd_size ? ", " : "", sdm_instance_params(t->s->shape, NULL)[c->param].name,
+                     c->speed);
+    sdm_text_add(&text, "; the unit of sdmgen is mm");
+    if (c->unit)
+        sdm_text_add(&text, ": if the vertices are in %s, multiply them by %g", c->unit,
+                     c->unit_mm);
+    tell(t, SDM_E_QUALITY, &text);
+}
+
 static void tell_callbacks(teller *t)
 {
     const sdm_shape_survey *f = &t->s->found;
@@ -266,6 +290,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_turned(&t);
     tell_sizes(&t);
     tell_jumps(&t);
+    tell_unit(&t);
     tell_cut(&t);
     tell_callbacks(&t);
     tell_notes(&t);

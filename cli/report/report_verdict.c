@@ -25,6 +25,16 @@ static void print_parts(const sdm_verdict *v)
     }
 }
 
+/* The error by the distance from the surface. */
+static void print_far(const sdm_verdict *v)
+{
+    printf("  by distance within %g mm of the surface %.5f mm", v->near_mm, v->rmse_near_mm);
+    if (isfinite(v->rmse_inside_mm)) printf(", farther inside %.5f", v->rmse_inside_mm);
+    if (isfinite(v->rmse_outside_mm)) printf(", farther outside %.5f", v->rmse_outside_mm);
+    printf("; the largest error, %.3g mm, lies %.3g mm %s\n", v->largest_mm, fabs(v->largest_at_mm),
+           v->largest_at_mm < 0 ? "inside" : "outside");
+}
+
 void cli_print_verdict(const sdm_verdict *v)
 {
     const double voxel = v->voxel_mm;
@@ -33,7 +43,10 @@ void cli_print_verdict(const sdm_verdict *v)
     printf("  %-11s %s", sdm_grade_name(v->grade), sdm_grade_text(v->grade));
     if (v->cut > 0 && v->grade != SDM_GRADE_POOR)
         printf("; not for the %.2g %% of the shapes that the grid cuts", fmin(99, 100 * v->cut));
+    if (sdm_verdict_errs_far(v))
+        printf("; not for distances far from the surface: wrong by up to %.2g mm", v->largest_mm);
     printf("\n");
+    print_far(v);
     print_parts(v);
     if (isfinite(v->motion_mm))
         printf("  template    at the vertices: frames and amplitudes %.2g mm, warp %.2g mm\n",

@@ -14,6 +14,7 @@
 
 static bool quiet_wanted;
 static cli_form form;
+static size_t warnings;
 static volatile sig_atomic_t interrupts;
 
 static int exit_code_of(sdm_status status)
@@ -178,7 +179,10 @@ void cli_warn(const char *fmt, ...)
     va_start(args, fmt);
     print_line("warning", "sdmgen: warning: ", fmt, args);
     va_end(args);
+    warnings++;
 }
+
+size_t cli_warnings(void) { return warnings; }
 
 static void on_interrupt(int number)
 {

@@ -50,6 +50,9 @@ void cli_notice(const char *fmt, ...) SDM_PRINTF(1, 2);
    probably not what the user wants. */
 void cli_warn(const char *fmt, ...) SDM_PRINTF(1, 2);
 
+/* Number of warnings that the program has printed so far. */
+size_t cli_warnings(void);
+
 /* printf() for texts that quote a file: characters that command a terminal are printed as \xNN, as
  * they are in all messages on stderr. */
 void cli_print(const char *fmt, ...) SDM_PRINTF(1, 2);

@@ -13,6 +13,7 @@
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
 #include "survey_line.h"
+#include "survey_scale.h"
 
 enum { LINES_PER_PARAM = 4, LINES_MAX = 64, VELOCITIES = 4, REPEATS = 8, BOX_SAMPLES = 64 };
 
@@ -380,6 +381,7 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
         if (!s) s = repeat(&v, n_threads, err);
         if (!s) s = widen_box(&v, err);
     }
+    if (!s) s = sdm_survey_measure_scale(&v.family, out, err);
     sdm_free(v.found);
     sdm_free(v.line);
     sdm_free(v.unlike);
@@ -412,7 +414,8 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
     bool bad = s->inside_out.shapes || (s->turned.shapes && s->turned.shapes < s->n) ||
                s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->unlike ||
-               s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT;
+               s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
+               s->scale.odd_speed;
     for (size_t k = 0; k < s->n_params && s->jump; k++)
         bad = bad || s->jump[k].kind != SDM_BREAK_NONE;
     return bad ? SDM_E_QUALITY : SDM_OK;

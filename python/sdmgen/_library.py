@@ -31,13 +31,17 @@ _local = threading.local()
 
 
 def _candidates(name: str) -> list[str]:
-    """The paths to try: beside this file, the folder of SDMGEN_LIBRARY, and the system's path."""
+    """The paths to try: beside this file, the folder of SDMGEN_LIBRARY, the folder lib with python3/dist-packages of an
+    installation, and the system's path."""
     file = f"lib{name}.so.{_VERSION}"
     paths = [str(Path(__file__).resolve().parent / "lib" / file)]
     given = os.environ.get("SDMGEN_LIBRARY")
     if given:
         folder = Path(given) if os.path.isdir(given) else Path(given).parent
         paths.append(given if name == "sdmgen" and not os.path.isdir(given) else str(folder / file))
+    above = Path(__file__).resolve().parents
+    if len(above) > 4 and above[2].name == "python3":
+        paths += [str(above[4] / folder / file) for folder in ("lib", "lib64")]
     return [path for path in paths if os.path.exists(path)] + [file]
 
 

@@ -131,9 +131,9 @@ sdm_status sdm_field_points(const sdm_field *f, const double *x, size_t n, float
         wrong = i < wrong ? i : wrong;
     }
     if (wrong == SIZE_MAX) return SDM_OK;
-    char name[40];
+    char name[64];
     float value, along[3], *by_params = slopes ? slopes + wrong * f->info->n_params : NULL;
-    snprintf(name, sizeof name, "point %zu", wrong);
+    snprintf(name, sizeof name, "point %zu of %zu", wrong + 1, n);
     return report(f, point(f, x + 3 * wrong, &value, gradient ? along : NULL, by_params),
                   x + 3 * wrong, name, err);
 }

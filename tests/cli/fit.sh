@@ -135,7 +135,7 @@ voxels=$(($(wc -c <label.nii) - 352))
     tail -c +$((353 + voxels / 2)) label.nii | tr '\001' '\002'
 } >two.nii
 for labels in '--label 1 --label 77' '--label 77 --label 1'; do
-    expect 3 "two.nii: no voxel has the label '77'" sdmgen fit $fit two.nii $labels
+    expect 3 "two.nii: no voxel has the label '77'; its labels are 1 2$" sdmgen fit $fit two.nii $labels
 done
 expect 0 - sdmgen fit $fit two.nii --label 1 --label 2 --rotation 0,0,0 --spacing 0.5 --json
 near "$(param rx)" "$rx" 0.001

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: which options apply to which kind of target, against the table in docs/fitting.md.
-# Tests: fit_applies.c fit_size.c option_names.c
+# Tests: fit_applies.c fit_size.c fit_labels.c fit_target.c option_names.c
 . "$(dirname "$0")/common.sh"
 shape='--shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2'
 expect 0 - sdmgen phantom $shape --spacing 0.8 -o image.nii --label labels.nii --quiet
@@ -35,6 +35,28 @@ expect 2 'these apply: --keep appearance, --point-sd$' sdmgen fit $shape points.
 # --ras is about points and about coordinates of the command line
 expect 2 '--ras .*does nothing in a fit to image' sdmgen fit $shape image.nii --ras --start-points missing.csv
 expect 1 'missing.csv: ' sdmgen fit $shape points.csv --ras --start-points missing.csv
+
+# an image in metres
+sdmgen phantom $shape --spacing 0.8 -o image.mha --quiet
+sed 's/^ElementSpacing = .*/ElementSpacing = 0.0008 0.0008 0.0008/' image.mha >metres.mha
+sdmgen fit $shape metres.mha --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
+grep -q 'warning: metres.mha: the image measures 0.0[0-9]* mm across, its voxels 0.0008 mm, the start shape [0-9.]* mm: are they in m? lengths are mm' err ||
+    bad "image in metres: $(cat err)"
+# without values of the tissues a notice says which are taken; labels and images in each other's place
+sdmgen fit $shape image.nii --rotation 0,0,0 --max-iterations 1 >out 2>err
+grep -q 'image measures' err && bad "image in millimetres: $(cat err)"
+grep -q -- '--inside and --outside are not given: the fit starts from inside 40 +- 170, outside 1300 +- 270' err || bad "tissues: $(cat err)"
+sdmgen fit $shape image.nii --rotation 0,0,0 --max-iterations 1 --inside 40,170 >out 2>err
+grep -q -- '--outside is not given' err || bad "one tissue: $(cat err)"
+sdmgen fit $shape image.nii --rotation 0,0,0 --max-iterations 1 --inside 40,170 --outside 1300,200 >out 2>err
+grep -q 'not given: the fit' err && bad "given tissues: $(cat err)"
+sdmgen fit $shape labels.nii --rotation 0,0,0 --max-iterations 1 >out 2>err
+grep -q 'labels.nii holds only 2 different values, 0 to 1: if it is a label map, give --label with the value of the shape, e.g. --label 1$' err ||
+    bad "labels as an image: $(cat err)"
+expect 3 "image.nii: no voxel has the label '31000' .*if it is an image, leave --label out" sdmgen fit $shape image.nii --label 31000
+sdmgen phantom $shape --spacing 0.3 -o fine.nii --quiet
+sdmgen fit $shape fine.nii --label "$(sdmgen info fine.nii --json | sed 's/.*"max": *\([-0-9]*\).*/\1/')" --rotation 0,0,0 --max-iterations 1 >out 2>err
+grep -q 'fine.nii holds over 1000 different values, or fractions: if it is an image, leave --label out' err || bad "an image as labels: $(cat err)"
 
 # a mesh in metres or micrometres
 sed 's/\([0-9.-]\{1,\}\)/\1e-3/g; 1s/.*/x,y,z/' points.csv >metres.csv

@@ -34,7 +34,8 @@ faulty sizes 4 '^warning +the number of vertices or triangles changes at size=2,
 faulty wires 4 '^warning +the triangles get other vertices in'
 faulty velocity 4 '^warning +velocity\(\) is off by 0\.0099 of the largest velocity by reach, at vertex 9'
 faulty unlike 4 '^warning +8 meshes had other bits'
-faulty open 3 '^broken +open or badly oriented edges in all 21 shapes, up to 3'
+faulty open 3 '^broken +open or badly oriented edges in all 21 shapes, up to 3 at .*: part 2 of 2 \(11 triangles, vertices 8 \.\. 15, .* has 3 edges .*, the first at [0-9.]+ -?[0-9.]+ -?[0-9.]+ mm: add the triangles'
+faulty metres 4 '^warning +the shape is 0\.008 mm in size, 1 mm of the parameter .size. moves its vertices by 0\.0017 mm; the unit of sdmgen is mm: if the vertices are in m, multiply them by 1000$'
 faulty fail 3 "^broken +no mesh in [0-9]+ of 21 shapes: shape 'faulty' at size=2\.5 reach=1\.5: too large"
 expect 4 'mend' sdmgen shapes check faulty -O fault=jump --plugin "$plugin" --samples 16 --json
 has '"verdict": "warning".*"jumps": \[\{"kind": "jump", "parameter": "size", "value": [12]\.[0-9]+, "vertex": [0-9]+, "mm": 0\.125'
@@ -48,7 +49,7 @@ YAML
 expect 0 - sdmgen shapes check good.yaml --plugin "$plugin" --samples 16
 has '^fine: the shape can be trained$'
 expect 4 mend sdmgen shapes check good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" --samples 16 -o cut.svg
-cuts='over the parameters the shape reaches from \(-2, -2, -2\) to \(4, 2, 2\) mm; the grid covers \(-3\.5, -4, -4\) to \(3\.5, 4, 4\) mm and cuts [0-9.]+ % of the shapes \(by up to 0\.5 mm at the upper end of x\); use grid: (auto|\{voxels: [0-9]+\}) \(size: \[[0-9, ]+\], spacing: [0-9.]+, origin: \[[-0-9., ]+\]\)'
+cuts='over the parameters the shape reaches from \(-2, -2, -2\) to \(4, 2, 2\) mm; the grid covers \(-3\.5, -4, -4\) to \(3\.5, 4, 4\) mm and cuts [0-9.]+ % of the shapes \(by up to 0\.5 mm at the upper end of x\); use grid: \{spacing: 1\} \(size: \[[0-9, ]+\], spacing: 1, origin: \[[-0-9., ]+\]\)'
 has "^warning +$cuts$"
 present cut.svg
 
@@ -63,7 +64,7 @@ expect 0 - sdmgen mesh --shape faulty --audit --plugin "$plugin"
 has '^volume +125\.5 mm\^3, the sum over all triangles: overlaps count twice$'
 has '^volume of the union +125\.375 mm\^3$'
 has '^fine: the mesh is closed; it overlaps itself, and the union counts$'
-expect 3 'error: the mesh is not closed: on 3 edges' sdmgen mesh --shape faulty -O fault=open --audit --plugin "$plugin"
+expect 3 'error: the mesh is not closed: part 2 of 2 \(11 triangles, .* has 3 edges .*, the first at' sdmgen mesh --shape faulty -O fault=open --audit --plugin "$plugin"
 expect 0 'warning: the mesh is open: 3 boundary edges' sdmgen mesh --shape faulty -O fault=open -o open.ply --plugin "$plugin" -q
 expect 3 'not closed' sdmgen mesh --mesh open.ply --json
 has '"verdict": "broken"'
@@ -84,6 +85,8 @@ done
 sdmgen config good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" >out 2>err || bad 'config of a grid that cuts'
 told "$cuts"
 expect 0 "^sdmgen: warning: $cuts" sdmgen config good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" -q
+has '^good\.yaml: no mistakes, 1 warning$'
+expect 0 'warning: the shape is 0\.0[0-9]+ mm in size' sdmgen config good.yaml shape.options.fault=metres --plugin "$plugin" -q
 sdmgen exact --shape faulty -O fault=handle --certify -o z.nrrd --plugin "$plugin" >out 2>err
 [ $? -eq 4 ] || bad "exact --certify of a part that is inside out: $(cat err)"
 told '^sdmgen: error: signs: [0-9]+ voxels are in a part of the mesh that is inside out'

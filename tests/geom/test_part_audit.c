@@ -137,6 +137,11 @@ static void test_open_and_flat_parts(void **state)
     sdm_part_audit a = audit_of(&m);
     assert_int_equal(a.part[0].state, SDM_PART_OPEN);
     assert_int_equal(a.part[0].open_edges, 3);
+    int at_side = 0;
+    for (int d = 0; d < 3; d++)
+        at_side +=
+            a.part[0].open_at[d] == a.part[0].min[d] || a.part[0].open_at[d] == a.part[0].max[d];
+    assert_true(at_side > 0);
     assert_int_equal(a.part[1].state, SDM_PART_INSIDE_OUT);
     assert_true(isnan(a.union_volume));
     sdm_part_audit_dispose(&a);

@@ -108,7 +108,7 @@ static void test_refused_outside(void **state)
     assert_int_equal(
         sdm_generate_points(s->model[0], params, NULL, x, 2, values, NULL, NULL, NULL, &err),
         SDM_E_RANGE);
-    assert_non_null(strstr(err.text, "point 1 (9, 1, 1) mm lies outside of the box"));
+    assert_non_null(strstr(err.text, "point 2 of 2 (9, 1, 1) mm lies outside of the box"));
     // roundings of a position on the face of the box are no reason
     x[3] = m.origin[0] - 1e-12;
     assert_false(

@@ -119,7 +119,7 @@ static void test_wrong_arguments_are_refused(void **state)
     assert_int_equal(
         sdm_generate_points(s->model[0], params, NULL, bad, 2, values, NULL, NULL, NULL, &err),
         SDM_E_ARG);
-    assert_non_null(strstr(err.text, "point 1"));
+    assert_non_null(strstr(err.text, "point 2 of 2"));
     sdm_field *f;
     const sdm_generate_opts check = {.check = true, .exact_shape = s->shape};
     assert_int_equal(sdm_field_create(s->model[0], &check, false, &f, &err), SDM_E_ARG);

@@ -160,6 +160,38 @@ static void test_an_image_without_noise_passes(void **state)
     sdm_instance_free(torus);
 }
 
+// A capsule thinner than the point spread has no voxel deep inside; in an image of noise alone the
+// values given for the inside are then the measure, and they are missing.
+static void test_a_thin_shape_in_noise_is_refused(void **state)
+{
+    (void)state;
+    sdm_instance *capsule = shape_of("capsule");
+    const sdm_grid g = cube(5.5, 0.35);
+    const size_t n = sdm_grid_count(&g);
+    float *v = calloc(n, sizeof *v);
+    if (!v) abort();
+    for (size_t i = 0; i < n; i++) v[i] = (float)(1300 + 270 * sdm_rng_normal(9, 0, i));
+    const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = v};
+    const sdm_fit_source source = {
+        .shape = capsule,
+        .grid = sdm_grid_centred((int64_t[3]){34, 34, 34}, 0.35, (double[3]){0, 0, 0})};
+    sdm_fit_opts o = sdm_fit_defaults();
+    const double thin[2] = {0.5, 4};
+    o.start_pose = POSE;
+    o.start_params = thin;
+    o.keep_params = true;
+    o.blur = 0.7, o.keep_blur = true;
+    o.appearance.n_outside = 1;
+    sdm_fit_result r;
+    sdm_error err = {0};
+    assert_int_equal(sdm_fit(&source, &t, &o, &r, &err), SDM_E_QUALITY);
+    assert_true(r.verdict.n_units > 0);
+    assert_int_equal(r.verdict.grade, SDM_FIT_FAILED);
+    sdm_fit_dispose(&r);
+    free(v);
+    sdm_instance_free(capsule);
+}
+
 static void test_wrong_shapes_are_refused(void **state)
 {
     (void)state;
@@ -424,6 +456,7 @@ int main(void)
         cmocka_unit_test(test_findings_are_sorted),
         cmocka_unit_test(test_right_fits_pass),
         cmocka_unit_test(test_an_image_without_noise_passes),
+        cmocka_unit_test(test_a_thin_shape_in_noise_is_refused),
         cmocka_unit_test(test_wrong_shapes_are_refused),
         cmocka_unit_test(test_points_of_another_shape_are_refused),
         cmocka_unit_test(test_strays_are_refused_if_many),

@@ -18,7 +18,7 @@ static const sdm_param FAULTY_PARAMS[] = {{"size", "mm", 1, 3, 2.5, "edge of the
 static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
-     "exit|trained|hang|flood|heap|beyond|before|print|write|shared|"
+     "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge",
      "x"}};
 
@@ -112,6 +112,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         memcpy(out->tri, OTHER, sizeof OTHER);
     }
     if (is_large) faulty_arrays(fault, p, out);
+    for (size_t i = 0; i < 24 * boxes && !strcmp(fault, "metres"); i++) out->vert[i] /= 1000;
     return 0;
 }
 

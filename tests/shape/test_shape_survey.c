@@ -1,6 +1,6 @@
 /* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
  * known from the source; shapes without faults pass.
- * Tests: shape_survey.c survey_line.c */
+ * Tests: shape_survey.c survey_line.c survey_scale.c units.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,6 +14,7 @@
 #include "sdm/builtin_shapes.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/shape_survey.h"
+#include "sdm/internal/units.h"
 
 static sdm_registry *registry;
 static sdm_error err;
@@ -116,6 +117,32 @@ static void broken_meshes(void **state)
     assert_int_equal(s.failed.worst, 0);
     assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_MESH);
     sdm_shape_survey_dispose(&s);
+}
+
+// The vertices in m: the size and the motion by a parameter in mm tell; both name the unit.
+static void vertices_in_metres(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("none");
+    // a corner of the body moves by sqrt(3) mm
+    assert_true(fabs(s.scale.speed - sqrt(3)) < 1e-6 && s.scale.param == 0 && s.scale.size == 8);
+    assert_true(!s.scale.odd_size && !s.scale.odd_speed && !s.scale.unit);
+    sdm_shape_survey_dispose(&s);
+    s = survey("metres");
+    assert_true(s.scale.odd_size && s.scale.odd_speed);
+    assert_true(fabs(s.scale.speed - 1e-3 * sqrt(3)) < 1e-9);
+    assert_string_equal(s.scale.unit, "m");
+    assert_true(s.scale.unit_mm == 1000);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    sdm_shape_survey_dispose(&s);
+    static const struct {
+        double mm;
+        const char *unit;
+    } cases[] = {{900, "m"}, {30, "inches"}, {9, "cm"}, {2e-3, "um"}, {1, NULL}, {1e5, NULL}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const char *unit = sdm_unit_near(cases[i].mm, NULL);
+        assert_true(!unit == !cases[i].unit && (!unit || !strcmp(unit, cases[i].unit)));
+    }
 }
 
 static void breaks_along_a_parameter(void **state)
@@ -252,6 +279,7 @@ int main(void)
         cmocka_unit_test(without_faults),
         cmocka_unit_test(parts_that_are_inside_out),
         cmocka_unit_test(broken_meshes),
+        cmocka_unit_test(vertices_in_metres),
         cmocka_unit_test(breaks_along_a_parameter),
         cmocka_unit_test(callbacks),
         cmocka_unit_test(a_grid_that_cuts),

@@ -102,28 +102,34 @@ static void test_capsule(void **state)
     run_files_remove();
 }
 
-// A proposal reads as the keys that it names.
+// A proposal keeps the spacing of the configuration and reads as the keys that it names; where the
+// spacing makes too many voxels, it says so.
 static void test_proposal(void **state)
 {
     (void)state;
-    static const char *const SIZES[] = {"[60, 30, 30]", "[30, 80, 30]"},
-                             *const WORDS[] = {"grid: auto (", "grid: {voxels: 80} ("};
-    for (int k = 0; k < 2; k++) {
+    static const struct {
+        const char *given, *words, *as;
+        bool coarser;
+    } cases[] = {{"grid: {size: [5, 6, 7], spacing: 1}", "grid: {spacing: 1} (",
+                  "grid: {spacing: 1}", false},
+                 {"grid: {size: [5, 6, 7], spacing: [1, 1, 0.5]}", "grid: {spacing: [1, 1, 0.5]} (",
+                  "grid: {spacing: [1, 1, 0.5]}", false},
+                 {"grid: {size: [5, 6, 7], spacing: 0.01}", "grid: auto (", "grid: auto", true}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         sdm_config c;
         sdm_error e = {0};
         sdm_text text = {0};
-        char grid[64];
-        snprintf(grid, sizeof grid, "grid: {size: %s, spacing: 1}", SIZES[k]);
-        read_config(&c, grid);
+        read_config(&c, cases[k].given);
         if (sdm_train_grid_proposal(&c, capsule, &text, &e)) fail_msg("%s", e.text);
-        assert_memory_equal(text.data, WORDS[k], strlen(WORDS[k]));
+        assert_memory_equal(text.data, cases[k].words, strlen(cases[k].words));
+        assert_int_equal(strstr(text.data, "coarser than yours: ") != NULL, cases[k].coarser);
 
         char proposed[256];
         const char *keys = strchr(text.data, '(') + 1;
         snprintf(proposed, sizeof proposed, "grid: {%.*s}", (int)strcspn(keys, ")"), keys);
         sdm_config as_keys, as_word;
         read_config(&as_keys, proposed);
-        read_config(&as_word, k ? "grid: {voxels: 80}" : "grid: auto");
+        read_config(&as_word, cases[k].as);
         assert_int_equal(sdm_train_grid(&as_word, capsule, NULL, &e), SDM_OK);
         assert_memory_equal(&as_keys.grid, &as_word.grid, sizeof as_keys.grid);
         sdm_text_dispose(&text);

@@ -288,7 +288,8 @@ static void template_remains(void **state)
     assert_false(r.compared);
 }
 
-// Thick parts that overlap: the verdict names the bound inside, and the remedy.
+// Thick parts that overlap: the verdict tells the error far inside from that near the surface, and
+// names the remedy, which is no finer grid.
 static void overlap_is_named(void **state)
 {
     (void)state;
@@ -303,9 +304,13 @@ static void overlap_is_named(void **state)
     const sdm_config c = parse_config(link_text, thick, 7);
     const sdm_train_report r = train(&c);
     const double *part = r.verdict.part_mm2;
-    assert_int_equal(r.verdict.limit, SDM_CAUSE_OVERLAP);
-    assert_true(fabs(part[SDM_CAUSE_OVERLAP] + part[SDM_CAUSE_TEMPLATE] - r.accuracy.mse_mm2) <
+    assert_int_equal(r.verdict.limit, SDM_CAUSE_FAR);
+    assert_true(fabs(part[SDM_CAUSE_FAR] + part[SDM_CAUSE_TEMPLATE] - r.accuracy.mse_mm2) <
                 1e-9 * r.accuracy.mse_mm2);
+    // the largest error is a bound deep inside; it is told, whatever the grade
+    assert_true(r.verdict.largest_mm == r.accuracy.max_abs_mm);
+    assert_true(r.verdict.largest_at_mm < -r.verdict.near_mm && sdm_verdict_errs_far(&r.verdict));
+    assert_true(r.verdict.rmse_inside_mm > 4 * r.verdict.rmse_near_mm);
     if (!strstr(r.verdict.sentence, "set network.kind to auto")) fail_msg("%s", r.verdict.sentence);
 }
 

@@ -82,7 +82,7 @@ static void largest_part_limits(void **state)
         {"data.memory_gb=0.005", SDM_CAUSE_MAPS, 0, 0, "to 400 and data.memory_gb to 1;"},
         {NULL, SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f16"},
         {"network.weights=f16", SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f32"},
-        {NULL, SDM_CAUSE_OVERLAP, 0, 0, "set network.kind to auto, which trains pod, too"},
+        {NULL, SDM_CAUSE_FAR, 0, 0, "set network.kind to auto, which trains pod, too"},
         {NULL, SDM_CAUSE_TEMPLATE, 0, 0,
          "lower grid.spacing from 0.8 to 0.4 (and double grid.size, if it is given)"},
     };
@@ -118,18 +118,25 @@ static void length_of_the_training(void **state)
     assert_string_equal(v.key, "train.steps");
 }
 
-// After `auto` there is no other kind to advise.
-static void overlap_without_a_remedy(void **state)
+// After `auto` the other kind is a choice, not a remedy. An error of less than a voxel, or near the
+// surface, is not told with the grade.
+static void error_far_from_the_surface(void **state)
 {
     (void)state;
     const sdm_config c = config_of(NULL, 0);
     const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .asked = false};
     sdm_verdict v = figures();
-    v.part_mm2[SDM_CAUSE_TEMPLATE] = 1e-5, v.part_mm2[SDM_CAUSE_OVERLAP] = 3e-5;
+    v.part_mm2[SDM_CAUSE_TEMPLATE] = 1e-5, v.part_mm2[SDM_CAUSE_FAR] = 3e-5;
     trainer_verdict_decide(&in, &v);
-    assert_int_equal(v.limit, SDM_CAUSE_OVERLAP);
-    assert_true(!v.key[0] && !strstr(v.sentence, "network.kind"));
+    assert_int_equal(v.limit, SDM_CAUSE_FAR);
+    assert_true(!v.key[0] && strstr(v.sentence, "set network.kind to pod; a finer grid does not"));
     assert_non_null(strstr(v.sentence, "75 %"));
+    v.near_mm = 1.6, v.largest_mm = 0.9, v.largest_at_mm = -5;
+    assert_true(sdm_verdict_errs_far(&v));
+    v.largest_at_mm = 1.5;
+    assert_false(sdm_verdict_errs_far(&v));
+    v.largest_mm = 0.7, v.largest_at_mm = 5;
+    assert_false(sdm_verdict_errs_far(&v));
 }
 
 // The grid limits if it errs twice as much as the model and more than a twentieth of a voxel: where
@@ -434,7 +441,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(largest_part_limits),
         cmocka_unit_test(length_of_the_training),
-        cmocka_unit_test(overlap_without_a_remedy),
+        cmocka_unit_test(error_far_from_the_surface),
         cmocka_unit_test(grid_limits),
         cmocka_unit_test(grades),
         cmocka_unit_test(grid_cuts),

@@ -1,9 +1,14 @@
 /* The grid that is fitted to the shapes of a configuration. */
+#include <math.h>
+
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/text.h"
 #include "sdm/internal/train.h"
 
 enum { BOX_SAMPLES = 256, BOX_SEED = 1 };
+
+/* Most voxels of a grid that is proposed with the spacing of the configuration. */
+static const double PROPOSED_MAX = 2.5e6;
 
 /* The box low[3] .. high[3] of the shapes of a configuration. */
 static sdm_status find_box(const sdm_config *config, const sdm_instance *shape, double low[3],
@@ -23,15 +28,21 @@ static void add_three(sdm_text *out, const double v[3])
     sdm_text_add(out, "[%.10g, %.10g, %.10g]", v[0], v[1], v[2]);
 }
 
+/* Appends a spacing: "3" or "[3, 3, 4]". */
+static void add_spacing(sdm_text *out, const sdm_grid *g)
+{
+    if (g->spacing[0] == g->spacing[1] && g->spacing[0] == g->spacing[2])
+        sdm_text_add(out, "%.10g", g->spacing[0]);
+    else
+        add_three(out, g->spacing);
+}
+
 /* Appends the keys of a grid: "size: [59, 52, 37], spacing: 0.23, origin: [-6.1, -5.5, -2.1]". */
 static void add_keys(sdm_text *out, const sdm_grid *g)
 {
     sdm_text_add(out, "size: [%lld, %lld, %lld], spacing: ", (long long)g->n[0], (long long)g->n[1],
                  (long long)g->n[2]);
-    if (g->spacing[0] == g->spacing[1] && g->spacing[0] == g->spacing[2])
-        sdm_text_add(out, "%.10g", g->spacing[0]);
-    else
-        add_three(out, g->spacing);
+    add_spacing(out, g);
     sdm_text_add(out, ", origin: ");
     add_three(out, g->origin);
 }
@@ -62,15 +73,24 @@ sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance 
                                    sdm_text *out, sdm_error *err)
 {
     double low[3], high[3];
-    int voxels = SDM_GRID_VOXELS_MIN;
     sdm_grid grid;
-    for (int i = 0; i < 3; i++)
-        if (config->grid.n[i] > voxels) voxels = (int)config->grid.n[i];
     sdm_status s = find_box(config, shape, low, high, err);
-    if (!s) s = sdm_grid_around(low, high, voxels, NULL, &grid, err);
     if (s) return s;
-    sdm_text_add(out, voxels == SDM_GRID_VOXELS ? "grid: auto (" : "grid: {voxels: %d} (", voxels);
+    // the spacing stays, unless that makes very many voxels
+    s = sdm_grid_around(low, high, 0, config->grid.spacing, &grid, NULL);
+    const double voxels = s ? INFINITY : (double)sdm_grid_count(&grid);
+    if (voxels <= PROPOSED_MAX) {
+        sdm_text_add(out, "grid: {spacing: ");
+        add_spacing(out, &grid);
+        sdm_text_add(out, "} (");
+    } else {
+        s = sdm_grid_around(low, high, SDM_GRID_VOXELS, NULL, &grid, err);
+        if (s) return s;
+        sdm_text_add(out, "grid: auto (");
+    }
     add_keys(out, &grid);
     sdm_text_add(out, ")");
+    if (voxels > PROPOSED_MAX && voxels < INFINITY)
+        sdm_text_add(out, ", coarser than yours: with your spacing it has %.3g voxels", voxels);
     return out->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
 }

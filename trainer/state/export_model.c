@@ -53,8 +53,8 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     const double voxel = trainer_dataset_voxel(d);
     const float near_mm = (float)sdm_grid_near(d->grid);
     double square = 0, absolute = 0, near = 0, largest = 0, at_surface = 0, dice = 0, dice_min = 1;
-    double shallow = 0, deep = 0;
-    size_t n_near = 0, n_at_surface = 0;
+    double far[2] = {0, 0}, largest_at = 0; // far from the surface: outside, inside
+    size_t n_near = 0, n_at_surface = 0, n_far[2] = {0, 0};
     // sum the errors over maps and voxels
     for (size_t i = 0; i < n && !s; i++) {
         sdm_model_forward_threads(m, d->holdout_params + i * d->n_params, 1, map, scratch,
@@ -73,10 +73,11 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
             const double e = (double)values[v] - truth[v];
             here += e * e;
             absolute += fabs(e);
-            if (truth[v] < 0 && e > 0) shallow += e * e;
-            if (truth[v] < 0 && e < 0) deep += e * e;
-            if (fabs(e) > largest) largest = fabs(e);
-            if (fabsf(truth[v]) <= near_mm) near += e * e, n_near++;
+            if (fabs(e) > largest) largest = fabs(e), largest_at = (double)truth[v];
+            if (fabsf(truth[v]) <= near_mm)
+                near += e * e, n_near++;
+            else
+                far[truth[v] < 0] += e * e, n_far[truth[v] < 0]++;
             if (fabs((double)truth[v]) <= voxel) at_surface += e * e, n_at_surface++;
             inside += (size_t)(truth[v] < 0) + (size_t)(values[v] < 0);
             both += truth[v] < 0 && values[v] < 0;
@@ -105,8 +106,10 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
                                    n_at_surface ? sqrt(at_surface / (double)n_at_surface) : 0,
                                .dice = dice / (double)n,
                                .dice_min = dice_min,
-                               .shallow_mm2 = shallow / voxels,
-                               .deep_mm2 = deep / voxels};
+                               .rmse_inside_mm = sqrt(far[1] / (double)n_far[1]),
+                               .rmse_outside_mm = sqrt(far[0] / (double)n_far[0]),
+                               .far_mm2 = (far[0] + far[1]) / voxels,
+                               .largest_at_mm = largest_at};
     }
     trainer_workbench_dispose(&w);
     sdm_free(each);

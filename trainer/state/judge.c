@@ -111,9 +111,9 @@ static const char *advise_part(const verdict_input *in, sdm_verdict *v)
         return advise_maps(in, v);
     case SDM_CAUSE_ROUNDING:
         return "The rounding of the weights limits it";
-    case SDM_CAUSE_OVERLAP:
-        return "Inside overlaps of its parts the template gives bounds, not distances; this limits "
-               "it";
+    case SDM_CAUSE_FAR:
+        return "Far from the surface the template only estimates distances, inside overlaps of its "
+               "parts and where parts are stretched; this limits it";
     case SDM_CAUSE_TEMPLATE:
         advise(v, "grid.spacing", v->voxel_mm, v->voxel_mm / 2);
         return "The lattices of the template limit it, which are as fine as the grid";
@@ -161,9 +161,12 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
         snprintf(change, sizeof change, ": set network.weights to %s",
                  c->network.weights == SDM_WEIGHT_I8 ? "f16" : "f32");
     // a run of `auto` has compared the kinds, or found pod far worse
-    if (v->limit == SDM_CAUSE_OVERLAP && in->asked)
-        snprintf(change, sizeof change,
-                 ": set network.kind to auto, which trains pod, too, and keeps the better one");
+    if (v->limit == SDM_CAUSE_FAR)
+        snprintf(change, sizeof change, "%s",
+                 in->asked ? ": set network.kind to auto, which trains pod, too, and keeps the "
+                             "better one"
+                           : ": where such distances matter, set network.kind to pod; a finer grid "
+                             "does not change them");
     if (!strcmp(v->key, "grid.spacing"))
         snprintf(also, sizeof also, " (and double grid.size, if it is given)");
     // with `auto`, a value that is the default of `auto` would become that of the kind
@@ -239,13 +242,12 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
         tell_cut(v);
 }
 
-/* Distributes the error of the model over its causes. A bound errs towards the surface alone, all
- * other errors about as much to either side. */
+/* Distributes the error of the model over its causes. What a template leaves besides its correction
+ * is divided as the whole error is between the voxels near the surface and the others. */
 static void set_parts(const error_measures *m, const model_errors *errors, double mse,
                       sdm_verdict *v)
 {
     double *part = v->part_mm2;
-    const double shallow = errors->shallow_mm2, deep = errors->deep_mm2;
     error_pair network = m->network, bases = m->bases;
     if (m->other_voxels || (m->corrects && network.heldout > mse)) {
         // the ratios on other voxels: a sample, or a correction's grid, which reaches farther
@@ -260,11 +262,12 @@ static void set_parts(const error_measures *m, const model_errors *errors, doubl
         part[SDM_CAUSE_MAPS] = network.heldout - network.training;
     }
     const double rest = mse - (isfinite(network.heldout) ? network.heldout : 0);
-    if (m->overlaps) part[SDM_CAUSE_OVERLAP] = fmin(rest, fmax(0, shallow - deep));
-    if (m->corrects)
-        part[SDM_CAUSE_TEMPLATE] = rest - (m->overlaps ? part[SDM_CAUSE_OVERLAP] : 0);
-    else if (!m->other_voxels)
+    if (m->corrects) {
+        part[SDM_CAUSE_FAR] = mse > 0 ? rest * errors->far_mm2 / mse : 0;
+        part[SDM_CAUSE_TEMPLATE] = rest - part[SDM_CAUSE_FAR];
+    } else if (!m->other_voxels) {
         part[SDM_CAUSE_ROUNDING] = rest;
+    }
 }
 
 sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verdict *out,
@@ -283,6 +286,12 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
     *out = (sdm_verdict){.voxel_mm = trainer_dataset_voxel(d),
                          .rmse_mm = t->accuracy.rmse_mm,
                          .rmse_voxel_mm = errors->rmse_voxel_mm,
+                         .near_mm = t->accuracy.near_mm,
+                         .rmse_near_mm = t->accuracy.rmse_near_mm,
+                         .rmse_inside_mm = errors->rmse_inside_mm,
+                         .rmse_outside_mm = errors->rmse_outside_mm,
+                         .largest_mm = t->accuracy.max_abs_mm,
+                         .largest_at_mm = errors->largest_at_mm,
                          .dice = errors->dice,
                          .dice_min = errors->dice_min,
                          .modes_mm2 = m.modes,

@@ -9,9 +9,11 @@ typedef struct model_errors {
     double rmse_voxel_mm; /* root mean square error of the voxels within a voxel of the surface */
     double dice;          /* Dice coefficient: mean over the held-out shapes */
     double dice_min;      /* Dice coefficient: smallest of a held-out shape */
-    /* Mean square errors inside the shapes, as parts of that of all voxels, mm^2: where the map is
-       nearer to the surface than the truth, and where it is not. */
-    double shallow_mm2, deep_mm2;
+    /* root mean square errors of the voxels farther from the surface than sdm_accuracy.near_mm,
+       inside and outside; NaN: there are none */
+    double rmse_inside_mm, rmse_outside_mm;
+    double far_mm2;       /* what these voxels add to the mean square error of all voxels */
+    double largest_at_mm; /* exact signed distance at the voxel with the largest error */
 } model_errors;
 
 /* Measures the parts of the error and fills *out. t->accuracy must be set. */

@@ -17,7 +17,6 @@ typedef struct error_measures {
     error_pair network, bases; /* of the network; of its bases with the best coefficients */
     double modes;      /* held-out maps: what the bases hold and the global modes leave out */
     bool other_voxels; /* the voxels are only a sample of those of the maps */
-    bool overlaps;     /* the map is the minimum over parts that may overlap */
     bool corrects;     /* the maps are those of a correction, not exact maps */
     double motion_mm, warp_mm; /* of a template (template_design) */
 } error_measures;

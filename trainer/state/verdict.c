@@ -1,12 +1,13 @@
 /* The words and the JSON of a verdict. */
 #include "sdm/internal/verdict.h"
 
+#include <math.h>
 #include <stdio.h>
 
 const char *sdm_cause_name(sdm_cause cause)
 {
     static const char *const names[] = {"bases",    "network", "maps", "rounding",
-                                        "template", "overlap", "grid"};
+                                        "template", "far",     "grid"};
     return (size_t)cause < SDM_CAUSES ? names[cause] : "unknown";
 }
 
@@ -17,8 +18,8 @@ const char *sdm_cause_text(sdm_cause cause)
         "what the network leaves of training maps besides",
         "what is larger on held-out maps than on training maps",
         "rounding of the weights in the model file",
-        "what motion, warp and lattices of the template leave besides",
-        "inside overlaps of the parts, where their minimum is only a bound of the distance",
+        "what motion, warp and lattices of the template leave near the surface",
+        "what it leaves farther away, inside overlaps of parts and where parts are stretched",
         "exact maps, interpolated between the voxels at the exact surface"};
     return (size_t)cause < SDM_CAUSES ? texts[cause] : "unknown";
 }
@@ -37,6 +38,11 @@ const char *sdm_grade_text(sdm_grade grade)
                : "not for surfaces: whole voxels are on the wrong side";
 }
 
+bool sdm_verdict_errs_far(const sdm_verdict *v)
+{
+    return v->largest_mm > v->voxel_mm && fabs(v->largest_at_mm) > v->near_mm;
+}
+
 void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
 {
     char key[32];
@@ -44,6 +50,12 @@ void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
     sdm_json_real(j, "voxel_mm", v->voxel_mm);
     sdm_json_real(j, "rmse_mm", v->rmse_mm);
     sdm_json_real(j, "rmse_voxel_mm", v->rmse_voxel_mm);
+    sdm_json_real(j, "near_mm", v->near_mm);
+    sdm_json_real(j, "rmse_near_mm", v->rmse_near_mm);
+    sdm_json_real(j, "rmse_inside_mm", v->rmse_inside_mm);
+    sdm_json_real(j, "rmse_outside_mm", v->rmse_outside_mm);
+    sdm_json_real(j, "largest_mm", v->largest_mm);
+    sdm_json_real(j, "largest_at_mm", v->largest_at_mm);
     sdm_json_real(j, "dice", v->dice);
     sdm_json_real(j, "dice_min", v->dice_min);
     for (int i = 0; i < SDM_CAUSES; i++) {

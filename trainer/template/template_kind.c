@@ -284,7 +284,6 @@ static sdm_status template_parts(const trainer *t, error_measures *out, sdm_erro
     out->motion_mm = s->design.motion_error_mm;
     out->warp_mm = s->design.warp_error_mm;
     out->corrects = true;
-    out->overlaps = s->design.n_parts > 1;
     return s->corrected ? trainer_kind_pod.parts(t, out, err) : SDM_OK;
 }
 

@@ -108,7 +108,12 @@ static void count_edges_and_contacts(job *j)
     const sdm_contacts *contacts = &j->survey.contacts;
     for (size_t i = 0; i < topo->n_edges; i++) {
         const sdm_edge *e = &topo->edges[i];
-        if (e->n_up != e->n_down) j->out->part[j->part_of[e->first / 3]].open_edges++;
+        if (e->n_up == e->n_down) continue;
+        sdm_part *p = &j->out->part[j->part_of[e->first / 3]];
+        const double *lo = j->given->vert + 3 * (size_t)e->lo,
+                     *hi = j->given->vert + 3 * (size_t)e->hi;
+        for (int d = 0; d < 3 && !p->open_edges; d++) p->open_at[d] = 0.5 * (lo[d] + hi[d]);
+        p->open_edges++;
     }
     for (size_t i = 0; i < contacts->n; i++) {
         const uint32_t a = j->part_of[contacts->list[i].tri],

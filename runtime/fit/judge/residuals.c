@@ -12,6 +12,9 @@
 // where fewer voxels lie deep, as in a thin shape, the purest ones take their place: this much
 #define DEEP_MIN 50
 #define NEARLY_DEEP 0.2
+// with fewer of them, in a shape thinner than the point spread, the tissue of the fit is the
+// measure
+#define DEEP_LEAST 8
 // most values of which a median is computed; of more, every second, third ... one is taken
 #define VALUES_MAX 20000
 // a value so many sd beyond that of the inside is a third material (air beside fluid)
@@ -49,16 +52,25 @@ static double tissue_weight(const fit_problem *p, size_t i, size_t tissue)
                  : p->observation.tissue[tissue].weight;
 }
 
+// the tissue with the largest weight inside (side 1) or outside (side 0)
+static const sdm_fit_law *main_tissue(const fit_problem *p, int side)
+{
+    const fit_observation *o = &p->observation;
+    const size_t first = side ? 0 : o->n_in, end = side ? o->n_in : o->n_tissues;
+    size_t most = first;
+    for (size_t k = first; k < end; k++)
+        if (o->tissue[k].weight > o->tissue[most].weight) most = k;
+    return &o->tissue[most];
+}
+
 // by how much the mean of all outside tissues at sample i differs from that of the main one
 static double outside_shift(const fit_problem *p, size_t i)
 {
     const fit_observation *o = &p->observation;
+    const double mean = main_tissue(p, 0)->mean;
     double sum = 0;
-    size_t main = o->n_in;
     for (size_t k = o->n_in; k < o->n_tissues; k++)
-        if (o->tissue[k].weight > o->tissue[main].weight) main = k;
-    for (size_t k = o->n_in; k < o->n_tissues; k++)
-        sum += (o->tissue[k].mean - o->tissue[main].mean) * tissue_weight(p, i, k);
+        sum += (o->tissue[k].mean - mean) * tissue_weight(p, i, k);
     return sum;
 }
 
@@ -123,6 +135,10 @@ static void side_measure(const fit_problem *p, fit_residuals *r, int side, doubl
                 list[kept++] = (double)p->samples.value[i];
         r->n_deep[side] = n;
         r->middle[side] = sdm_fit_shortest_half(list, kept, &r->spread[side]);
+    }
+    if (r->n_deep[side] < DEEP_LEAST) {
+        const sdm_fit_law *tissue = main_tissue(p, side);
+        r->middle[side] = tissue->mean, r->spread[side] = tissue->sd;
     }
     if (is_labels(p)) r->middle[side] = side;
 }

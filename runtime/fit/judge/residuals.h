@@ -2,7 +2,8 @@
 
    Voxels: the observed share of the inside material is the value of the voxel on the scale from the
    outside (0) to the inside (1); the prediction is the share that the shape fills. Both ends of the
-   scale are least medians of squares over the voxels deep inside and deep outside. They and the
+   scale are least medians of squares over the voxels deep inside and deep outside (where a thin
+   shape has none inside, the tissue of the fit). They and the
    noise are robust: the tissues of the fit itself would not do, because a wrong shape widens them
    until they excuse everything. Points: the residual is the signed distance from the surface over
    the largest radius of the shape. */

@@ -31,8 +31,9 @@ typedef struct sdm_part {
     size_t first_vert, last_vert; /* lowest and highest index of a vertex */
     size_t
         open_edges; /* edges on which not as many triangles run in one direction as in the other */
-    size_t met;     /* pairs of a triangle of this part and a triangle of another that meet */
-    double volume, area;   /* signed, mm^3, as given; mm^2 */
+    double open_at[3];   /* middle of the first of them, mm */
+    size_t met;          /* pairs of a triangle of this part and a triangle of another that meet */
+    double volume, area; /* signed, mm^3, as given; mm^2 */
     double min[3], max[3]; /* bounding box, mm */
     bool turned;           /* the engine reverses its triangles, alone or with the whole mesh */
     sdm_part_state state;

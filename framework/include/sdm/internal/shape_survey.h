@@ -49,6 +49,20 @@ typedef struct sdm_survey_jump {
     double mm;     /* JUMP: how far */
 } sdm_survey_jump;
 
+/* How large the shapes are, and whether they look like shapes in another unit than mm. */
+typedef struct sdm_survey_scale {
+    double size;   /* longest edge of the box of all shapes, mm */
+    bool odd_size; /* it is below SDM_SURVEY_SIZE_MIN or above SDM_SURVEY_SIZE_MAX */
+    /* how far vertices of the first shape move per mm of the parameter `param`, at most, mm: of the
+     * parameters with the unit mm the one that moves them farthest. NaN: there is none */
+    double speed;
+    size_t param;
+    bool odd_speed; /* it is below SDM_SURVEY_SPEED_MIN or above SDM_SURVEY_SPEED_MAX */
+    /* the unit that would explain both, and its length in mm; NULL: none would */
+    const char *unit;
+    double unit_mm;
+} sdm_survey_scale;
+
 /* Zero-initialise; sdm_shape_survey_dispose() frees. */
 typedef struct sdm_shape_survey {
     size_t n_params;
@@ -71,6 +85,7 @@ typedef struct sdm_shape_survey {
     double volume[2], area[2]; /* smallest and largest of the unions, mm^3 and mm^2; closed meshes
                                   alone; NaN in a brief survey */
     double low[3], high[3];    /* box of all meshes, mm; a search widens it unless `brief` */
+    sdm_survey_scale scale;
 
     /* the samples whose vertices lie beyond the centres of the outer voxels; amount: mm beyond */
     sdm_survey_count cut;
@@ -103,11 +118,18 @@ size_t sdm_survey_samples(const sdm_instance *shape, size_t samples);
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
  * are usable, but a training or derivatives would suffer: parts that are inside out (at some of the
  * parameters also those that the engine turns), sizes, triangles or vertices that jump, a grid that
- * cuts, wrong velocities, or results that differ from call to call. Else SDM_OK. */
+ * cuts, wrong velocities, results that differ from call to call, or an odd size or speed (another
+ * unit than mm). Else SDM_OK. */
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 
 /* velocity_error above this is wrong. */
 #define SDM_SURVEY_VELOCITY_LIMIT 1e-3
+
+/* Sizes (mm) and speeds beyond these are odd. A screw of many turns moves fast with its pitch. */
+#define SDM_SURVEY_SIZE_MIN 1.0
+#define SDM_SURVEY_SIZE_MAX 1000.0
+#define SDM_SURVEY_SPEED_MIN 0.1
+#define SDM_SURVEY_SPEED_MAX 100.0
 
 #ifdef __cplusplus
 }

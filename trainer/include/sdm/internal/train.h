@@ -108,9 +108,9 @@ sdm_status sdm_train_grid(sdm_config *config, const sdm_instance *shape, sdm_tex
                           sdm_error *err);
 
 /* Appends a grid that holds the shapes of the configuration, for a message about one that cuts
-   them: "grid: auto (size: [59, 52, 37], spacing: 0.23, origin: [-6.1, -5.5, -2.1])", or with
-   "grid: {voxels: 80}" if the longest edge of the present grid has 80 voxels. Errors as
-   sdm_train_grid(). */
+   them: "grid: {spacing: 0.2} (size: [66, 58, 41], spacing: 0.2, origin: [-6.1, -5.5, -2.1])" with
+   the spacing of the present grid, or where that makes over 2.5 million voxels "grid: auto (...)"
+   and why. Errors as sdm_train_grid(). */
 sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance *shape,
                                    sdm_text *out, sdm_error *err);
 

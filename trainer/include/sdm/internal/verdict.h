@@ -30,12 +30,13 @@ typedef enum sdm_cause {
     SDM_CAUSE_MAPS,
     /* The weights in the file have fewer digits. Measured: model minus network before rounding. */
     SDM_CAUSE_ROUNDING,
-    /* `template`: motion, warp and the lattices of the template. Measured: model minus correction.
-     */
+    /* `template`: motion, warp and the lattices of the template. Measured: model minus correction,
+       the share of the voxels near the surface (near_mm). */
     SDM_CAUSE_TEMPLATE,
-    /* `template` of several parts: inside overlaps the minimum over the parts is only a bound of
-       the distance. Measured: what errors towards the surface have more than others, inside. */
-    SDM_CAUSE_OVERLAP,
+    /* `template`: far from the surface its maps are estimates, bounds inside overlaps of parts and
+       distances to first order where a part is stretched. Measured: the share of the other voxels.
+     */
+    SDM_CAUSE_FAR,
     /* The voxels are too large for the shape. Measured: exact maps, interpolated at points of the
        exact surface. Not a part of the error at the voxels. */
     SDM_CAUSE_GRID,
@@ -46,6 +47,10 @@ typedef struct sdm_verdict {
     double voxel_mm;               /* smallest spacing of the grid */
     double rmse_mm, rmse_voxel_mm; /* of all voxels; of those within a voxel of the surface */
     double dice, dice_min; /* overlap of the volumes inside: mean, and smallest of a shape */
+    /* by the exact distance: root mean square errors of the voxels within near_mm of the surface
+       (two voxels), and of those farther inside and outside; NaN: there are none */
+    double near_mm, rmse_near_mm, rmse_inside_mm, rmse_outside_mm;
+    double largest_mm, largest_at_mm; /* largest error of a voxel; exact signed distance there */
     sdm_grade grade;
     double part_mm2[SDM_CAUSES]; /* parts of the mean square error; of the grid: of the surface */
     /* Part of the held-out root mean square error, beyond that of the bases, that the last third of
@@ -69,7 +74,7 @@ typedef struct sdm_verdict {
     char sentence[512]; /* what limits the model and what to do, one sentence */
 } sdm_verdict;
 
-/* "bases", "network", "maps", "rounding", "template", "overlap" or "grid". [any thread] */
+/* "bases", "network", "maps", "rounding", "template", "far" or "grid". [any thread] */
 const char *sdm_cause_name(sdm_cause cause);
 
 /* How the part was measured, a few words. [any thread] */
@@ -78,6 +83,10 @@ const char *sdm_cause_text(sdm_cause cause);
 /* "good", "usable" or "poor"; what such a model is good for. [any thread] */
 const char *sdm_grade_name(sdm_grade grade);
 const char *sdm_grade_text(sdm_grade grade);
+
+/* true: the largest error exceeds a voxel and lies farther than near_mm from the surface, where the
+   grade says nothing. [any thread] */
+bool sdm_verdict_errs_far(const sdm_verdict *v);
 
 /* Adds the figures of the verdict to the open object of *j. */
 void sdm_verdict_json(sdm_json *j, const sdm_verdict *v);

@@ -7,6 +7,7 @@
 #include "inputs/grid_cut.h"
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
+#include "measure/measures.h"
 #include "report/exact_layers.h"
 #include "report/json_values.h"
 #include "report/output.h"
@@ -36,15 +37,26 @@ typedef struct job {
     sdm_exact *engine; /* NULL: another method */
     cli_layers layers;
     cli_points_table points; /* of --points */
+    sdm_measures measures;   /* of --measure */
     double ms_build, ms_query;
     sdm_sign_certificate certificate; /* checked == 0 without --certify */
     double bound_mm;                  /* bound on the error of the distances; 0: exact */
 } job;
 
+static sdm_status measure_shape(job *j, const cli_shape *shape, sdm_error *err)
+{
+    cli_depths depths;
+    const sdm_status s = cli_read_depths(j->args, shape->instance, &depths, err);
+    if (s || !j->args->measure) return s;
+    return sdm_shape_measure(shape->instance, shape->values, depths.mm, depths.n, &j->measures,
+                             err);
+}
+
 static sdm_status make_shape_mesh(job *j, sdm_error *err)
 {
     cli_shape shape = {0};
     sdm_status s = cli_shape_open(j->args, j->args->shape, &j->args->options, &shape, err);
+    if (!s) s = measure_shape(j, &shape, err);
     const double start = sdm_clock();
     if (!s) s = sdm_instance_mesh(shape.instance, shape.values, &j->mesh, err);
     j->ms_mesh = 1e3 * (sdm_clock() - start);
@@ -66,7 +78,14 @@ static sdm_status open_mesh(job *j, sdm_error *err)
     if (args->mesh && (args->params.n > 0 || args->options.n > 0))
         return sdm_fail(err, SDM_E_ARG,
                         "exact: -p and -O belong to --shape; a mesh file has no parameters");
-    if (args->outputs.n == 0 && !args->points && !args->json && !cli_layers_wanted(args))
+    if (!args->shape && (args->measure || args->depths))
+        return sdm_fail(err, SDM_E_ARG,
+                        "exact: --measure and --depth belong to --shape; sdmgen mesh --audit "
+                        "measures a mesh file");
+    if (args->measure && args->points)
+        return sdm_fail(err, SDM_E_ARG, "exact: --measure does not go with --points");
+    if (args->outputs.n == 0 && !args->points && !args->json && !args->measure &&
+        !cli_layers_wanted(args))
         return sdm_fail(err, SDM_E_ARG, "exact: an output is needed: -o FILE, or --json");
     if (args->certify && strcmp(args->method, "exact"))
         return sdm_fail(err, SDM_E_ARG, "exact: --certify belongs to --method exact, not %s",
@@ -334,6 +353,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
         sdm_json_int(&json, "sign_wrong", (int64_t)c->wrong);
         sdm_json_int(&json, "below_zero", (int64_t)c->below_zero);
     }
+    if (j->args->measure) cli_json_measures(&j->measures, false, &json);
     sdm_json_text(&json, "values_crc64", hash);
     sdm_json_grid(&json, "grid", &j->grid, false);
     sdm_json_close(&json, '}');
@@ -367,6 +387,7 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
         if (!s) s = write_outputs(&j, err);
         if (!s) s = cli_layers_write(&j.layers, args, &j.grid, err);
         if (!s && args->json) s = print_json(&j, err);
+        if (!s && args->measure && !args->json) cli_print_measures(&j.measures, false);
         if (!s) s = write_results(&j, err);
         if (!s) s = judge_signs(&j, err);
     }

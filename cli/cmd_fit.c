@@ -3,8 +3,11 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "cohort/cohort.h"
 #include "commands.h"
 #include "fit/fit_command.h"
+#include "page/page.h"
+#include "report/json_values.h"
 #include "report/progress_bar.h"
 #include "report/terminal.h"
 
@@ -63,6 +66,11 @@ static sdm_status check_arguments(cli_fit *f, sdm_error *err)
 {
     const cli_args *args = f->args;
     const bool with_model = args->files.n == 2;
+    if (!args->files.n)
+        return sdm_fail(err, SDM_E_ARG, "usage: sdmgen fit %s", args->command->synopsis);
+    if (args->cohort.part || args->cohort.claim)
+        return sdm_fail(err, SDM_E_ARG, "fit: --%s belongs to --cases TABLE",
+                        args->cohort.part ? "part" : "claim");
     if (with_model && args->shape)
         return sdm_fail(err, SDM_E_ARG,
                         "fit: either MODEL or --shape NAME, not both (files: '%s', '%s')",
@@ -72,7 +80,10 @@ static sdm_status check_arguments(cli_fit *f, sdm_error *err)
                         "fit: a MODEL and an IMAGE are needed, or --shape NAME and an IMAGE");
     f->model_path = with_model ? args->files.items[0] : NULL;
     f->path = args->files.items[with_model];
-    return cli_fit_check_files(args, err);
+    if (args->report && !with_model)
+        return sdm_fail(err, SDM_E_ARG, "fit: --report needs a MODEL: a page runs its network");
+    const sdm_status s = cli_page_check_option(args, err);
+    return s ? s : cli_fit_check_files(args, err);
 }
 
 /* Runs the fit. Returns SDM_OK also for a fit that is not trustworthy (f->doubt): its result is
@@ -127,19 +138,42 @@ static sdm_status print_result(const cli_fit *f, sdm_error *err)
     return cli_print_json(&json, err);
 }
 
+static sdm_status write_json(const cli_fit *f, const char *path, sdm_error *err)
+{
+    sdm_json json = {0};
+    if (!path) return SDM_OK;
+    cli_fit_json(f, &json);
+    const sdm_status s = cli_json_write(&json, path, err);
+    sdm_json_dispose(&json);
+    return s;
+}
+
+static sdm_status write_page(const cli_fit *f, sdm_error *err)
+{
+    sdm_json json = {0};
+    cli_fit_json(f, &json);
+    const sdm_status s = cli_page_report_fit(f->args, &json, f->args->report, err);
+    sdm_json_dispose(&json);
+    return s;
+}
+
 /* Prints the result and writes the files; if the fit is not trustworthy, fails with the reason. */
-static sdm_status show_result(cli_fit *f, sdm_error *err)
+static sdm_status show_result(cli_fit *f, const char *json, sdm_error *err)
 {
     const bool files = f->args->outputs.n || f->args->fit.label_out,
                write = !f->doubt.status || f->args->force;
-    sdm_status s = SDM_OK;
+    sdm_status s = SDM_OK, measured = SDM_OK;
     if (f->found) {
         print_notices(f);
+        measured = cli_fit_measure(f, err); // the result is shown without measures, too
         s = cli_fit_make_map(f, err);
         if (!s) s = cli_fit_compare(f, err);
         if (!s && write) s = cli_fit_write_files(f, err);
+        if (!s) s = write_json(f, json, err);
+        if (!s && f->args->report) s = write_page(f, err);
         if (!s) s = print_result(f, err);
         if (!s) s = cli_fit_write_results(f, err);
+        if (!s) s = measured;
     }
     if (s || !f->doubt.status) return s;
     return sdm_fail(err, f->doubt.status, "%s: %s%s", f->path, f->doubt.text,
@@ -147,11 +181,13 @@ static sdm_status show_result(cli_fit *f, sdm_error *err)
                                                 : "");
 }
 
-sdm_status cmd_fit(const cli_args *args, sdm_error *err)
+/* Runs one fit. json: file for the results also of a fit that is not trustworthy; NULL: none. */
+static sdm_status fit_one(const cli_args *args, const char *json, sdm_error *err)
 {
     cli_fit f = {.args = args};
     sdm_status s = check_arguments(&f, err);
     if (!s) s = cli_fit_open_source(&f, err);
+    if (!s) s = cli_fit_prepare_measures(&f, err);
     if (!s) s = cli_fit_read_options(&f, err);
     if (!s) s = cli_fit_read_target(&f, err);
     if (!s) s = cli_fit_check_options(&f, err);
@@ -161,7 +197,12 @@ sdm_status cmd_fit(const cli_args *args, sdm_error *err)
     if (!s) s = cli_fit_warn_size(&f, err);
     if (!s) cli_fit_notice_tissues(&f);
     if (!s) s = fit_shape(&f, err);
-    if (!s) s = show_result(&f, err);
+    if (!s) s = show_result(&f, json, err);
     cli_fit_dispose(&f);
     return s;
+}
+
+sdm_status cmd_fit(const cli_args *args, sdm_error *err)
+{
+    return args->cohort.cases ? cli_cohort_run(args, fit_one, err) : fit_one(args, NULL, err);
 }

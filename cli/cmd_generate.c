@@ -8,6 +8,7 @@
 #include "inputs/model_grade.h"
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
+#include "measure/measures.h"
 #include "report/generate_files.h"
 #include "report/json_values.h"
 #include "report/output.h"
@@ -49,9 +50,11 @@ typedef struct job {
     size_t n_clamped, n_exact; /* rows with clamped parameters; maps by the exact engine */
     size_t n_exact_error; /* maps by the exact engine since the network's error was too large */
     size_t n_checked;
-    sdm_check check; /* over checked rows: means of mean, bias and square; largest q95 and max */
-    uint64_t hash;   /* CRC-64 of all maps */
-    double volume;   /* of the last map, mm^3; NaN: of a band */
+    sdm_check check;   /* over checked rows: means of mean, bias and square; largest q95 and max */
+    uint64_t hash;     /* CRC-64 of all maps */
+    double volume;     /* of the last map, mm^3; NaN: of a band */
+    cli_depths depths; /* of --depth */
+    sdm_measures measures; /* of --measure */
 } job;
 
 /* The statistic of --error-of. */
@@ -128,18 +131,21 @@ static sdm_status read_rows(job *j, sdm_error *err)
     return s;
 }
 
-/* Creates the shape if --check, --max-error, --policy exact or --outside exact need it. */
+/* Creates the shape if --check, --max-error, --measure, --policy exact or --outside exact need
+ * it. */
 static sdm_status open_shape(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
-    const bool checks = args->check || args->max_error > 0;
+    const bool checks = args->check || args->max_error > 0 || args->measure;
     const bool exact =
         cli_policy(args) == SDM_RANGE_EXACT || cli_outside(args) == SDM_OUTSIDE_EXACT;
     if (!checks && !exact) return SDM_OK;
     sdm_status s = cli_open_registry(args, &j->registry, err);
     if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, err);
     return s && checks ? sdm_fail_in(err, s, "--%s needs the exact shape",
-                                     args->check ? "check" : "max-error")
+                                     args->check           ? "check"
+                                     : args->max_error > 0 ? "max-error"
+                                                           : "measure")
                        : s;
 }
 
@@ -183,6 +189,10 @@ static sdm_status check_options(const cli_args *args, sdm_error *err)
                       !isnan(args->direction[0]);
     if (args->columns && !args->points)
         return sdm_fail(err, SDM_E_ARG, "generate: --columns belongs to --points FILE");
+    if ((args->measure || args->depths) && (args->points || args->rows))
+        return sdm_fail(err, SDM_E_ARG,
+                        "generate: --measure describes one shape: it does not go with --%s",
+                        args->points ? "points" : "params");
     if (!(args->max_error > 0) && strcmp(args->error_of, "max"))
         return sdm_fail(err, SDM_E_ARG, "generate: --error-of does nothing without --max-error MM");
     if (cli_outside(args) != SDM_OUTSIDE_REFUSE && !grid && !args->points)
@@ -196,15 +206,17 @@ static sdm_status check_options(const cli_args *args, sdm_error *err)
 static sdm_status prepare_job(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
-    if (!args->outputs.n && !args->json && !args->gradient && !args->jacobian && !args->check)
-        return sdm_fail(
-            err, SDM_E_ARG,
-            "generate: an output is needed: -o FILE, --gradient, --jacobian, --check or --json");
+    if (!args->outputs.n && !args->json && !args->gradient && !args->jacobian && !args->check &&
+        !args->measure)
+        return sdm_fail(err, SDM_E_ARG,
+                        "generate: an output is needed: -o FILE, --gradient, --jacobian, --check, "
+                        "--measure or --json");
     sdm_status s = open_model(j, err);
     if (!s) s = choose_grid(j, err);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
+    if (!s) s = cli_read_depths(args, j->shape, &j->depths, err);
     if (!s) s = check_rows(j, err);
     // with --params: check the names of the files of the last row, which are the longest
     if (!s && args->rows) s = cli_row_files_check(args, j->n_rows, err);
@@ -424,6 +436,7 @@ static sdm_status print_json(const job *j, sdm_error *err)
     sdm_json_real(&json, "error_rmse_mm", j->info->accuracy.rmse_mm);
     sdm_json_real(&json, "error_between_mm", j->own ? 0 : j->info->quality.between_mm);
     if (j->n_rows == 1) sdm_json_real(&json, "volume_mm3", j->volume);
+    if (j->args->measure) cli_json_measures(&j->measures, false, &json);
     sdm_json_text(&json, "values_crc64", hash);
     sdm_json_grid(&json, "grid", &j->grid, false);
     if (j->n_rows == 1) cli_json_params(&json, "parameters", j->params, j->info->n_params, j->rows);
@@ -545,6 +558,16 @@ static void notice_between(const job *j)
                    rmse, between);
 }
 
+/* Measures the shape, whose parameters --policy clamp may have moved, and prints the measures. */
+static sdm_status measure(job *j, sdm_error *err)
+{
+    if (!j->args->measure) return SDM_OK;
+    const cli_depths *d = &j->depths;
+    const sdm_status s = sdm_shape_measure(j->shape, j->rows, d->mm, d->n, &j->measures, err);
+    if (!s && !j->args->json) cli_print_measures(&j->measures, false);
+    return s;
+}
+
 static sdm_status run_maps(job *j, sdm_error *err)
 {
     cli_progress progress;
@@ -557,6 +580,7 @@ static sdm_status run_maps(job *j, sdm_error *err)
     }
     cli_progress_end(&progress, !s);
     if (!s && !j->args->json) notice_between(j);
+    if (!s) s = measure(j, err);
     if (!s && j->args->json) s = print_json(j, err);
     return s ? s : write_results(j, err);
 }

@@ -7,6 +7,7 @@
 #include "phantom/phantom_command.h"
 #include "report/files.h"
 #include "report/json_values.h"
+#include "report/output.h"
 #include "report/terminal.h"
 #include "sdm/image.h"
 #include "sdm/memory.h"
@@ -107,7 +108,7 @@ static sdm_status make_image(const cli_phantom *p, sdm_error *err)
         cli_notice("the shape leaves the field of view");
     if (!s && values) s = write_images(p, values, text, err);
     if (!s && args->phantom.label)
-        s = sdm_volume_write(args->phantom.label, &p->grid, label, SDM_VOXEL_UINT8, text, err);
+        s = cli_write_labels(args->phantom.label, &p->grid, label, args->shape, text, err);
     if (!s) s = write_truth(p, inside, err);
     sdm_free(label);
     sdm_free(values);

@@ -8,6 +8,7 @@
 #include "report/json_values.h"
 #include "report/terminal.h"
 #include "sdm/internal/distribution.h"
+#include "sdm/internal/mesh_measures.h"
 #include "sdm/memory.h"
 #include "shapes/shapes_command.h"
 
@@ -131,6 +132,38 @@ static sdm_status print_options(const sdm_shape *shape, sdm_error *err)
     return SDM_OK;
 }
 
+/* Prints measures[n] with names of one width. */
+static void print_measures(const sdm_measure *m, size_t n, int width)
+{
+    for (size_t i = 0; i < n; i++)
+        printf("  %-*s  %-4s  %s\n", width, m[i].name, m[i].unit, m[i].help);
+}
+
+/* Prints the measures that --measure prints: the shape's own, then those of its mesh. */
+static void print_all_measures(const sdm_shape *shape)
+{
+    int width = 8; // of the names of the mesh's measures
+    for (uint32_t i = 0; i < shape->n_measures; i++) {
+        const int length = (int)strlen(shape->measures[i].name);
+        if (length > width) width = length;
+    }
+    printf("\nmeasures (--measure):\n");
+    print_measures(shape->measures, shape->n_measures, width);
+    print_measures(sdm_mesh_measures, SDM_MESH_MEASURES, width);
+}
+
+static void json_measures(sdm_json *j, const sdm_measure *m, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        sdm_json_open(j, NULL, '{');
+        sdm_json_text(j, "name", m[i].name);
+        sdm_json_text(j, "unit", m[i].unit);
+        sdm_json_bool(j, "of_depth", m[i].of_depth);
+        sdm_json_text(j, "help", m[i].help);
+        sdm_json_close(j, '}');
+    }
+}
+
 static void json_params(sdm_json *j, const sdm_param *params, const sdm_distribution *distributions,
                         size_t n)
 {
@@ -172,7 +205,7 @@ typedef sdm_status (*command_function)(const cli_args *args, sdm_error *err);
 static const struct {
     const char *word;
     command_function run;
-} subcommands[] = {{"new", cli_shapes_new}, {"check", cli_shapes_check}};
+} subcommands[] = {{"new", cli_shapes_new}, {"check", cli_shapes_check}, {"test", cli_shapes_test}};
 enum { N_SUBCOMMANDS = sizeof subcommands / sizeof *subcommands };
 
 /* The subcommand that the first word names; NULL: none. */
@@ -224,6 +257,10 @@ static sdm_status print_shape(const cli_args *args, const sdm_registry *registry
         sdm_json_text(&json, "summary", shape->summary ? shape->summary : "");
         json_params(&json, params, distributions, n);
         json_options(&json, shape);
+        sdm_json_open(&json, "measures", '[');
+        json_measures(&json, shape->measures, shape->n_measures);
+        json_measures(&json, sdm_mesh_measures, SDM_MESH_MEASURES);
+        sdm_json_close(&json, ']');
         sdm_json_close(&json, '}');
         s = cli_print_json(&json, err);
     } else {
@@ -232,6 +269,7 @@ static sdm_status print_shape(const cli_args *args, const sdm_registry *registry
         if (!s && !instance && shape->describe)
             printf("\nits parameters depend on its options: set them with -O\n");
         if (!s) s = print_options(shape, err);
+        if (!s) print_all_measures(shape);
     }
     sdm_instance_free(instance);
     return s;

@@ -6,6 +6,8 @@
 #include "commands.h"
 #include "inputs/config_shape.h"
 #include "inputs/setup.h"
+#include "page/page.h"
+#include "report/files.h"
 #include "report/report_survey.h"
 #include "report/report_verdict.h"
 #include "report/terminal.h"
@@ -120,7 +122,10 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     if (s) return s;
     cli_timing times;
     s = look_at_model(report.model_path, shape, folder, &times, err);
-    return s ? s : print_summary(args, &report, &times, err);
+    if (!s) s = print_summary(args, &report, &times, err);
+    return s || !args->report
+               ? s
+               : cli_page_report(args, folder, cli_page_has_runtime(), args->report, err);
 }
 
 sdm_status cmd_train(const cli_args *args, sdm_error *err)
@@ -128,11 +133,16 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     sdm_config *config = NULL;
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
-    sdm_status s = cli_open_config(args, &config, &registry, &shape, err);
+    sdm_status s = cli_page_check_option(args, err);
+    if (!s) s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && args->out && strlen(args->out) >= sizeof config->output.folder)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
     if (!s) s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);
+    // a page in the folder of the run, which the training makes, needs no check
+    const size_t n = strlen(config ? config->output.folder : "");
+    if (!s && args->report && (strncmp(args->report, config->output.folder, n) || !n))
+        s = cli_check_files(args, NULL, err);
     if (!s) s = train_network(args, config, shape, err);
     sdm_instance_free(shape);
     sdm_registry_free(registry);

@@ -18,6 +18,7 @@ sdm_status cmd_bench(const cli_args *args, sdm_error *err);
 sdm_status cmd_experiment(const cli_args *args, sdm_error *err);
 sdm_status cmd_phantom(const cli_args *args, sdm_error *err);
 sdm_status cmd_fit(const cli_args *args, sdm_error *err);
+sdm_status cmd_collect(const cli_args *args, sdm_error *err);
 sdm_status cmd_export(const cli_args *args, sdm_error *err);
 sdm_status cmd_import(const cli_args *args, sdm_error *err);
 sdm_status cmd_slicer(const cli_args *args, sdm_error *err);

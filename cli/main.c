@@ -15,6 +15,7 @@
 #include "commands.h"
 #include "report/crash_guard.h"
 #include "report/terminal.h"
+#include "sdm/internal/isolation.h"
 #include "slicer/slicer.h"
 
 /* The functions of the commands, by index into cli_commands. */
@@ -23,8 +24,9 @@ static sdm_status (*const functions[CLI_N_COMMANDS])(const cli_args *args, sdm_e
     [CLI_MESH] = cmd_mesh,       [CLI_EVAL] = cmd_eval,         [CLI_REPORT] = cmd_report,
     [CLI_SHAPES] = cmd_shapes,   [CLI_INFO] = cmd_info,         [CLI_VERIFY] = cmd_verify,
     [CLI_CONFIG] = cmd_config,   [CLI_BENCH] = cmd_bench,       [CLI_EXPERIMENT] = cmd_experiment,
-    [CLI_PHANTOM] = cmd_phantom, [CLI_FIT] = cmd_fit,           [CLI_EXPORT] = cmd_export,
-    [CLI_IMPORT] = cmd_import,   [CLI_SLICER] = cmd_slicer,     [CLI_HELP] = cmd_help};
+    [CLI_PHANTOM] = cmd_phantom, [CLI_FIT] = cmd_fit,           [CLI_COLLECT] = cmd_collect,
+    [CLI_EXPORT] = cmd_export,   [CLI_IMPORT] = cmd_import,     [CLI_SLICER] = cmd_slicer,
+    [CLI_HELP] = cmd_help};
 
 static int print_help(const cli_command *command)
 {
@@ -100,6 +102,8 @@ static void open_standard_files(void)
 
 int main(int argc, char **argv)
 {
+    if (argc > 1 && !strcmp(argv[1], SDM_ISOLATION_COMMAND))
+        return sdm_isolation_worker(argc - 1, argv + 1);
     open_standard_files();
     keep_memory();
     if (argc == 2 && !strcmp(argv[1], "--version")) {

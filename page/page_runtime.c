@@ -6,9 +6,11 @@
 
 #include "sdm/builtin_shapes.h"
 #include "sdm/isosurface.h"
-#include "sdm/map.h"
 #include "sdm/memory.h"
 #include "sdm/runtime.h"
+
+/* Indices of voxels that differ by less are taken for equal. */
+#define NEAR 1e-6
 
 static sdm_error failure;
 static sdm_model *model;
@@ -20,7 +22,6 @@ static float *values;  // [nz][ny][nx]
 static sdm_result result;
 
 // the surface of the map
-static float *gradient; // [3][nz][ny][nx]
 static float *vertices; // [n_vert][6] position in mm, normal
 static sdm_mesh mesh;
 static bool cut;
@@ -47,7 +48,6 @@ static sdm_status prepare(sdm_error *err)
     sdm_status s = SDM_ALLOC(&params, info->n_params, "parameters", err);
     if (!s) s = SDM_ALLOC(&ranges, 2 * info->n_params, "ranges", err);
     if (!s) s = SDM_ALLOC(&values, count, "map", err);
-    if (!s) s = SDM_ALLOC(&gradient, 3 * count, "gradient", err);
     if (s) return s;
     size_t n = 0;
     const sdm_param *of_shape = shape ? sdm_instance_params(shape, &n) : NULL;
@@ -94,28 +94,43 @@ int page_was_exact(void) { return result.source == SDM_SOURCE_EXACT; }
 const float *page_values(void) { return values; }
 size_t page_n_values(void) { return sdm_grid_count(&info->grid); }
 
-/* normal[3] = the direction of the gradient at x (mm), between the voxels around it. */
+/* Adds weight times the gradient of the map, by central differences, at a voxel. */
+static void add_gradient(const int64_t at[3], double weight, double sum[3])
+{
+    const sdm_grid *g = &info->grid;
+    const float *value = values + sdm_grid_voxel(g, at[0], at[1], at[2]);
+    const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]};
+    for (int a = 0; a < 3; a++) {
+        const int64_t up = at[a] + 1 < g->n[a] ? step[a] : 0, down = at[a] > 0 ? step[a] : 0;
+        if (!up && !down) continue; // one layer of voxels
+        const double slope =
+            ((double)value[up] - (double)value[-down]) / ((up && down ? 2 : 1) * g->spacing[a]);
+        for (int row = 0; row < 3; row++) sum[row] += weight * g->dir[3 * row + a] * slope;
+    }
+}
+
+/* normal[3] = the direction of the gradient at x (mm), a vertex of the surface: between the two
+ * voxels at the ends of its edge of the grid. */
 static void normal_at(const double x[3], float normal[3])
 {
     const sdm_grid *g = &info->grid;
-    const size_t count = sdm_grid_count(g);
     double index[3], share[3], sum[3] = {0};
     int64_t low[3];
     sdm_grid_index(g, x, index);
     for (int a = 0; a < 3; a++) {
-        low[a] = (int64_t)fmin(fmax(floor(index[a]), 0), fmax((double)g->n[a] - 2, 0));
-        share[a] = g->n[a] > 1 ? index[a] - (double)low[a] : 0;
+        low[a] = (int64_t)fmin(fmax(floor(index[a] + NEAR), 0), (double)g->n[a] - 1);
+        share[a] = fmin(fmax(index[a] - (double)low[a], 0), 1);
     }
     for (int corner = 0; corner < 8; corner++) {
         int64_t at[3];
         double weight = 1;
         for (int a = 0; a < 3; a++) {
             const int high = corner >> a & 1;
-            at[a] = low[a] + (high && g->n[a] > 1);
+            at[a] = low[a] + high;
             weight *= high ? share[a] : 1 - share[a];
+            if (at[a] >= g->n[a]) weight = 0;
         }
-        const size_t v = sdm_grid_voxel(g, at[0], at[1], at[2]);
-        for (size_t a = 0; a < 3; a++) sum[a] += weight * (double)gradient[a * count + v];
+        if (weight > NEAR) add_gradient(at, weight, sum);
     }
     const double length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
     for (int a = 0; a < 3; a++) normal[a] = (float)(length > 0 ? sum[a] / length : 0);
@@ -152,7 +167,6 @@ int page_surface(void)
     free(vertices);
     vertices = NULL;
     sdm_status s = sdm_isosurface(&info->grid, values, 0, &mesh, &cut, &failure);
-    if (!s) s = sdm_map_gradient(&info->grid, values, 1, gradient, &failure);
     if (!s) s = SDM_ALLOC(&vertices, 6 * mesh.n_vert + 1, "surface", &failure);
     if (s) return 1;
     for (size_t i = 0; i < mesh.n_vert; i++) {

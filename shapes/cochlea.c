@@ -38,6 +38,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cochlea_measure.h"
 #include "cochlea_ring.h"
 #include "lathe.h"
 #include "sdm/shape.h"
@@ -397,6 +398,19 @@ static int cochlea_distance(const void *self, const sdm_host *host, const sdm_op
     return 0;
 }
 
+static int cochlea_measure(const void *self, const sdm_host *host, const sdm_option_value *options,
+                           const double *p, uint32_t index, double depth, double *value)
+{
+    (void)options;
+    const cochlea *c = self;
+    double x[COCHLEA_UNKNOWNS];
+    unknowns_at(c, p, x);
+    if (x[COCHLEA_THETA] < COCHLEA_MEASURES_FROM)
+        return host->fail(host, "the diameters need three quarters of a turn: theta >= 4.8");
+    *value = sdm_cochlea_measure(&c->model, x, index, depth);
+    return 0;
+}
+
 const sdm_shape sdm_shape_cochlea = {
     .abi = SDM_SHAPE_ABI,
     .size = sizeof(sdm_shape),
@@ -415,4 +429,7 @@ const sdm_shape sdm_shape_cochlea = {
     .velocity = cochlea_velocity,
     .distance = cochlea_distance,
     .mirror = "ear",
+    .measures = sdm_cochlea_measures,
+    .n_measures = COCHLEA_MEASURES,
+    .measure = cochlea_measure,
 };

@@ -217,6 +217,7 @@ static sdm_status parse_option(int argc, char **argv, int *i, cli_args *args, sd
         value = argv[++*i];
     }
     if (value && !*value) return sdm_fail(err, SDM_E_ARG, "--%s: empty value", o->name);
+    args->given[args->n_given++] = (cli_given){o, value ? value : o->name};
     return store_value(args, o, value, err);
 }
 
@@ -293,7 +294,8 @@ static sdm_status make_lists(int argc, cli_args *args, sdm_error *err)
                          &args->fit.reference_labels,
                          &args->fit.keep};
     const size_t n_lists = sizeof lists / sizeof *lists;
-    const sdm_status s = SDM_ALLOC(&args->memory, (size_t)argc * n_lists, "command line", err);
+    sdm_status s = SDM_ALLOC(&args->memory, (size_t)argc * n_lists, "command line", err);
+    if (!s) s = SDM_ALLOC(&args->given, (size_t)argc, "command line", err);
     if (s) return s;
     for (size_t i = 0; i < n_lists; i++) lists[i]->items = args->memory + i * (size_t)argc;
     return SDM_OK;
@@ -345,6 +347,7 @@ sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err)
 
 void cli_args_dispose(cli_args *args)
 {
+    sdm_free(args->given);
     sdm_free((void *)args->memory);
     memset(args, 0, sizeof *args);
 }

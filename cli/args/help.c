@@ -38,13 +38,14 @@ void cli_help_all(sdm_text *out)
     sdm_text_add(out, "usage: sdmgen COMMAND [arguments] [options]\n\ncommands:\n");
     for (size_t i = 0; i < CLI_N_COMMANDS; i++)
         sdm_text_add(out, "  %-10s %s\n", cli_commands[i].name, cli_commands[i].summary);
-    sdm_text_add(out, "\n  sdmgen COMMAND --help   options of a command\n"
-                      "  sdmgen --version        version\n\n"
-                      "exit codes: 0 done, 1 failed, 2 usage or configuration, 3 bad input data, 4 "
-                      "quality not reached,\n"
-                      "            5 parameters out of range, 130 interrupted\n"
-                      "environment: SDMGEN_PLUGIN_PATH (folders with shape plug-ins), "
-                      "OMP_NUM_THREADS, NO_COLOR\n");
+    sdm_text_add(
+        out, "\n  sdmgen COMMAND --help   options of a command\n"
+             "  sdmgen --version        version\n\n"
+             "exit codes: 0 done, 1 failed, 2 usage or configuration, 3 bad input data, 4 "
+             "quality not reached,\n"
+             "            5 parameters out of range, 6 cases failed or missing, 130 interrupted\n"
+             "environment: SDMGEN_PLUGIN_PATH (folders with shape plug-ins), "
+             "OMP_NUM_THREADS, NO_COLOR\n");
 }
 
 void cli_help_command(const cli_command *c, sdm_text *out)

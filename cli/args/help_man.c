@@ -46,7 +46,9 @@ static void add_exit_codes(sdm_text *out)
         out,
         ".SH EXIT STATUS\n"
         ".TP\n0\ndone\n.TP\n1\nfailed\n.TP\n2\nusage or configuration\n.TP\n3\nbad input data\n"
-        ".TP\n4\nquality not reached\n.TP\n5\nparameters out of range\n.TP\n130\ninterrupted\n");
+        ".TP\n4\nquality not reached\n.TP\n5\nparameters out of range\n.TP\n6\ncases of a cohort "
+        "failed or missing\n.TP\n130\n"
+        "interrupted\n");
 }
 
 void cli_man(sdm_text *out)

@@ -13,7 +13,7 @@
 #define REPORTS                                                                                    \
     (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) |              \
      ON(CLI_SHAPES) | ON(CLI_INFO) | ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |         \
-     ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_IMPORT))
+     ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_COLLECT) | ON(CLI_IMPORT))
 
 /* Commands that train networks. */
 #define WITH_MODELS                                                                                \
@@ -61,15 +61,19 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "exact engine: errors of the distance, overlap of the volumes inside (Dice), distances\n"
      "between the zero surfaces, and the time per map on one core.",
      "sdmgen eval runs/cochlea/model.sdm --samples 100 --json", 1, 1},
-    {"report", "MODEL | RUN -o FILE.html", "make a page with the model, for a browser",
+    {"report", "MODEL | RUN | FIT.json -o FILE.html",
+     "make a page of a model or of a fit, for a browser",
      "Writes one HTML file that needs no network and no other file. It holds the model and\n"
      "the runtime as WebAssembly: a slider for each parameter, the surface, three slices,\n"
      "volume and area, which follow at once; the errors of the network; and, of the folder of\n"
      "a run, plots of its training. Beyond the trained range the exact engine computes the\n"
-     "map, if the shape is a built-in one without data files.",
+     "map, if the shape is a built-in one without data files. FIT.json (of `sdmgen fit`):\n"
+     "the image with the contour of the fit and its standard deviation, the verdict, and\n"
+     "what the image does not determine; model and image are read from where the fit found\n"
+     "them, or from the folder of the file.",
      "sdmgen report runs/cochlea -o cochlea.html", 1, 1},
-    {"shapes", "[NAME] | new NAME | check NAME|CONFIG",
-     "list the shapes, describe one, begin a new one, or check one",
+    {"shapes", "[NAME] | new NAME | check NAME|CONFIG | test NAME|PLUGIN",
+     "list the shapes, describe one, begin a new one, check or test one",
      "Without NAME: lists the shapes. NAME: prints the parameters and options of one.\n"
      "new NAME: writes the folder NAME (or that of --out) with a shape of this name as a\n"
      "plug-in: C source, CMakeLists.txt, a configuration and tests. It builds and passes its\n"
@@ -78,7 +82,11 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "and trainings: broken meshes, parts that are inside out, vertices that jump, numbers of\n"
      "vertices that change, a grid that cuts the shapes (with a CONFIG, whose key=value\n"
      "overrides may follow), wrong velocities, results that differ from call to call. -o FILE\n"
-     "draws nine shapes. Exit code 3: meshes are broken; 4: maps or trainings suffer.",
+     "draws nine shapes. Exit code 3: meshes are broken; 4: maps or trainings suffer.\n"
+     "test: tests whether a shape keeps the contract of sdm/shape.h, a plug-in isolated as by\n"
+     "--isolate: valid, closed and oriented meshes, the same triangles, no jumps, velocities,\n"
+     "the same bits from call to call and from many threads, parameters outside the ranges,\n"
+     "options. One line for each test; exit codes as for check.",
      "sdmgen shapes check cochlea -o cochlea.png", 0, SIZE_MAX},
     {"info", "FILE", "describe the content of a model, level set, image, mesh file or shape model",
      NULL, "sdmgen info runs/cochlea/model.sdm", 1, 1},
@@ -126,7 +134,7 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "sdmgen phantom --shape cochlea --random-params --random-pose 20,1 --spacing 0.2 -o ct.nii.gz "
      "--truth truth.json",
      0, 0},
-    {"fit", "MODEL IMAGE | --shape NAME IMAGE",
+    {"fit", "MODEL IMAGE | --shape NAME IMAGE | [MODEL] --cases FILE.csv -o DIR",
      "fit a shape to an image, a label map, a mesh or points",
      "Estimates the parameters and the pose of the shape, with their uncertainty, using the\n"
      "network of MODEL or (--exact, --shape) the exact engine. IMAGE is a volume (.nii\n"
@@ -139,10 +147,22 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      ".npy distances on the grid of the image; .png .svg .pdf the contour over the\n"
      "image; .json the results.\n"
      "Exit code 4: the fit failed or is not to be trusted; files are then written only with\n"
-     "--force.",
+     "--force.\n"
+     "--cases fits all cases of a table, each into its folder DIR/ID with fit.json, case.json,\n"
+     "log.txt and the files of further -o. The same command does what is missing or changed.\n"
+     "Exit code 0: each case has a result, accepted or refused; 6: some failed, DIR/failed.csv\n"
+     "tells why.",
      "sdmgen fit runs/cochlea/model.sdm ct.nii.gz --start-centre 4,-2,7 --start-axis 0,0,1 -o "
      "fit.stl -o fit.png",
-     1, 2},
+     0, 2},
+    {"collect", "DIR [-o FILE.csv]", "make one table of the fits of a cohort",
+     "DIR is the folder of `sdmgen fit --cases`. The table has a row for each case, in their\n"
+     "order: state, verdict, parameters, pose and measures with their standard deviations,\n"
+     "comparison with the reference, evidence, outliers. Without -o it is printed. It does not\n"
+     "depend on how the cases were divided or how often a run was interrupted.\n"
+     "An outlier is a parameter more than 3.5 robust standard deviations from the median of the\n"
+     "accepted fits. Exit code 6: cases failed or are missing.",
+     "sdmgen collect out -o cohort-results.csv", 1, 1},
     {"export", "MODEL -o FILE.onnx | --shape NAME -o FILE.glb",
      "write a network or a shape for other programs",
      "MODEL: the network as ONNX (opset 13): input `params` [N][P] in the units of the\n"
@@ -255,7 +275,8 @@ const cli_option cli_options[] = {
 
     /* the output */
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(outputs),
-     "output: .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl .obj .off .vtk .vtp .png .svg .pdf; may "
+     "output: .vdb .nii .nii.gz .nrrd .seg.nrrd (the inside as a segment of 3D Slicer) .mha .npy "
+     ".ply .stl .obj .off .vtk .vtp .png .svg .pdf; may "
      "be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_PHANTOM), AT(outputs),
      "the image: .nii .nii.gz .nrrd .mha .npy; may be repeated"},
@@ -263,14 +284,19 @@ const cli_option cli_options[] = {
      "output: .ply .stl .obj .off .vtk .vtp; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(outputs),
      "output: .vdb .ply .stl .obj .off .vtk .vtp .nii .nii.gz .nrrd .mha .npy .png .svg .pdf "
-     ".json; may be repeated"},
+     ".json; may be repeated. With --cases the first one is the folder of the results, the others "
+     "are files in the folder of each case"},
+    {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_COLLECT), AT(outputs),
+     "the table: .csv; or .html, a page with the outliers first; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_EXPORT), AT(outputs),
      "output: .onnx (MODEL) or .glb (--shape); may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_SHAPES), AT(outputs),
      "check: a picture of nine shapes: .png .svg .pdf; may be repeated"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_REPORT), AT(outputs), "the page: .html"},
     {"no-model", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_REPORT), AT(no_model),
-     "leave out the model and the runtime: pictures at the default parameters alone"},
+     "leave out the model and the runtime: pictures alone"},
+    {"report", 0, CLI_TEXT, "FILE.html", NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_FIT), AT(report),
+     "also write a page of the result for a browser (see `sdmgen report`)"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_IMPORT), AT(outputs), "output: .ssm"},
     {"modes", 0, CLI_INT, "N", NULL, 1, 1048576, ON(CLI_IMPORT), AT(import.modes),
      "keep the first N modes (default: all, at most 64)"},
@@ -331,7 +357,7 @@ const cli_option cli_options[] = {
     {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_VERIFY), AT(samples),
      "number of random shapes (default 20)"},
     {"samples", 0, CLI_INT, "N", NULL, 1, 1000000, ON(CLI_SHAPES), AT(samples),
-     "check: number of random shapes (default 128)"},
+     "check, test: number of random shapes (default 128; test: 64)"},
     {"naive", 0, CLI_INT, "N", NULL, 0, 1000, ON(CLI_EVAL), AT(naive),
      "number of shapes on which the naive method is timed (default 2; 0: none)"},
     {"max-mse", 0, CLI_REAL, "MM2", NULL, 0, 1e12, ON(CLI_EVAL), AT(max_mse),
@@ -397,7 +423,8 @@ const cli_option cli_options[] = {
     {"type", 0, CLI_CHOICE, NULL, "int16|float32", 0, 0, ON(CLI_PHANTOM), AT(phantom.type),
      "type of the voxels: int16, rounded to whole HU (default), or float32; .npy is float32"},
     {"label", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.label),
-     "also write the labels, 1 inside and 0 outside: .nii .nii.gz .nrrd .mha"},
+     "also write the labels, 1 inside and 0 outside: .nii .nii.gz .nrrd .seg.nrrd "
+     ".mha"},
     {"truth", 0, CLI_TEXT, "FILE.json", NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.truth),
      "also write the truth: shape, parameters, pose, grid and the settings of the image"},
 
@@ -483,6 +510,17 @@ const cli_option cli_options[] = {
      "auto: also fit the mirror image of a shape that has one and tell which fits better; a shape "
      "whose side is not given with -O takes the better one (default auto)"},
 
+    /* fits of many cases */
+    {"cases", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_FIT), AT(cohort.cases),
+     "fit the cases of a table: a column id, a column image (an image, labels, a mesh or points), "
+     "and others with the names of options, or model, for those that differ from case to case; "
+     "relative paths start from the folder of the table"},
+    {"part", 0, CLI_TEXT, "I/N", NULL, 0, 0, ON(CLI_FIT), AT(cohort.part),
+     "fit only part I of N of the cases, contiguous rows of the table"},
+    {"claim", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(cohort.claim),
+     "share the cases with other processes that run the same command, on this machine or on others "
+     "with the same file system"},
+
     /* fits: outputs */
     {"reference", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(fit.reference),
      "label map or segmentation to compare with, within the field of view of the image: Dice and "
@@ -494,8 +532,17 @@ const cli_option cli_options[] = {
      "union"},
     {"label-out", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_FIT), AT(fit.label_out),
      "also write the fitted shape as labels on the grid of the image, 1 inside and 0 outside: .nii "
-     ".nii.gz .nrrd .mha"},
+     ".nii.gz .nrrd .seg.nrrd .mha"},
 
+    {"measure", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(measure),
+     "print the measures of the shape: its own (sdmgen shapes NAME lists them), volume, area and "
+     "extents"},
+    {"measure", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(measure),
+     "print the measures of the fitted shape with standard deviations: its own (sdmgen shapes NAME "
+     "lists them), volume, area and extents"},
+    {"depth", 0, CLI_TEXT, "MM[,MM...]", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT),
+     AT(depths),
+     "with --measure: also the measures at these depths, such as the frequency along the cochlea"},
     {"returnparameterfile", 0, CLI_TEXT, "FILE", NULL, 0, 0,
      ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT), AT(returns),
      "also write the main results as lines NAME = VALUE, as 3D Slicer reads them"},
@@ -517,6 +564,13 @@ const cli_option cli_options[] = {
     /* all commands */
     {"plugin", 0, CLI_LIST, "FILE", NULL, 0, 0, WITH_SHAPES, AT(plugins),
      "load shapes from a shared object; may be repeated"},
+    {"isolate", 0, CLI_FLAG, NULL, NULL, 0, 0, WITH_SHAPES, AT(isolate),
+     "run the callbacks of plug-ins in processes of their own: one that crashes, hangs, exits or "
+     "takes all memory is an error with its name; results have the same bits"},
+    {"isolate-seconds", 0, CLI_REAL, "S", NULL, 0.01, 1e6, WITH_SHAPES, AT(isolate_seconds),
+     "with --isolate: longest time of a call, by the clock (default 10)"},
+    {"isolate-memory", 0, CLI_REAL, "GB", NULL, 0.05, 1e6, WITH_SHAPES, AT(isolate_memory),
+     "with --isolate: memory of a plug-in in each of its processes (default 2)"},
     {"expect", 0, CLI_TEXT, "SHA256", NULL, 0, 0, WITH_MODELS, AT(expect),
      "refuse a model file with another SHA-256 than this (sdmgen info prints it)"},
     {"max-memory", 0, CLI_REAL, "GB", NULL, 0.1, 1e6, ALL & ~ON(CLI_HELP), AT(max_memory),

@@ -66,6 +66,7 @@ enum {
     CLI_EXPERIMENT,
     CLI_PHANTOM,
     CLI_FIT,
+    CLI_COLLECT,
     CLI_EXPORT,
     CLI_IMPORT,
     CLI_SLICER,
@@ -77,6 +78,12 @@ typedef struct cli_list {
     const char **items; /* point into argv */
     size_t n;
 } cli_list;
+
+/* An option as given on the command line. */
+typedef struct cli_given {
+    const cli_option *option;
+    const char *value; /* a flag: its name */
+} cli_given;
 
 /* A pose: the pose of the shape for `phantom`, the start pose for `fit`. Each vector is NaN when
  * its option is missing. */
@@ -110,6 +117,12 @@ typedef struct cli_fit_args {
     double prior_sd, prior_rotation, prior_translation, eps;
 } cli_fit_args;
 
+/* Options of `fit` for a table of cases; NULL: option missing. */
+typedef struct cli_cohort_args {
+    const char *cases, *part;
+    bool claim;
+} cli_cohort_args;
+
 /* Options of `import` alone; 0 or NULL: option missing. */
 typedef struct cli_import_args {
     int64_t modes;
@@ -131,6 +144,8 @@ struct cli_args {
     const char *expect;   /* generate, eval, report, info, verify, bench, fit, export */
     const char *progress; /* train, generate, exact, eval, verify, experiment, fit */
     double max_memory;    /* GB; 0: option missing */
+    bool isolate;         /* commands with --plugin */
+    double isolate_seconds, isolate_memory; /* s, GB; 0: option missing */
     int64_t threads, seed;
     bool resume;                     /* train */
     bool force;                      /* train, experiment, fit */
@@ -142,6 +157,7 @@ struct cli_args {
     double narrow;                   /* exact: voxels; 0: option missing */
     double tolerance;                /* exact: mm; 0: option missing */
     bool no_model;                   /* report */
+    const char *report;              /* train, fit: file of a page */
     bool dump;                       /* config */
     bool keys;                       /* config, experiment */
     bool markdown;                   /* config, experiment, help */
@@ -150,6 +166,8 @@ struct cli_args {
     const char *out;                 /* train, experiment, shapes */
     const char *install;             /* slicer */
     const char *returns;             /* generate, exact, fit: file of results */
+    bool measure;                    /* generate, exact, fit */
+    const char *depths;              /* generate, exact, fit: list of mm; NULL: option missing */
     const char *rows;                /* generate: the file of --params */
     const char *policy;              /* generate, fit */
     const char *shape;               /* exact, mesh, bench, phantom, fit */
@@ -179,7 +197,10 @@ struct cli_args {
     cli_pose_args pose;              /* phantom, fit */
     cli_phantom_args phantom;
     cli_fit_args fit;
+    cli_cohort_args cohort; /* fit */
     cli_import_args import;
+    cli_given *given; /* [n_given] all options in the order of the command line */
+    size_t n_given;
     const char **memory; /* storage of the items of all lists */
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "args/options.h"
+#include "measure/measures.h"
 #include "sdm/fit.h"
 #include "sdm/volume.h"
 
@@ -66,11 +67,22 @@ typedef struct cli_fit {
     float *map;                /* [map_grid] signed distance, mm */
     sdm_mesh surface;          /* zero level set of the map, in the world */
     cli_overlap overlap;
+
+    /* fit_measures.c: --measure */
+    cli_depths depths;
+    sdm_measures measures;
 } cli_fit;
 
 /* Opens the model or the shape; sets the start parameters and the source of the maps. SDM_E_ARG,
  * SDM_E_RANGE, errors of opening. */
 sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err);
+
+/* After cli_fit_open_source(): reads --depth. With --measure it measures the shape at the start, so
+ * that a mistake ends the command before the fit. SDM_E_ARG, SDM_E_PLUGIN. */
+sdm_status cli_fit_prepare_measures(cli_fit *f, sdm_error *err);
+
+/* After the fit: with --measure fills f->measures. */
+sdm_status cli_fit_measure(cli_fit *f, sdm_error *err);
 
 /* Reads the image, label map, mesh or points. SDM_E_ARG, SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_target(cli_fit *f, sdm_error *err);
@@ -147,6 +159,9 @@ const char *cli_fit_kind(const cli_fit *f);
 /* Negates x and y of points[n][3]: this converts RAS to LPS and back. */
 void cli_fit_negate_xy(double *points, size_t n);
 
+/* Checks the types of the output files, and the options of level sets. SDM_E_ARG. */
+sdm_status cli_fit_check_types(const cli_args *args, sdm_error *err);
+
 /* Before any work: checks the types of the output files and that they can be written.
  * SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err);
@@ -157,6 +172,10 @@ sdm_status cli_fit_write_files(const cli_fit *f, sdm_error *err);
 /* Writes slices of the image near the shape with the contour of the fitted shape, and of the
  * reference where --reference gives one. */
 sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *err);
+
+/* values[g] at a point of the world, by trilinear interpolation; voxels outside of the grid count
+ * as 0. */
+double cli_fit_interpolate(const sdm_grid *g, const float *values, const double world[3]);
 
 /* Prints the result as text on stdout. */
 void cli_fit_print(const cli_fit *f);

@@ -17,7 +17,7 @@ static bool is_image(const char *path)
 
 /* ---- before any work ---- */
 
-sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err)
+sdm_status cli_fit_check_types(const cli_args *args, sdm_error *err)
 {
     const char *label = args->fit.label_out;
     sdm_status s = SDM_OK;
@@ -27,7 +27,12 @@ sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err)
     if (!s && label && !cli_ends_with_any(label, CLI_VOLUME_ENDINGS))
         s = sdm_fail(err, SDM_E_ARG,
                      "--label-out '%s': its name must end in .nii .nii.gz .nrrd or .mha", label);
-    if (!s) s = cli_check_vdb_options(args, err);
+    return s ? s : cli_check_vdb_options(args, err);
+}
+
+sdm_status cli_fit_check_files(const cli_args *args, sdm_error *err)
+{
+    const sdm_status s = cli_fit_check_types(args, err);
     return s ? s : cli_check_files(args, NULL, err);
 }
 
@@ -70,10 +75,10 @@ static sdm_status write_labels(const cli_fit *f, const sdm_grid *g, const float 
     const size_t n = sdm_grid_count(g);
     uint8_t *labels = NULL;
     char text[120];
+    snprintf(text, sizeof text, "sdmgen %s: %s, fitted", SDM_VERSION_TEXT, f->shape_name);
     sdm_status s = SDM_ALLOC(&labels, n, "labels", err);
     for (size_t i = 0; i < n && !s; i++) labels[i] = values[i] < 0;
-    snprintf(text, sizeof text, "sdmgen %s: %s, fitted", SDM_VERSION_TEXT, f->shape_name);
-    if (!s) s = sdm_volume_write(f->args->fit.label_out, g, labels, SDM_VOXEL_UINT8, text, err);
+    if (!s) s = cli_write_labels(f->args->fit.label_out, g, labels, f->shape_name, text, err);
     sdm_free(labels);
     return s;
 }

@@ -142,6 +142,7 @@ void cli_fit_json(const cli_fit *f, sdm_json *j)
     sdm_json_bool(j, "converged", r->converged);
     sdm_json_text(j, "reason", r->reason);
     add_unknowns(j, f);
+    if (f->args->measure) cli_json_measures(&f->measures, true, j);
     add_overlap(j, f);
     add_target(j, f);
     add_work(j, f);

@@ -8,8 +8,7 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
-/* Trilinear interpolation at a point of the world; voxels outside of the grid count as 0. */
-static double interpolate(const sdm_grid *g, const float *values, const double world[3])
+double cli_fit_interpolate(const sdm_grid *g, const float *values, const double world[3])
 {
     double at[3], sum = 0;
     sdm_grid_index(g, world, at);
@@ -39,7 +38,7 @@ static void sample_reference(const cli_fit *f, const sdm_grid *g, float *out)
                 const double index[3] = {(double)i, (double)j, (double)k};
                 double world[3];
                 sdm_grid_world(g, index, world);
-                *out++ = 0.5f - (float)interpolate(&f->reference_grid, f->reference, world);
+                *out++ = 0.5f - (float)cli_fit_interpolate(&f->reference_grid, f->reference, world);
             }
 }
 

@@ -97,6 +97,7 @@ void cli_fit_print(const cli_fit *f)
     print_vector("rotation", r->pose.rotation, r->sd + f->n_params, "rad");
     print_vector("translation", r->pose.translation, r->sd + f->n_params + 3, "mm");
     if (*r->open_motions) printf("  not determined by the data: %s\n", r->open_motions);
+    if (f->measures.n) cli_print_measures(&f->measures, true);
     print_overlap(f);
     print_target(f);
     cli_fit_print_verdict(f);

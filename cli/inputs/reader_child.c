@@ -20,15 +20,8 @@
 
 #include "report/terminal.h"
 #include "sdm/internal/clock.h"
+#include "sdm/internal/sanitized.h"
 #include "sdm/memory.h"
-
-#if defined(__SANITIZE_ADDRESS__)
-#define SANITIZED 1 // gcc
-#elif defined(__has_feature)
-#define SANITIZED __has_feature(address_sanitizer) // clang
-#else
-#define SANITIZED 0
-#endif
 
 #define MEGABYTE UINT64_C(1048576)
 
@@ -80,7 +73,7 @@ static void limit_child(limits most)
     (void)mallopt(M_ARENA_MAX, 1);
 #endif
     const uint64_t stacks = (uint64_t)sysconf(_SC_NPROCESSORS_ONLN) * 16 * MEGABYTE;
-    if (!SANITIZED) set_limit(RLIMIT_AS, bytes_now() + most.bytes + stacks);
+    if (!SDM_SANITIZED) set_limit(RLIMIT_AS, bytes_now() + most.bytes + stacks);
     set_limit(RLIMIT_CPU, most.seconds);
     set_limit(RLIMIT_CORE, 0);
 }

@@ -10,14 +10,32 @@
 #include "report/terminal.h"
 #include "sdm/builtin_shapes.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/isolation.h"
 #include "sdm/internal/model_hash.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
+
+static void tell(const char *text) { cli_notice("%s", text); }
+
+/* The options --isolate. */
+static sdm_status isolate(const cli_args *args, sdm_registry *r, sdm_error *err)
+{
+    if (!args->isolate && (args->isolate_seconds > 0 || args->isolate_memory > 0))
+        return sdm_fail(err, SDM_E_ARG, "--isolate-%s needs --isolate",
+                        args->isolate_seconds > 0 ? "seconds" : "memory");
+    const sdm_isolation how = {
+        .program = "/proc/self/exe",
+        .seconds = args->isolate_seconds > 0 ? args->isolate_seconds : 10,
+        .bytes = (uint64_t)(1e9 * (args->isolate_memory > 0 ? args->isolate_memory : 2)),
+        .notice = tell};
+    return args->isolate ? sdm_registry_isolate(r, &how, err) : SDM_OK;
+}
 
 sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error *err)
 {
     sdm_status s = sdm_registry_create(out, err);
     if (!s) s = sdm_builtin_shapes_add(*out, err);
+    if (!s) s = isolate(args, *out, err);
     for (size_t i = 0; i < args->plugins.n && !s; i++)
         s = sdm_registry_load(*out, args->plugins.items[i], err);
     if (!s) s = sdm_registry_load_path(*out, getenv("SDMGEN_PLUGIN_PATH"), err);

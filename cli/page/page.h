@@ -2,11 +2,12 @@
  * The files that make up the page lie in the folder page/. */
 #pragma once
 
+#include "args/options.h"
+#include "page_fit.h"
 #include "sdm/internal/text.h"
-#include "sdm/model.h"
 
-/* A model as it stands without the runtime: its surface and three slices at the default
- * parameters. Zero-initialise; cli_still_dispose() frees, also after an error. */
+/* A shape as it stands without the runtime: its surface and three slices. Zero-initialise;
+ * cli_still_dispose() frees, also after an error. */
 typedef struct cli_still {
     double volume, area;   /* of the surface, mm^3 and mm^2 */
     double min[3], max[3]; /* corners of its box, mm */
@@ -20,7 +21,9 @@ typedef struct cli_still {
     size_t size;
 } cli_still;
 
-sdm_status cli_still_make(const sdm_model *model, cli_still *out, sdm_error *err);
+/* values: a map on the grid. */
+sdm_status cli_still_make(const sdm_grid *grid, const float *values, cli_still *out,
+                          sdm_error *err);
 void cli_still_dispose(cli_still *s);
 
 /* The content of a page. */
@@ -30,8 +33,9 @@ typedef struct cli_page {
     const sdm_param *of_shape; /* [info->n_params] */
     const char *summary;       /* of the shape; NULL: not known */
     const char *metrics;       /* text of metrics.jsonl; NULL: no training to show */
-    const cli_still *still;
-    const uint8_t *model; /* [info->file_bytes] the model's file; NULL: pictures alone */
+    const cli_page_fit *fit;   /* NULL: a page of a model */
+    const cli_still *still;    /* at the default or at the fitted parameters */
+    const uint8_t *model;      /* [info->file_bytes] the model's file; NULL: pictures alone */
 } cli_page;
 
 /* Adds the figures of the page as an object. */
@@ -43,6 +47,19 @@ void cli_page_history(const char *metrics, sdm_json *json);
 
 /* Whether this program holds the runtime for pages. */
 bool cli_page_has_runtime(void);
+
+/* Before any work: checks --report of a command whose page may do without the runtime. SDM_E_ARG.
+ */
+sdm_status cli_page_check_option(const cli_args *args, sdm_error *err);
+
+/* Writes the page of a model file, of the folder of a run or of the result of a fit (.json) to
+ * `path`. live: with the model and the runtime. SDM_E_IO, SDM_E_NOMEM, errors of opening. */
+sdm_status cli_page_report(const cli_args *args, const char *source, bool live, const char *path,
+                           sdm_error *err);
+
+/* The same for the result of a fit in memory; with the runtime if this program has it. */
+sdm_status cli_page_report_fit(const cli_args *args, const sdm_json *fit, const char *path,
+                               sdm_error *err);
 
 /* Writes the page. SDM_E_IO, SDM_E_NOMEM. */
 sdm_status cli_page_write(const cli_page *page, const char *path, sdm_error *err);

@@ -21,6 +21,21 @@ static void add_still(const cli_still *s, sdm_json *j)
     sdm_json_close(j, '}');
 }
 
+/* Adds the result of the fit, as it is in its file, and what the bytes of the page mean. */
+static void add_fit(const cli_page_fit *f, sdm_json *j)
+{
+    sdm_json_open(j, "fit_data", '{');
+    sdm_json_real(j, "map_step_mm", f->map_step);
+    sdm_json_real(j, "sd_step_mm", f->sd_step);
+    if (f->image) {
+        sdm_json_grid(j, "image", &f->image_grid, false);
+        sdm_json_real(j, "low", f->low);
+        sdm_json_real(j, "high", f->high);
+    }
+    sdm_json_close(j, '}');
+    sdm_text_add(&j->text, ", \"fit\": %s", f->text);
+}
+
 void cli_page_figures(const cli_page *page, sdm_json *j)
 {
     const sdm_model_info *m = page->info;
@@ -48,6 +63,7 @@ void cli_page_figures(const cli_page *page, sdm_json *j)
     cli_json_accuracy(j, &m->accuracy);
     sdm_json_close(j, '}');
     add_still(page->still, j);
+    if (page->fit) add_fit(page->fit, j);
     if (page->metrics) cli_page_history(page->metrics, j);
     sdm_json_close(j, '}');
 }

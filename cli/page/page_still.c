@@ -1,12 +1,10 @@
-/* The surface and three slices of a model at its default parameters, in a compact form for a page.
- */
+/* The surface and three slices of a map, in a compact form for a page. */
 #include <math.h>
 #include <string.h>
 
 #include "page.h"
 #include "sdm/isosurface.h"
 #include "sdm/memory.h"
-#include "sdm/runtime.h"
 
 static void put16(uint8_t **at, uint16_t v)
 {
@@ -88,25 +86,16 @@ static sdm_status pack(const sdm_grid *g, const float *values, const sdm_mesh *m
     return SDM_OK;
 }
 
-sdm_status cli_still_make(const sdm_model *model, cli_still *out, sdm_error *err)
+sdm_status cli_still_make(const sdm_grid *grid, const float *values, cli_still *out, sdm_error *err)
 {
-    const sdm_model_info *info = sdm_model_get_info(model);
-    double *params = NULL;
-    float *values = NULL;
     sdm_mesh mesh = {0};
-    sdm_status s = SDM_ALLOC(&params, info->n_params, "parameters", err);
-    if (!s) s = SDM_ALLOC(&values, sdm_grid_count(&info->grid), "map", err);
-    for (size_t i = 0; i < info->n_params && !s; i++) params[i] = info->params[i].def;
-    if (!s) s = sdm_generate(model, params, NULL, values, NULL, err);
-    if (!s) s = sdm_isosurface(&info->grid, values, 0, &mesh, &out->cut, err);
+    sdm_status s = sdm_isosurface(grid, values, 0, &mesh, &out->cut, err);
     if (!s) s = measure(&mesh, out, err);
     if (!s) {
-        choose_slices(&info->grid, out);
-        s = pack(&info->grid, values, &mesh, out, err);
+        choose_slices(grid, out);
+        s = pack(grid, values, &mesh, out, err);
     }
     sdm_mesh_dispose(&mesh);
-    sdm_free(values);
-    sdm_free(params);
     return s;
 }
 

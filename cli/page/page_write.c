@@ -92,6 +92,8 @@ static sdm_status put_part(sdm_outfile *out, const cli_page *page, const char *n
                            : SDM_OK;
     if (!strcmp(name, "model"))
         return page->model ? put_base64(out, page->model, page->info->file_bytes, err) : SDM_OK;
+    if (!strcmp(name, "fit"))
+        return page->fit ? put_base64(out, page->fit->bytes, page->fit->size, err) : SDM_OK;
     if (!strcmp(name, "still"))
         return page->model ? SDM_OK : put_base64(out, page->still->bytes, page->still->size, err);
     return sdm_fail(err, SDM_E_ARG, "page.html: no part '%s'", name);

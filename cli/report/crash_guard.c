@@ -34,22 +34,6 @@ static void end_program(const sdm_callback *c, const char *reason)
     _exit(CLI_EXIT_INPUT);
 }
 
-static const char *reason_of(int signal_number)
-{
-    switch (signal_number) {
-    case SIGSEGV:
-        return "the plug-in used memory that is not its own (segmentation fault)";
-    case SIGBUS:
-        return "the plug-in used memory that does not exist (bus error)";
-    case SIGFPE:
-        return "the plug-in divided an integer by zero";
-    case SIGILL:
-        return "the plug-in ran an instruction that this processor does not have";
-    default:
-        return "the plug-in called abort(), or damaged memory";
-    }
-}
-
 static const int signals[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 enum { N_SIGNALS = sizeof signals / sizeof *signals };
 static struct sigaction before[N_SIGNALS]; // what the signals did before
@@ -58,7 +42,7 @@ static void on_crash(int signal_number, siginfo_t *info, void *context)
 {
     (void)context;
     const sdm_callback *c = sdm_callback_running();
-    if (c) end_program(c, reason_of(signal_number));
+    if (c) end_program(c, sdm_callback_crash_reason(signal_number));
     // not a plug-in: the instruction runs into the fault again, as ever; a signal that was sent
     // does not come again by itself
     for (size_t i = 0; i < N_SIGNALS; i++)

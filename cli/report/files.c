@@ -88,9 +88,9 @@ static sdm_status find_inputs(const cli_args *args, cli_list *out, sdm_error *er
 
 static sdm_status find_outputs(const cli_args *args, cli_list *out, sdm_error *err)
 {
-    const char *const single[] = {args->closest,       args->normal,        args->triangle,
-                                  args->jacobian,      args->gradient,      args->fit.label_out,
-                                  args->phantom.label, args->phantom.truth, args->returns};
+    const char *const single[] = {
+        args->closest,       args->normal, args->triangle,      args->jacobian,      args->gradient,
+        args->fit.label_out, args->report, args->phantom.label, args->phantom.truth, args->returns};
     const size_t n_single = sizeof single / sizeof *single;
     const sdm_status s = SDM_ALLOC(&out->items, args->outputs.n + n_single, "names of files", err);
     if (s) return s;

@@ -7,6 +7,9 @@
 #define CLI_VOLUME_ENDINGS ".nii .nii.gz .nrrd .mha"
 #define CLI_MESH_ENDINGS ".ply .stl .obj .off .vtk .vtp"
 
+/* Ending of a segmentation of 3D Slicer, one of the volumes. */
+#define CLI_SEGMENTATION_ENDING ".seg.nrrd"
+
 /* True when the name has this ending, in upper or lower case, after at least one other
  * character. */
 bool cli_ends_with(const char *path, const char *suffix);

@@ -9,9 +9,11 @@
 #include "sdm/image.h"
 #include "sdm/internal/near.h"
 #include "sdm/isosurface.h"
+#include "sdm/memory.h"
 #include "sdm/meshfile.h"
 #include "sdm/picture.h"
 #include "sdm/vdb.h"
+#include "sdm/volume.h"
 #include "terminal.h"
 
 typedef enum file_kind {
@@ -204,6 +206,29 @@ static sdm_status write_picture(const char *path, const cli_map *map, sdm_error 
     return sdm_picture_slices(path, map->grid, &column, 1, levels, 2, err);
 }
 
+sdm_status cli_write_labels(const char *path, const sdm_grid *grid, const uint8_t *labels,
+                            const char *name, const char *text, sdm_error *err)
+{
+    sdm_segment segment = {.value = 1};
+    if (!cli_ends_with(path, CLI_SEGMENTATION_ENDING))
+        return sdm_volume_write(path, grid, labels, SDM_VOXEL_UINT8, text, err);
+    snprintf(segment.name, sizeof segment.name, "%s", name);
+    return sdm_segmentation_write(path, grid, labels, &segment, 1, text, err);
+}
+
+/* Writes the inside of the map as a segmentation. */
+static sdm_status write_inside(const char *path, const cli_map *map, const char *text,
+                               sdm_error *err)
+{
+    const size_t n = sdm_grid_count(map->grid);
+    uint8_t *labels = NULL;
+    sdm_status s = SDM_ALLOC(&labels, n, "labels", err);
+    for (size_t i = 0; i < n && !s; i++) labels[i] = map->values[i] < 0;
+    if (!s) s = cli_write_labels(path, map->grid, labels, map->shape, text, err);
+    sdm_free(labels);
+    return s;
+}
+
 sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *args, sdm_error *err)
 {
     char text[400], made[80];
@@ -217,6 +242,7 @@ sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *a
         describe_method(map, made);
         snprintf(text, sizeof text, "sdmgen %s: " SDM_MAP_TEXT "; %s: %s %s", SDM_VERSION_TEXT,
                  made, map->shape, map->params);
+        if (cli_ends_with(path, CLI_SEGMENTATION_ENDING)) return write_inside(path, map, text, err);
         return sdm_image_write(path, map->grid, map->values, text, err);
     case KIND_SURFACE:
         return write_surface(path, map, err);

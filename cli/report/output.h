@@ -50,6 +50,11 @@ bool cli_is_picture(const char *path);
 sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *args,
                          sdm_error *err);
 
+/* Writes labels[grid], 1 inside and 0 outside; as .seg.nrrd a segmentation with one segment of this
+ * name. Errors as sdm_volume_write() and sdm_segmentation_write(). */
+sdm_status cli_write_labels(const char *path, const sdm_grid *grid, const uint8_t *labels,
+                            const char *name, const char *text, sdm_error *err);
+
 /* buf[size] = path with `row` in place of its %d (or %4d, %04d); without one, "-0001" is inserted
  * before the ending. SDM_E_ARG: the name is too long. */
 sdm_status cli_number_path(const char *path, size_t row, char *buf, size_t size, sdm_error *err);

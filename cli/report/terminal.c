@@ -14,12 +14,14 @@
 
 static bool quiet_wanted;
 static cli_form form;
+static bool incomplete;
 static size_t warnings;
 static volatile sig_atomic_t interrupts;
 static bool unprinted; // by cli_print()
 
 static int exit_code_of(sdm_status status)
 {
+    if (incomplete) return CLI_EXIT_INCOMPLETE;
     switch (status) {
     case SDM_OK:
         return CLI_EXIT_DONE;
@@ -43,6 +45,8 @@ static int exit_code_of(sdm_status status)
 
 void cli_set_quiet(bool quiet) { quiet_wanted = quiet; }
 bool cli_is_quiet(void) { return quiet_wanted; }
+
+void cli_set_incomplete(void) { incomplete = true; }
 
 void cli_set_form(const char *name)
 {

@@ -14,6 +14,7 @@ enum {
     CLI_EXIT_INPUT = 3,
     CLI_EXIT_QUALITY = 4,
     CLI_EXIT_RANGE = 5,
+    CLI_EXIT_INCOMPLETE = 6, /* some cases of a cohort failed or are missing */
     CLI_EXIT_INTERRUPTED = 130
 };
 
@@ -42,6 +43,9 @@ void cli_json_line(sdm_json *json);
    that begin with the place of the mistake, "file:line:column:", have no such prefix. Returns the
    exit code. */
 int cli_report(const sdm_error *err);
+
+/* From now on cli_report() returns CLI_EXIT_INCOMPLETE. */
+void cli_set_incomplete(void);
 
 /* Prints "sdmgen: text" on stderr, unless quiet: good to know. */
 void cli_notice(const char *fmt, ...) SDM_PRINTF(1, 2);

@@ -1,11 +1,9 @@
 /* sdmgen shapes check: surveys a family of shapes and prints what spoils maps, derivatives and
  * trainings. */
-#define _XOPEN_SOURCE 700 // realpath()
 #include "shapes_command.h"
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "inputs/config_shape.h"
@@ -34,29 +32,6 @@ typedef struct check {
 } check;
 
 /* ---- the shape ---- */
-
-/* *name = the only shape of the files of --plugin. */
-static sdm_status only_shape(const check *c, const char **name, sdm_error *err)
-{
-    size_t n = 0;
-    for (size_t i = 0; i < sdm_registry_count(c->registry); i++) {
-        bool given = false;
-        for (size_t k = 0; k < c->args->plugins.n; k++) {
-            char *path = realpath(c->args->plugins.items[k], NULL);
-            given = given || (path && !strcmp(path, sdm_registry_origin(c->registry, i)));
-            free(path);
-        }
-        if (!given) continue;
-        *name = sdm_registry_at(c->registry, i)->name;
-        n++;
-    }
-    if (n == 1) return SDM_OK;
-    if (n == 0)
-        return sdm_fail(err, SDM_E_ARG,
-                        "usage: sdmgen shapes check NAME|CONFIG, or --plugin FILE with one shape");
-    return sdm_fail(err, SDM_E_ARG,
-                    "shapes check: --plugin has %zu shapes: name one, for example %s", n, *name);
-}
 
 /* Ranges, distributions and grid of the configuration. */
 static sdm_status open_config(check *c, sdm_error *err)
@@ -99,7 +74,7 @@ static sdm_status open_shape(check *c, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG, "shapes check: unexpected argument '%s'",
                         args->files.items[2]);
     sdm_status s = cli_open_registry(args, &c->registry, err);
-    if (!s && !name) s = only_shape(c, &name, err);
+    if (!s && !name) s = cli_only_shape(args, c->registry, "check NAME|CONFIG", &name, err);
     return s ? s : cli_create_shape(c->registry, name, &args->options, &c->shape, err);
 }
 

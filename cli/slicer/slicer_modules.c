@@ -8,7 +8,7 @@ enum { FIT = 1, EXACT = 2, GENERATE = 4 };
 /* arrays, tables and level sets, which Slicer does not read, and options of the terminal */
 #define NOT_FOR_SLICER                                                                             \
     "params points columns gradient jacobian closest normal triangle dense half band json "        \
-    "progress quiet help "
+    "progress quiet help cases part claim "
 
 const slicer_module slicer_modules[SLICER_N_MODULES] = {
     {"SdmgenFit", CLI_FIT, "Fit a shape (sdmgen)",

@@ -110,6 +110,7 @@ void sdm_host_call_begin(host_call *c, sdm_mesh *mesh, bool files)
                          .read_file = host_read_file,
                          .read_mesh = host_read_mesh,
                          .read_npy = host_read_npy};
+    c->shape = NULL;
     c->mesh = mesh;
     c->files = files;
     c->blocks = NULL;

@@ -14,6 +14,7 @@ static sdm_status instance_call_create(sdm_instance *s, sdm_error *err)
     if (!s->shape->create) return SDM_OK;
     host_call call;
     sdm_host_call_begin(&call, NULL, true);
+    call.shape = s->shape;
     sdm_callback_begin(s, "create", NULL);
     const int failed = s->shape->create(&call.host, s->options, &s->self);
     sdm_callback_end();
@@ -74,15 +75,28 @@ sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *opt
     *out = NULL;
     if (!shape || (n_options && !options))
         return sdm_fail(err, SDM_E_ARG, "a shape and its options are needed to make an instance");
+    sdm_option_value *values = NULL;
+    char *text = NULL;
+    sdm_status status = SDM_ALLOC(&values, shape->n_options, "option values", err);
+    if (!status)
+        status = sdm_shape_parse_options(shape, options, n_options, base_dir, values, &text, err);
+    if (!status) return sdm_instance_start(shape, values, text, out, err);
+    sdm_free(values);
+    return status;
+}
+
+sdm_status sdm_instance_start(const sdm_shape *shape, sdm_option_value *options, char *text,
+                              sdm_instance **out, sdm_error *err)
+{
     sdm_instance *s = NULL;
     sdm_status status = SDM_ALLOC(&s, 1, "instance", err);
-    if (status) return status;
-    s->shape = shape;
-    status = SDM_ALLOC(&s->options, shape->n_options, "option values", err);
-    if (!status)
-        status =
-            sdm_shape_parse_options(shape, options, n_options, base_dir, s->options, &s->text, err);
-    if (!status) status = instance_call_create(s, err);
+    if (status) {
+        sdm_free(options);
+        sdm_free(text);
+        return status;
+    }
+    *s = (sdm_instance){.shape = shape, .options = options, .text = text};
+    status = instance_call_create(s, err);
     if (!status) status = instance_call_describe(s, err);
     if (!status) status = instance_call_distributions(s, err);
     if (status)
@@ -159,15 +173,24 @@ sdm_status sdm_instance_fail_at(const sdm_instance *s, const double *p, sdm_stat
     return sdm_fail_in(err, status, "%s", where);
 }
 
+sdm_status sdm_mesh_out_check(const sdm_mesh_out *out, const sdm_mesh_out *given, sdm_error *err)
+{
+    return out->vert && out->vert == given->vert && out->tri == given->tri &&
+                   out->n_vert == given->n_vert && out->n_tri == given->n_tri
+               ? SDM_OK
+               : sdm_fail(err, SDM_E_PLUGIN,
+                          "mesh() must fill what reserve() gave, and leave sizes and pointers as "
+                          "they are");
+}
+
 /* The plug-in must have filled the arrays of host->reserve() with at least one triangle, valid
    indices and finite coordinates. */
-static sdm_status mesh_out_check(const sdm_mesh *m, const sdm_mesh_out *out, sdm_error *err)
+static sdm_status mesh_check(const sdm_mesh *m, const sdm_mesh_out *out, sdm_error *err)
 {
-    if (!out->vert || out->vert != m->vert || out->tri != m->tri || out->n_vert != m->n_vert ||
-        out->n_tri != m->n_tri)
-        return sdm_fail(
-            err, SDM_E_PLUGIN,
-            "mesh() must fill what reserve() gave, and leave sizes and pointers as they are");
+    const sdm_mesh_out given = {
+        .vert = m->vert, .tri = m->tri, .n_vert = m->n_vert, .n_tri = m->n_tri};
+    const sdm_status s = sdm_mesh_out_check(out, &given, err);
+    if (s) return s;
     if (m->n_tri == 0) return sdm_fail(err, SDM_E_PLUGIN, "the mesh has no triangle");
     for (size_t i = 0; i < 3 * m->n_tri; i++)
         if (m->tri[i] >= m->n_vert)
@@ -183,9 +206,15 @@ static sdm_status mesh_out_check(const sdm_mesh *m, const sdm_mesh_out *out, sdm
 
 sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *out, sdm_error *err)
 {
-    sdm_status status = sdm_instance_check(s, p, err);
+    const sdm_status status = sdm_instance_check(s, p, err);
     if (status) return status;
     if (!out) return sdm_fail(err, SDM_E_ARG, "the address of the mesh must not be NULL");
+    return sdm_instance_mesh_anywhere(s, p, out, err);
+}
+
+sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sdm_mesh *out,
+                                      sdm_error *err)
+{
     out->n_vert = out->n_tri = 0;
     sdm_mesh_out filled = {0};
     host_call call;
@@ -193,8 +222,9 @@ sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *o
     sdm_callback_begin(s, "mesh", p);
     const int failed = s->shape->mesh(s->self, &call.host, s->options, p, &filled);
     sdm_callback_end();
-    status = failed ? sdm_host_call_failed(&call, "mesh", failed, SDM_E_PLUGIN, err)
-                    : mesh_out_check(out, &filled, err);
+    const sdm_status status = failed
+                                  ? sdm_host_call_failed(&call, "mesh", failed, SDM_E_PLUGIN, err)
+                                  : mesh_check(out, &filled, err);
     sdm_host_call_end(&call);
     if (!status) return SDM_OK;
     out->n_vert = out->n_tri = 0;

@@ -12,9 +12,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "isolated_protocol.h"
 #include "sdm/internal/file.h"
 #include "sdm/memory.h"
-#include "shape_internal.h"
 
 #define FILE_SHAPES_MAX 256
 #define FILE_BYTES_MAX (UINT64_C(1) << 28)
@@ -93,11 +93,24 @@ static sdm_status check_complete(const char *path, sdm_error *err)
                           size, (unsigned long long)end);
 }
 
+static sdm_status isolated_load(sdm_registry *r, const char *path, sdm_error *err)
+{
+    void *object = NULL;
+    const size_t before = sdm_registry_count(r);
+    sdm_status s = sdm_isolated_load(r, sdm_registry_isolation(r), path, &object, err);
+    if (!s) s = sdm_registry_keep(r, path, object, sdm_isolated_close, err);
+    if (!s) return SDM_OK;
+    sdm_registry_shrink(r, before);
+    if (object) sdm_isolated_close(object);
+    return s;
+}
+
 /* Loads the file at an absolute path and adds its shapes. */
 static sdm_status object_load(sdm_registry *r, const char *path, sdm_error *err)
 {
     const sdm_status complete = check_complete(path, err);
     if (complete) return complete;
+    if (sdm_registry_isolation(r)) return isolated_load(r, path, err);
     void *object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!object) {
         const char *why = dlerror();

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "sdm/internal/heap.h"
+#include "sdm/internal/isolation.h"
 #include "sdm/internal/text.h"
 #include "shape_internal.h"
 
@@ -24,6 +25,7 @@ struct sdm_registry {
     size_t n_objects;
     char **skipped; /* messages of files that could not be loaded */
     size_t n_skipped;
+    sdm_isolation *isolation; /* NULL: plug-ins run in this process */
 };
 
 sdm_status sdm_registry_create(sdm_registry **out, sdm_error *err)
@@ -50,9 +52,19 @@ void sdm_registry_free(sdm_registry *r)
     }
     for (size_t i = 0; i < r->n_skipped; i++) sdm_free(r->skipped[i]);
     sdm_free((void *)r->skipped);
+    sdm_free(r->isolation);
     sdm_free(r->objects);
     sdm_free(r->entries);
     sdm_free(r);
+}
+
+const sdm_isolation *sdm_registry_isolation(const sdm_registry *r) { return r->isolation; }
+
+sdm_status sdm_registry_set_isolation(sdm_registry *r, const sdm_isolation *how, sdm_error *err)
+{
+    const sdm_status s = r->isolation ? SDM_OK : SDM_ALLOC(&r->isolation, 1, "isolation", err);
+    if (!s) *r->isolation = *how;
+    return s;
 }
 
 /* *out = a copy of the text, to be freed with sdm_free(). */

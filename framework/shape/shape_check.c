@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "sdm/internal/mesh_measures.h"
 #include "sdm/internal/text.h"
 #include "shape_internal.h"
 
@@ -143,6 +144,40 @@ static sdm_status mirror_check(const char *who, const sdm_shape *shape, sdm_erro
                     shape->mirror);
 }
 
+// whether `name` belongs to one of measures[n]
+static bool is_taken(const char *name, const sdm_measure *measures, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++)
+        if (strcmp(measures[i].name, name) == 0) return true;
+    return false;
+}
+
+static sdm_status measures_check(const char *who, const sdm_shape *t, sdm_error *err)
+{
+    const uint32_t n = t->n_measures;
+    if (!t->measure != !n || (n && !t->measures))
+        return sdm_fail(err, SDM_E_PLUGIN,
+                        "%s: measures, their number and measure() go together: all or none", who);
+    if (n > SHAPE_MEASURES_MAX)
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: %u measures, at most %d", who, (unsigned)n,
+                        SHAPE_MEASURES_MAX);
+    for (uint32_t i = 0; i < n; i++) {
+        const sdm_measure *m = &t->measures[i];
+        if (!sdm_is_name(m->name))
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: measure %u has the name '%s': " SDM_NAME_RULE,
+                            who, (unsigned)i + 1, m->name ? m->name : "(none)");
+        if (is_taken(m->name, t->measures, i))
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: two measures are named '%s'", who, m->name);
+        if (is_taken(m->name, sdm_mesh_measures, SDM_MESH_MEASURES))
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: measure '%s': every shape has it from its mesh",
+                            who, m->name);
+        if (!m->unit || !m->help)
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: measure '%s' has no %s (\"\" is fine)", who,
+                            m->name, m->unit ? "help" : "unit");
+    }
+    return SDM_OK;
+}
+
 sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sdm_shape *out,
                                   sdm_error *err)
 {
@@ -178,5 +213,6 @@ sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sd
     if (!s && !out->n_params && !out->describe)
         s = sdm_fail(err, SDM_E_PLUGIN, "%s: no parameters", who);
     if (!s) s = options_check(who, out->options, out->n_options, err);
-    return s ? s : mirror_check(who, out, err);
+    if (!s) s = mirror_check(who, out, err);
+    return s ? s : measures_check(who, out, err);
 }

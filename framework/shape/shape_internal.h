@@ -6,6 +6,7 @@
 
 #define SHAPE_PARAMS_MAX 64
 #define SHAPE_OPTIONS_MAX 64
+#define SHAPE_MEASURES_MAX 64
 
 /* shape_check.c: copies min(size, sizeof(sdm_shape)) bytes of a plug-in's table to *out (further
    members become zero) and checks the contents. `origin` is the start of error messages.
@@ -33,6 +34,13 @@ const char *sdm_registry_kept(const sdm_registry *r, size_t index);
 /* registry.c: adds a message to those of sdm_registry_skipped(). SDM_E_NOMEM. */
 sdm_status sdm_registry_skip(sdm_registry *r, const char *message, sdm_error *err);
 
+/* registry.c: how plug-ins are isolated; NULL: they run in this process. */
+const struct sdm_isolation *sdm_registry_isolation(const sdm_registry *r);
+
+/* registry.c: plug-ins that are loaded from now on are isolated as *how says. SDM_E_NOMEM. */
+sdm_status sdm_registry_set_isolation(sdm_registry *r, const struct sdm_isolation *how,
+                                      sdm_error *err);
+
 /* options.c: converts the given texts to values[shape->n_options]; the texts of the values are
  * stored in the new block *text, which the caller frees with sdm_free(). SDM_E_ARG, SDM_E_CONFIG,
  * SDM_E_NOMEM. */
@@ -45,6 +53,7 @@ sdm_status sdm_shape_parse_options(const sdm_shape *shape, const sdm_named_text 
  * blocks of the call. */
 typedef struct host_call {
     sdm_host host;
+    const sdm_shape *shape; /* in create(): the table as the instance has it */
     sdm_mesh *mesh;
     bool files;
     struct host_block *blocks;
@@ -65,6 +74,10 @@ sdm_status sdm_host_call_failed(const host_call *c, const char *callback, int re
 void sdm_callback_begin(const sdm_instance *s, const char *function, const double *p);
 void sdm_callback_end(void);
 
+/* callback.c: from now on place[size] holds the name of the callback that the process is in, "" for
+ * none; for processes with one thread that calls. */
+void sdm_callback_show(char *place, size_t size);
+
 /* velocity.c: sdm_instance_velocity() by differences of meshes, whatever callbacks the shape has.
  */
 sdm_status sdm_velocity_by_differences(const sdm_instance *s, const double *p, size_t n_vert,
@@ -79,6 +92,36 @@ struct sdm_instance {
     sdm_option_value *options;
     char *text;
 };
+
+/* instance.c: makes an instance with the values options[shape->n_options], whose texts are in the
+ * block `text`. Takes both, also after an error. Errors of sdm_instance_create(). */
+sdm_status sdm_instance_start(const sdm_shape *shape, sdm_option_value *options, char *text,
+                              sdm_instance **out, sdm_error *err);
+
+/* instance.c: sdm_instance_mesh() without a check of the parameters, which a shape need not bear.
+ */
+sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sdm_mesh *out,
+                                      sdm_error *err);
+
+/* shape_repeat.c: makes the meshes at p[n][n_params] one after the other, then again: backwards for
+ * one thread, else all at once on n_threads for a quarter of a second. *unlike: how many of the n
+ * had other bits; *first: the first of them. Runs in one worker process if the shape is isolated.
+ * SDM_E_PLUGIN: a mesh cannot be made. */
+sdm_status sdm_shape_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
+                            size_t *unlike, size_t *first, sdm_error *err);
+
+/* isolated.c: the callbacks of the shape run in worker processes. */
+bool sdm_is_isolated(const sdm_instance *s);
+
+/* isolated.c: how many calls have ended a worker of an isolated shape. */
+size_t sdm_isolated_ends(const sdm_instance *s);
+
+/* isolated.c: sdm_shape_repeat() in a worker of an isolated shape. */
+sdm_status sdm_isolated_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
+                               size_t *unlike, size_t *first, sdm_error *err);
+
+/* instance.c: SDM_E_PLUGIN: `out` is not what reserve() has given to mesh(). */
+sdm_status sdm_mesh_out_check(const sdm_mesh_out *out, const sdm_mesh_out *given, sdm_error *err);
 
 /* instance.c: inserts "shape 'NAME' at a=4.4 alpha=0.5 ...: " before the text of *err and returns
  * `status`. */

@@ -28,6 +28,11 @@ function fillTable(table, rows) {
   for (const [name, value] of rows) table.append(element('tr', {}, element('th', { scope: 'row' }, name), element('td', {}, value)));
 }
 
+// The bytes of an element with a base64 text.
+function bytesOf(id) {
+  return Uint8Array.from(atob($(id).textContent.trim()), c => c.charCodeAt(0));
+}
+
 const calm = matchMedia('(prefers-reduced-motion: reduce)');
 
 // The value of a colour in the style sheet, as red, green, blue from 0 to 1.
@@ -38,16 +43,27 @@ function colour(name) {
 
 const cssColour = ([r, g, b], alpha = 1) => `rgb(${r * 255} ${g * 255} ${b * 255} / ${alpha})`;
 
-// Calls draw() when the size of the element or the colours of the page change.
-function onChange(target, draw) {
-  new ResizeObserver(draw).observe(target);
+// Calls draw() when the size of the canvas or the colours of the page change. Returns a function that sets the number of pixels of the
+// canvas, `share` of those of the screen, and gives the pixels for a length of the page. It asks for no layout: drawing stays fast.
+function onChange(canvas, draw) {
+  let width = canvas.clientWidth, height = canvas.clientHeight;
+  new ResizeObserver(() => {
+    width = canvas.clientWidth;
+    height = canvas.clientHeight;
+    draw();
+  }).observe(canvas);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
+  return (share = 1) => {
+    const ratio = share * Math.min(devicePixelRatio || 1, 2);
+    const pixels = { width: Math.max(1, Math.round(width * ratio)), height: Math.max(1, Math.round(height * ratio)) };
+    if (canvas.width !== pixels.width || canvas.height !== pixels.height) Object.assign(canvas, pixels);
+    return ratio;
+  };
 }
 
-// Sets the size of a canvas in pixels of the screen; returns pixels for a length of the page.
-function fitCanvas(canvas) {
-  const ratio = Math.min(devicePixelRatio || 1, 2);
-  const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
-  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-  return ratio;
+// The colours of these names in the style sheet, read once for each scheme of colours.
+function colours(...names) {
+  let read = null;
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { read = null; });
+  return () => (read ??= Object.fromEntries(names.map(name => [name, colour('--' + name)])));
 }

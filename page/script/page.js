@@ -15,11 +15,14 @@ const radius = box.triangles ? 0.5 * Math.hypot(...box.min.map((low, a) => box.m
 // distances of the last colours: half of the shortest edge of the grid
 const reach = Math.min(...grid.size.map((n, a) => n * grid.spacing[a])) / 3;
 
+// where the sliders begin
+const home = fit ? fit.values : parameters.map(p => p.default);
+
 const state = {
-  values: parameters.map(p => p.default),
+  values: [...home],
   position: [...box.slices],
   ranges: parameters.map(p => [p.min, p.max]),
-  map: null, compared: null, watched: null,
+  map: null, compared: null, watched: null, framed: false,
   busy: true, wanted: false, drawn: 0, waiting: []
 };
 
@@ -37,8 +40,10 @@ if (!surfaceView) {
 }
 
 const still = figures.live ? null : readStill();
+const movable = figures.live || fit;
 const sliceViews = AXES.map((_, axis) => createSliceView(axis, grid, {
-  moved: figures.live && ((a, index) => moveSlices(AXES.map((__, b) => (b === a ? index : null)))),
+  backdrop: fit && paintFit,
+  moved: movable && ((a, index) => moveSlices(AXES.map((__, b) => (b === a ? index : null)))),
   pointed: moveSlices,
   watched: a => {
     state.watched = a;
@@ -53,15 +58,26 @@ function moveSlices(position) {
 }
 
 function drawSlices() {
-  if (still) still.slices.forEach((slice, axis) => sliceViews[axis].show(slice, box.slices, reach));
+  if (fit) showFitSlices();
+  else if (still) still.slices.forEach((slice, axis) => sliceViews[axis].show(slice, box.slices, reach));
   else if (state.map) sliceViews.forEach((view, axis) => view.show(sliceOf(state.map.values, grid.size, axis, state.position[axis]), state.position, reach));
   showFrame();
 }
 
+// The contour of the fit, and that of the sliders where they have moved.
+function showFitSlices() {
+  const moved = state.map && state.map.parameters.some((v, i) => v !== home[i]);
+  sliceViews.forEach((view, axis) => {
+    const of = values => sliceOf(values, grid.size, axis, state.position[axis]), fitted = of(fit.map);
+    view.show(moved ? of(state.map.values) : fitted, state.position, reach, fitted);
+  });
+}
+
 // Shows in the view of the surface where the slice lies that the reader looks at.
 function showFrame() {
-  if (!surfaceView) return;
   const axis = state.watched;
+  if (!surfaceView || (axis === null && !state.framed)) return;
+  state.framed = axis !== null;
   surfaceView.showFrames(axis === null ? [] : [[0, 0], [1, 0], [1, 1], [0, 1]].map(([a, b]) => {
     const index = [...state.position], [right, up] = [[1, 2], [0, 2], [0, 1]][axis];
     index[right] = a * (grid.size[right] - 1);
@@ -72,8 +88,7 @@ function showFrame() {
 
 // The pictures of a page without a model (see cli/page/page.h).
 function readStill() {
-  const text = atob($('still').textContent.trim()), bytes = new Uint8Array(text.length);
-  for (let i = 0; i < bytes.length; i++) bytes[i] = text.charCodeAt(i);
+  const bytes = bytesOf('still');
   let at = 0;
   const take = (Type, n) => {
     const part = new Type(bytes.buffer, at, n);
@@ -136,7 +151,7 @@ const sliders = parameters.map((p, i) => {
     setParameter(i, rounded(state.values[i] + steps * stepOf(p), stepOf(p)));
   });
   number.addEventListener('change', () => { if (Number.isFinite(number.valueAsNumber)) setParameter(i, number.valueAsNumber); });
-  range.addEventListener('dblclick', () => moveTo(state.values.map((v, k) => (k === i ? p.default : v))));
+  range.addEventListener('dblclick', () => moveTo(state.values.map((v, k) => (k === i ? home[i] : v))));
   $('sliders').append(row);
   return { range, number, note, row };
 });
@@ -151,7 +166,7 @@ function showSliders() {
     row.style.setProperty('--value', share(state.values[i]));
     row.style.setProperty('--default', (p.default - low) / (high - low));
     row.classList.toggle('beyond', state.values[i] < p.min || state.values[i] > p.max);
-    note.textContent = `trained ${numberText(p.min)} … ${withUnit(p.max, p.unit)}, default ${numberText(p.default)}`;
+    note.textContent = (fit ? fittedText(p) + '; ' : '') + `trained ${numberText(p.min)} … ${withUnit(p.max, p.unit)}, default ${numberText(p.default)}`;
   });
 }
 
@@ -181,7 +196,7 @@ function randomValues() {
 }
 
 const buttons = [
-  element('button', { type: 'button', onclick: () => moveTo(parameters.map(p => p.default)) }, 'Default'),
+  element('button', { type: 'button', onclick: () => moveTo(home) }, fit ? 'Fitted' : 'Default'),
   element('button', { type: 'button', onclick: () => moveTo(randomValues()) }, 'Random shape'),
   element('button', { type: 'button', id: 'compare', hidden: '', onclick: () => worker.postMessage({ compare: [...state.values] }) }, 'Compare with the exact map')
 ];
@@ -208,7 +223,7 @@ function send() {
 
 function showMap(map) {
   state.map = map;
-  document.documentElement.classList.toggle('exact', map.exact);
+  if (document.documentElement.classList.contains('exact') !== map.exact) document.documentElement.classList.toggle('exact');
   if (surfaceView) surfaceView.show(map.vertices, map.triangles);
   drawSlices();
   showReadings(map);
@@ -217,7 +232,37 @@ function showMap(map) {
   state.drawn++;
   state.busy = false;
   if (state.wanted || state.drawn < WARM) send();
-  else for (const done of state.waiting.splice(0)) done();
+  else {
+    startSweeps();
+    for (const done of state.waiting.splice(0)) done();
+  }
+}
+
+// Sweeps are computed when the sliders have come to rest, one parameter after the other, so that a slider that moves again does not wait.
+const SWEEP_REST = 400, SWEEP_PARAMETERS_MAX = 12;
+let sweepTimer = 0, sweeps = [];
+
+function startSweeps() {
+  clearTimeout(sweepTimer);
+  if (parameters.length > SWEEP_PARAMETERS_MAX) return;
+  sweepTimer = setTimeout(() => {
+    sweeps = [];
+    sendSweep();
+  }, SWEEP_REST);
+}
+
+function sendSweep() {
+  const index = sweeps.length, { min, max } = parameters[index];
+  // the others must be in the trained range, too: the exact engine would take too long
+  const values = Array.from({ length: SWEEP_STEPS }, (_, k) => min + k / (SWEEP_STEPS - 1) * (max - min));
+  worker.postMessage({ sweep: { parameters: parameters.map((p, i) => clamped(state.values[i], [p.min, p.max])), index, values } });
+}
+
+function takeSweep({ parameters: at, index, measures }) {
+  if (index !== sweeps.length || at.some((v, i) => v !== clamped(state.values[i], [parameters[i].min, parameters[i].max]))) return;
+  sweeps.push(measures);
+  if (sweeps.length < parameters.length) sendSweep();
+  else showSweeps(sweeps, at);
 }
 
 function onReady({ ranges, knowsShape }) {
@@ -234,6 +279,7 @@ function startWorker() {
   worker.onmessage = ({ data }) => {
     if (data.ready) onReady(data.ready);
     if (data.map) showMap(data.map);
+    if (data.sweep) takeSweep(data.sweep);
     if (data.compare) {
       state.compared = data.compare;
       showReadings(state.map);
@@ -254,7 +300,7 @@ function startWorker() {
 function showTexts() {
   const { network, accuracy } = figures, size = grid.size.join(' × ');
   const spacing = new Set(grid.spacing).size === 1 ? numberText(grid.spacing[0]) : grid.spacing.map(v => numberText(v)).join(' × ');
-  $('about').textContent = figures.summary || '';
+  $('about').textContent = fit ? `Fitted to ${String(figures.fit.image).split('/').pop()}` : figures.summary || '';
   $('sizes').textContent = `${parameters.length} parameter${parameters.length > 1 ? 's' : ''} · ${size} voxels of ${spacing} mm · network ${network.kind}`;
   $('program').textContent = figures.program;
   const mm = x => withUnit(x, 'mm');
@@ -268,6 +314,7 @@ function showTexts() {
     ['Size', withUnit(network.file_bytes / 1e6, 'MB')], ['Multiply-adds per map', numberText(network.multiply_adds)],
     ['Seed', String(network.seed)], ['Checksum', network.checksum]
   ]);
+  if (fit) showFit();
   if (figures.history) showHistory(figures.history);
 }
 

@@ -1,5 +1,6 @@
-// Slices of the map: colours between the voxels, and contours by marching squares.
+// Slices of the map: colours and contours between the voxels; the surface by marching squares.
 const AXES = ['x', 'y', 'z'];
+const SIDES = [[1, 2], [0, 2], [0, 1]]; // the axes to the right and up in the slice across each axis
 
 // The distance between contours: about seven between 0 and `reach` (mm), at 1, 2 or 5 times a power of ten.
 function contourStep(reach) {
@@ -21,73 +22,99 @@ function sliceOf(values, size, axis, index) {
   return { data, width, height };
 }
 
-// Adds the contour at `level` to the path of a context; place(column, row) gives the point on the canvas.
-function traceContour(context, { data, width, height }, level, place) {
+// Adds the contour at 0 to the path of a context; x[column] and y[row]: the places of the voxels on the canvas.
+function traceContour(context, { data, width, height }, x, y) {
+  const points = new Float64Array(8);
   for (let row = 0; row + 1 < height; row++) {
     for (let column = 0; column + 1 < width; column++) {
-      const at = row * width + column;
-      const v = [data[at] - level, data[at + 1] - level, data[at + width + 1] - level, data[at + width] - level];
-      const corner = [[column, row], [column + 1, row], [column + 1, row + 1], [column, row + 1]];
-      const points = [];
-      for (let e = 0; e < 4; e++) {
-        const f = (e + 1) % 4;
-        if (v[e] < 0 === v[f] < 0) continue;
-        const share = v[e] / (v[e] - v[f]);
-        points.push(place(corner[e][0] + share * (corner[f][0] - corner[e][0]), corner[e][1] + share * (corner[f][1] - corner[e][1])));
-      }
+      const at = row * width + column, a = data[at], b = data[at + 1], c = data[at + width + 1], d = data[at + width];
+      if (a < 0 === b < 0 && b < 0 === c < 0 && c < 0 === d < 0) continue;
+      const left = x[column], right = x[column + 1], low = y[row], high = y[row + 1];
+      let n = 0;
+      // a crossing of the edge from a corner with value p to one with value q
+      const cross = (p, q, fromX, fromY, toX, toY) => {
+        if (p < 0 === q < 0) return;
+        const share = p / (p - q);
+        points[n++] = fromX + share * (toX - fromX);
+        points[n++] = fromY + share * (toY - fromY);
+      };
+      cross(a, b, left, low, right, low);
+      cross(b, c, right, low, right, high);
+      cross(c, d, right, high, left, high);
+      cross(d, a, left, high, left, low);
       // four crossings: the mean of the corners says which are joined
-      if (points.length === 4 && v[0] < 0 !== v[0] + v[1] + v[2] + v[3] < 0) points.push(points.shift());
-      for (let p = 0; p + 1 < points.length; p += 2) {
-        context.moveTo(...points[p]);
-        context.lineTo(...points[p + 1]);
+      const turned = n === 8 && a < 0 !== a + b + c + d < 0 ? 2 : 0;
+      for (let i = 0; i < n; i += 4) {
+        context.moveTo(points[(i + turned) % n], points[(i + turned + 1) % n]);
+        context.lineTo(points[(i + turned + 2) % n], points[(i + turned + 3) % n]);
       }
     }
   }
 }
 
-const COLOURS = 512;
+const COLOURS = 4096;
+const TABLE_REACH = 1.5; // the table goes from -1.5 reach to 1.5 reach
+const sliceColours = colours('deep', 'inside', 'near', 'far', 'faint', 'ink');
 
-// The colours of distances from -reach to reach (mm), as words of an image.
-function colourTable() {
-  const deep = colour('--deep'), inside = colour('--inside'), near = colour('--near'), far = colour('--far');
+// The colours of distances, as words of an image. Contours are lines in the table, of the width of a pixel (mm): the slope of a distance is 1.
+function colourTable(reach, pixel) {
+  const { deep, inside, near, far, faint } = sliceColours(), step = contourStep(reach), size = TABLE_REACH * reach;
   const bytes = new Uint8Array(4 * COLOURS);
   for (let i = 0; i < COLOURS; i++) {
-    const d = (i + 0.5) / COLOURS * 2 - 1, share = Math.abs(d) ** 0.8, [from, to] = d < 0 ? [inside, deep] : [near, far];
-    for (let c = 0; c < 3; c++) bytes[4 * i + c] = Math.round(255 * (from[c] + (to[c] - from[c]) * share));
+    const d = ((i + 0.5) / COLOURS * 2 - 1) * size, share = Math.min(Math.abs(d) / reach, 1) ** 0.8, [from, to] = d < 0 ? [inside, deep] : [near, far];
+    const level = Math.round(d / step), line = level === 0 ? 0 : Math.min(Math.max(1 - Math.abs(d - level * step) / pixel, 0), 1);
+    for (let c = 0; c < 3; c++) {
+      const plain = from[c] + (to[c] - from[c]) * share;
+      bytes[4 * i + c] = Math.round(255 * (plain + 0.35 * line * (faint[c] - plain)));
+    }
     bytes[4 * i + 3] = 255;
   }
   return new Uint32Array(bytes.buffer);
 }
 
-// An image of the slice with `scale` pixels a voxel, linear between the voxels.
-function paint({ data, width, height }, reach, scale, flipped) {
-  const image = new ImageData(Math.round(width * scale), Math.round(height * scale));
-  const words = new Uint32Array(image.data.buffer), table = colourTable(), factor = COLOURS / (2 * reach);
-  const left = new Int32Array(image.width), share = new Float32Array(image.width);
-  for (let x = 0; x < image.width; x++) {
-    const at = Math.min(Math.max((x + 0.5) / scale - 0.5, 0), width - 1);
-    left[x] = Math.min(Math.floor(at), Math.max(width - 2, 0));
-    share[x] = at - left[x];
+// For each pixel of a line over n voxels: the voxel before it and its share of the way to the next; fine: of voxels this much shorter.
+function pixelPlaces(pixels, n, flipped, fine = 1) {
+  const low = new Int32Array(pixels), share = new Float32Array(pixels);
+  for (let i = 0; i < pixels; i++) {
+    const along = Math.min(Math.max((i + 0.5) / pixels * n - 0.5, 0), n - 1), at = fine * (flipped ? n - 1 - along : along);
+    low[i] = Math.min(Math.floor(at), Math.max(fine * (n - 1) - 1, 0));
+    share[i] = at - low[i];
   }
-  const step = width > 1 ? 1 : 0;
-  for (let y = 0; y < image.height; y++) {
-    const shown = Math.min(Math.max((y + 0.5) / scale - 0.5, 0), height - 1), at = flipped ? height - 1 - shown : shown;
-    const row = Math.min(Math.floor(at), Math.max(height - 2, 0)), part = at - row;
-    const low = row * width, high = height > 1 ? low + width : low;
-    for (let x = 0; x < image.width; x++) {
-      const a = left[x], b = a + step, t = share[x];
-      const upper = data[low + a] + t * (data[low + b] - data[low + a]), lower = data[high + a] + t * (data[high + b] - data[high + a]);
-      const index = (upper + part * (lower - upper) + reach) * factor;
-      words[y * image.width + x] = table[index < 0 ? 0 : index >= COLOURS ? COLOURS - 1 : index | 0];
-    }
-  }
-  return image;
+  return { low, share };
 }
+
+// Paints slices of one size on images of one size, linear between the voxels. pixel: mm.
+function createPainter(columns, rows, width, height, flipped, reach, pixel) {
+  const image = new ImageData(width, height), words = new Uint32Array(image.data.buffer);
+  const table = colourTable(reach, pixel), factor = COLOURS / (2 * TABLE_REACH * reach), zero = COLOURS / 2;
+  const across = pixelPlaces(width, columns, false), down = pixelPlaces(height, rows, flipped);
+  const wide = new Float32Array(rows * width), step = columns > 1 ? 1 : 0;
+  return data => {
+    for (let row = 0; row < rows; row++) {
+      const from = row * columns, to = row * width;
+      for (let x = 0; x < width; x++) {
+        const a = data[from + across.low[x]], b = data[from + across.low[x] + step];
+        wide[to + x] = (a + across.share[x] * (b - a)) * factor + zero;
+      }
+    }
+    for (let y = 0; y < height; y++) {
+      const low = down.low[y] * width, high = rows > 1 ? low + width : low, part = down.share[y], to = y * width;
+      for (let x = 0; x < width; x++) {
+        const a = wide[low + x], index = a + part * (wide[high + x] - a);
+        words[to + x] = table[index < 0 ? 0 : index >= COLOURS ? COLOURS - 1 : index | 0];
+      }
+    }
+    return image;
+  };
+}
+
+const PIXELS_OF_VOXEL = 8; // at most; larger pictures are stretched
 
 // The view of the slice across `axis`. moved(axis, index) is called when another slice is asked for, pointed(position) for a point: indices of
 // the other two axes, null for this one; watched(axis) when the reader turns to this slice, watched(null) when not any more.
-function createSliceView(axis, grid, { moved, pointed, watched }) {
-  const [right, up] = [[1, 2], [0, 2], [0, 1]][axis];
+// backdrop(axis, index, width, height, flipped, pixel): of a page of a fit, the picture behind the contours; null: colours of the distance.
+function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
+  const [right, up] = SIDES[axis];
   const flipped = up === 2; // z upwards; y (to the back) downwards, as radiologists look
   const canvas = element('canvas', { role: 'img' });
   const range = element('input', { type: 'range', min: 0, max: grid.size[axis] - 1, step: 1, 'aria-label': `Slice across ${AXES[axis]}` });
@@ -95,44 +122,70 @@ function createSliceView(axis, grid, { moved, pointed, watched }) {
   const figure = element('figure', {}, canvas, element('figcaption', {}, label, range));
   figure.style.setProperty('--shape', `${grid.size[right] * grid.spacing[right]} / ${grid.size[up] * grid.spacing[up]}`);
   figure.style.flexGrow = grid.size[right] * grid.spacing[right] / (grid.size[up] * grid.spacing[up]);
-  const buffer = document.createElement('canvas');
-  let last = null;
+  const buffer = document.createElement('canvas'), context = canvas.getContext('2d'), columns = grid.size[right], rows = grid.size[up];
+  let last = null, painter = null, prepared = 0, x = [], y = [];
 
-  const toRow = row => (flipped ? grid.size[up] - 1 - row : row);
+  const toRow = row => (flipped ? rows - 1 - row : row);
 
-  function draw() {
-    if (!last) return;
-    const { slice, position, reach } = last;
-    const ratio = fitCanvas(canvas), context = canvas.getContext('2d');
-    const place = (column, row) => [(column + 0.5) / slice.width * canvas.width, (toRow(row) + 0.5) / slice.height * canvas.height];
-    const image = paint(slice, reach, Math.min(canvas.width / slice.width, 8), flipped);
-    Object.assign(buffer, { width: image.width, height: image.height });
-    buffer.getContext('2d').putImageData(image, 0, 0);
-    context.drawImage(buffer, 0, 0, canvas.width, canvas.height);
-    const contour = (levels, style, width) => {
-      context.beginPath();
-      for (const level of levels) traceContour(context, slice, level, place);
-      Object.assign(context, { strokeStyle: style, lineWidth: width * ratio, lineCap: 'round' });
-      context.stroke();
+  // Prepares what depends on the size of the canvas and on the colours.
+  function prepare(reach) {
+    prepared = canvas.width;
+    const share = Math.min(1, PIXELS_OF_VOXEL * columns / canvas.width);
+    Object.assign(buffer, { width: Math.round(canvas.width * share), height: Math.max(1, Math.round(canvas.height * share)) });
+    const pixel = columns * grid.spacing[right] / buffer.width;
+    painter = backdrop ? createBackdrop(pixel) : createPainter(columns, rows, buffer.width, buffer.height, flipped, reach, pixel);
+    x = Float64Array.from({ length: columns }, (_, column) => (column + 0.5) / columns * canvas.width);
+    y = Float64Array.from({ length: rows }, (_, row) => (toRow(row) + 0.5) / rows * canvas.height);
+  }
+
+  // The picture behind the contours, made again only for another slice.
+  function createBackdrop(pixel) {
+    let made = null, of = -1;
+    return (_, index) => {
+      if (of !== index) made = backdrop(axis, index, buffer.width, buffer.height, flipped, pixel);
+      of = index;
+      return made;
     };
-    const step = contourStep(reach), levels = [];
-    for (let k = 1; k * step <= reach * 1.5; k++) levels.push(k * step, -k * step);
-    contour(levels, cssColour(colour('--faint'), 0.35), 0.75);
-    contour([0], cssColour(colour('--contour')), 2);
-    // where the other two slices are
-    const [x, y] = place(position[right], position[up]);
+  }
+
+  function contour(slice, style, width) {
     context.beginPath();
-    context.moveTo(x, 0);
-    context.lineTo(x, canvas.height);
-    context.moveTo(0, y);
-    context.lineTo(canvas.width, y);
-    Object.assign(context, { strokeStyle: cssColour(colour('--ink'), 0.16), lineWidth: ratio });
+    traceContour(context, slice, x, y);
+    Object.assign(context, { strokeStyle: style, lineWidth: width, lineCap: 'round' });
     context.stroke();
   }
 
-  // Shows a slice; position[3]: indices of the three slices; reach: distance (mm) of the last colour.
-  function show(slice, position, reach) {
-    last = { slice, position, reach };
+  function draw() {
+    if (!last) return;
+    const { slice, position, reach, fitted } = last, ratio = sized();
+    if (!painter || prepared !== canvas.width) prepare(reach);
+    const picture = painter(slice.data, position[axis]);
+    if (buffer.width === canvas.width) {
+      context.putImageData(picture, 0, 0);
+    } else {
+      buffer.getContext('2d').putImageData(picture, 0, 0);
+      context.drawImage(buffer, 0, 0, canvas.width, canvas.height);
+    }
+    if (fitted) contour(fitted, cssColour(colour('--fitted')), 1.5 * ratio);
+    if (fitted !== slice) contour(slice, cssColour(colour(fitted ? '--moved' : '--contour')), 2 * ratio);
+    // where the other two slices are
+    context.beginPath();
+    context.moveTo(x[position[right]], 0);
+    context.lineTo(x[position[right]], canvas.height);
+    context.moveTo(0, y[position[up]]);
+    context.lineTo(canvas.width, y[position[up]]);
+    Object.assign(context, { strokeStyle: cssColour(sliceColours().ink, 0.16), lineWidth: ratio });
+    context.stroke();
+  }
+
+  const sized = onChange(canvas, () => {
+    painter = null;
+    draw();
+  });
+
+  // Shows a slice; position[3]: indices of the three slices; reach: distance (mm) of the last colour; fitted: the same slice of the fit, null: none.
+  function show(slice, position, reach, fitted = null) {
+    last = { slice, position, reach, fitted };
     const mm = grid.origin[axis] + position[axis] * grid.spacing[axis];
     label.value = grid.straight ? `${AXES[axis]} = ${numberText(Math.round(mm * 100) / 100, 4)} mm` : `slice ${position[axis] + 1} of ${grid.size[axis]}`;
     canvas.setAttribute('aria-label', `Slice across ${AXES[axis]} of the map, ${label.value}`);
@@ -159,6 +212,5 @@ function createSliceView(axis, grid, { moved, pointed, watched }) {
   }
   for (const name of ['pointerenter', 'focusin']) figure.addEventListener(name, () => watched(axis));
   for (const name of ['pointerleave', 'focusout']) figure.addEventListener(name, () => watched(null));
-  onChange(canvas, draw);
   return { figure, show };
 }

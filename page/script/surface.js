@@ -74,16 +74,33 @@ function withNormals(positions, triangles) {
   return out;
 }
 
+// Without a graphics card the browser draws by software: there pictures have fewer pixels while they change, and when they have come to rest
+// so many that edges are smooth, since the smoothing of WebGL itself takes most of the time.
+const MOVING_SHARE = 0.7, RESTING_SHARE = 2, REST = 250;
+
+function hasGraphicsCard() {
+  const gl = document.createElement('canvas').getContext('webgl2', { failIfMajorPerformanceCaveat: true });
+  if (!gl) return false;
+  // Chromium tells the name by the extension alone, which Firefox advises against
+  const named = gl.getParameter(gl.RENDERER) === 'WebKit WebGL' && gl.getExtension('WEBGL_debug_renderer_info');
+  const name = gl.getParameter(named ? named.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
+  gl.getExtension('WEBGL_lose_context')?.loseContext();
+  return !/swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
 // The view of the surface on a canvas; null without WebGL2. centre (mm) stands in the middle, a ball of `radius` is seen.
 function createSurfaceView(canvas, centre, radius) {
-  const gl = canvas.getContext('webgl2', { antialias: true, premultipliedAlpha: true, preserveDrawingBuffer: true });
+  const fast = hasGraphicsCard(), gl = canvas.getContext('webgl2', { antialias: fast, premultipliedAlpha: true, preserveDrawingBuffer: true });
   if (!gl) return null;
   const home = { yaw: 0.55, pitch: 0.62, zoom: 1 };
   const at = { ...home };
-  let n = 0, program, lines = 0, buffers;
+  const paints = colours('surface', 'surface-back', 'surface-rim', 'accent');
+  let n = 0, program, place, lines = 0, buffers, frame = 0;
+  let share = 1, resting = 0;
 
   function prepare() {
     program = surfaceProgram(gl);
+    place = Object.fromEntries(['camera', 'turn', 'front', 'back', 'sky', 'shaded'].map(name => [name, gl.getUniformLocation(program, name)]));
     buffers = { surface: gl.createVertexArray(), frames: gl.createVertexArray(), vertices: gl.createBuffer(), triangles: gl.createBuffer(), lines: gl.createBuffer() };
     gl.bindVertexArray(buffers.surface);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.vertices);
@@ -100,9 +117,10 @@ function createSurfaceView(canvas, centre, radius) {
   }
 
   function draw() {
-    fitCanvas(canvas);
-    const { camera, turn } = cameraMatrices(at.yaw, at.pitch, at.zoom, centre, radius, canvas.width / canvas.height);
-    const place = name => gl.getUniformLocation(program, name);
+    cancelAnimationFrame(frame);
+    frame = 0;
+    sized(share);
+    const { camera, turn } = cameraMatrices(at.yaw, at.pitch, at.zoom, centre, radius, canvas.width / canvas.height), paint = paints();
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
@@ -110,19 +128,35 @@ function createSurfaceView(canvas, centre, radius) {
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.useProgram(program);
-    gl.uniformMatrix4fv(place('camera'), false, camera);
-    gl.uniformMatrix3fv(place('turn'), false, turn);
-    gl.uniform3fv(place('front'), colour('--surface'));
-    gl.uniform3fv(place('back'), colour('--surface-back'));
-    gl.uniform3fv(place('sky'), colour('--surface-rim'));
-    gl.uniform1f(place('shaded'), 1);
+    gl.uniformMatrix4fv(place.camera, false, camera);
+    gl.uniformMatrix3fv(place.turn, false, turn);
+    gl.uniform3fv(place.front, paint.surface);
+    gl.uniform3fv(place.back, paint['surface-back']);
+    gl.uniform3fv(place.sky, paint['surface-rim']);
+    gl.uniform1f(place.shaded, 1);
     gl.bindVertexArray(buffers.surface);
     gl.drawElements(gl.TRIANGLES, n, gl.UNSIGNED_INT, 0);
-    gl.uniform1f(place('shaded'), 0);
-    gl.uniform3fv(place('front'), colour('--accent'));
+    gl.uniform1f(place.shaded, 0);
+    gl.uniform3fv(place.front, paint.accent);
     gl.bindVertexArray(buffers.frames);
     for (let i = 0; i < lines; i += 4) gl.drawArrays(gl.LINE_LOOP, i, 4);
     gl.bindVertexArray(null);
+  }
+
+  // Called before a picture that others may follow soon.
+  function move() {
+    if (fast) return;
+    share = MOVING_SHARE;
+    clearTimeout(resting);
+    resting = setTimeout(() => {
+      share = RESTING_SHARE;
+      drawSoon();
+    }, REST);
+  }
+
+  // One picture for all that changes before the next frame of the screen.
+  function drawSoon() {
+    if (!frame) frame = requestAnimationFrame(draw);
   }
 
   // vertices[n][6]: position and normal
@@ -133,6 +167,7 @@ function createSurfaceView(canvas, centre, radius) {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.DYNAMIC_DRAW);
     gl.bindVertexArray(null);
     n = triangles.length;
+    move();
     draw();
   }
 
@@ -141,23 +176,25 @@ function createSurfaceView(canvas, centre, radius) {
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.lines);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(corners.flat()), gl.DYNAMIC_DRAW);
     lines = corners.length;
-    draw();
+    drawSoon();
   }
 
   function turnBy(yaw, pitch) {
+    move();
     at.yaw -= yaw;
     at.pitch = Math.min(Math.max(at.pitch + pitch, -Math.PI / 2), Math.PI / 2);
-    draw();
+    drawSoon();
   }
 
   function zoomBy(factor) {
+    move();
     at.zoom = Math.min(Math.max(at.zoom * factor, 0.4), 8);
-    draw();
+    drawSoon();
   }
 
   function reset() {
     Object.assign(at, home);
-    draw();
+    drawSoon();
   }
 
   const pointers = new Map();
@@ -195,7 +232,7 @@ function createSurfaceView(canvas, centre, radius) {
     actions[event.key]();
   });
   canvas.addEventListener('webglcontextlost', event => event.preventDefault());
+  const sized = onChange(canvas, draw);
   prepare();
-  onChange(canvas, draw);
   return { show, showFrames };
 }

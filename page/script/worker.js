@@ -1,6 +1,7 @@
 // The worker of a page: runs the runtime (page_runtime.c as WebAssembly) in a thread of its own.
-// Messages to it: {open: {runtime, model}} once, base64 texts; {map: parameters}; {compare: parameters}.
-// Its answers: {ready}, {map}, {compare}, each with its results; {error: text}.
+// Messages to it: {open: {runtime, model}} once, base64 texts; {map: parameters}; {compare: parameters};
+// {sweep: {parameters, index, values}}: volume and area while one parameter takes these values.
+// Its answers: {ready}, {map}, {compare}, {sweep}, each with its results; {error: text}.
 'use strict';
 let runtime;
 
@@ -88,11 +89,22 @@ function compare(parameters) {
   postMessage({ compare: { parameters, time, rmse: Math.sqrt(sum / exact.length), largest } });
 }
 
+function sweep({ parameters, index, values }) {
+  const measures = values.map(value => {
+    setParameters(parameters.map((v, i) => (i === index ? value : v)));
+    if (runtime.page_map() || runtime.page_surface()) return [NaN, NaN];
+    const [volume, area] = doubles(runtime.page_measures(), 8);
+    return runtime.page_is_cut() ? [NaN, NaN] : [volume, area];
+  });
+  postMessage({ sweep: { parameters, index, measures } });
+}
+
 onmessage = async ({ data }) => {
   try {
     if (data.open) await open(data.open);
     if (data.map) map(data.map);
     if (data.compare) compare(data.compare);
+    if (data.sweep) sweep(data.sweep);
   } catch (error) {
     postMessage({ error: error.message });
   }

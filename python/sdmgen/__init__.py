@@ -34,7 +34,7 @@ from ._map import Band, Batch, Check, Image, Map, MapInfo, Segment, surface
 from ._mesh import Audit, ExactMap, Mesh, Points, Report, Surface, exact, exact_band, exact_points
 from ._model import Accuracy, Field, Jacobian, Model, Samples, Tangent
 from ._phantom import Phantom, phantom, random_pose
-from ._shape import Param, Shape, shapes
+from ._shape import Measure, Param, Shape, shapes
 from ._train import Progress, TrainResult, train
 
 __version__ = "0.1.0"
@@ -61,6 +61,7 @@ __all__ = [
     "Jacobian",
     "Map",
     "MapInfo",
+    "Measure",
     "Mesh",
     "MeshError",
     "Model",

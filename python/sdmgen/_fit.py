@@ -19,7 +19,7 @@ from ._library import Callbacks, call, function, make
 from ._map import Image, Map, MapInfo
 from ._mesh import Mesh, Surface
 from ._model import POLICIES, Model
-from ._shape import Shape
+from ._shape import Measure, Shape, measures_by
 
 Label = Union[int, str]
 Target = Union[Image, Mesh, ArrayLike, Any]
@@ -73,6 +73,8 @@ class FitResult:
     #: parameters at an end of their range; parameters that the target does not determine
     at_bound: tuple[str, ...]
     not_determined: tuple[str, ...]
+    #: standard deviations of the parameters before the fit: of the priors or the ranges
+    prior_sd: Float64
     #: overlap with the labels or the reference (Dice coefficient); NaN: none were given
     dice: float
     converged: bool
@@ -113,6 +115,15 @@ class FitResult:
     def values(self) -> dict[str, float]:
         """the estimated parameters by name"""
         return dict(zip(self.unknowns, (float(p) for p in self.params)))
+
+    def measures(self, depths: ArrayLike = ()) -> list[Measure]:
+        """The measures of the fitted shape (Shape.measures()) with standard deviations, by the
+        covariance of the fit. After a fit with a model its shape must be known."""
+        source = self._source
+        shape = source.shape if source.shape is not None else instance(source.model, Model, "model").shape
+        c = make("sdm_fit_result", n_params=len(self.params))
+        c.params, c.prior_sd, c.covariance = address(self.params), address(self.prior_sd), address(self.cov)
+        return measures_by(shape.call, "sdm_fit_measure", (shape, byref(c)), depths, True)
 
     def map(self, grid: Optional[Grid] = None, threads: int = 0) -> Map:
         """The signed distance map of the fitted shape in the world, mm, NEGATIVE INSIDE; by default on
@@ -561,6 +572,7 @@ def _result_of(
         correlation=copied(c.correlation, (total, total), np.float64),
         at_bound=tuple(name for name, flag in zip(names, at_bound) if flag),
         not_determined=tuple(name for name, flag in zip(names, by_prior) if flag),
+        prior_sd=copied(c.prior_sd, (n,), np.float64),
         dice=_dice(source, params, pose, opened, reference),
         converged=c.converged,
         reason=c.reason.decode(),

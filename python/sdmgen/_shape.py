@@ -38,6 +38,36 @@ class Param:
     deviation: Optional[float] = None
 
 
+@dataclass(frozen=True)
+class Measure:
+    """A measure of a shape. `depth`: where it was taken, mm; None: it belongs to no depth. `value` is
+    NaN where a depth lies beyond the end of the shape. Of a fit: `sd`, the standard deviation (NaN:
+    unknown), and `not_determined`: the target says no more about it than the priors; else None."""
+
+    name: str
+    value: float
+    unit: str
+    help: str
+    depth: Optional[float] = None
+    sd: Optional[float] = None
+    not_determined: Optional[bool] = None
+
+
+def measures_by(call: Callable[..., Any], name: str, arguments: Sequence[Any], depths: ArrayLike, of_fit: bool) -> list[Measure]:
+    """The measures that a function of the library finds at these depths."""
+    at, result = float64(depths, (None,), "depths"), make("sdm_measures")
+    call(name, *arguments, address(at), len(at), byref(result))
+    return [
+        Measure(
+            *(c.name.decode(), c.value, c.unit.decode(), c.help.decode()),
+            depth=None if np.isnan(c.depth) else c.depth,
+            sd=c.sd if of_fit else None,
+            not_determined=c.not_determined if of_fit else None,
+        )
+        for c in result.at[: result.n]
+    ]
+
+
 def _distribution(c: Any) -> dict[str, Optional[float]]:
     normal = c.kind == _abi.constants["SDM_DISTRIBUTION_NORMAL"]
     return {"mean": c.mean if normal else None, "deviation": c.deviation if normal else None}
@@ -168,6 +198,11 @@ class Shape:
         x, p, result = float64(point, (3,), "point"), self.values(params, **named), ctypes.c_double()
         self.call("sdm_instance_distance", self, address(p), address(x), byref(result))
         return result.value
+
+    def measures(self, params: Params = None, depths: ArrayLike = (), **named: float) -> list[Measure]:
+        """The measures of the shape at parameters: its own, then volume, area and extents. Measures of
+        a depth, such as the frequency along the cochlea, are taken at `depths`, mm."""
+        return measures_by(self.call, "sdm_shape_measure", (self, address(self.values(params, **named))), depths, False)
 
     def random(self, seed: int) -> Float64:
         """Random parameters, each from its distribution."""

@@ -50,8 +50,6 @@
 #define FLAT_MAX 6
 // share of outliers among points at the start
 #define OUTLIERS_FIRST 0.1
-// a parameter is determined by its prior alone if its sd exceeds this share of the prior's sd
-#define BY_PRIOR 0.9
 // Largest number of times that the priors are reweighted. Without a limit a prior that contradicts
 // the image could reinforce itself: a worse fit has more correlated residuals, which strengthen the
 // prior.
@@ -108,6 +106,7 @@ void sdm_fit_dispose(sdm_fit_result *r)
     sdm_free(r->correlation);
     sdm_free(r->at_bound);
     sdm_free(r->by_prior);
+    sdm_free(r->prior_sd);
     sdm_free(r->objective);
     *r = (sdm_fit_result){0};
 }
@@ -125,6 +124,7 @@ static sdm_status result_create(size_t n, sdm_fit_result *out, sdm_error *err)
     if (!s) s = SDM_ALLOC(&out->correlation, size * size, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->at_bound, n, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->by_prior, n, "result of the fit", err);
+    if (!s) s = SDM_ALLOC(&out->prior_sd, n, "result of the fit", err);
     for (size_t i = 0; i < size * size && !s; i++) out->covariance[i] = out->correlation[i] = NAN;
     for (size_t i = 0; i < size && !s; i++) out->sd[i] = NAN;
     return s;
@@ -398,7 +398,8 @@ static void report(fit_problem *p, sdm_fit_result *out)
     for (size_t k = 0; k < p->n_params; k++) {
         out->params[k] = s->params[k];
         out->at_bound[k] = s->params[k] <= p->low[k] || s->params[k] >= p->high[k];
-        out->by_prior[k] = out->sd[k] > BY_PRIOR * sdm_fit_prior_sd(p, k);
+        out->prior_sd[k] = sdm_fit_prior_sd(p, k);
+        out->by_prior[k] = out->sd[k] > FIT_BY_PRIOR * out->prior_sd[k];
     }
     sdm_rotation_vector(s->rotation, out->pose.rotation);
     memcpy(out->pose.translation, s->translation, sizeof out->pose.translation);

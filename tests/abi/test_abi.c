@@ -81,6 +81,14 @@ struct shape_added {
     struct shape_v1 v1;
     void (*distributions)(const void *, sdm_distribution *);
     const char *mirror;
+    const sdm_measure *measures;
+    uint32_t n_measures;
+    int (*measure)(const void *, const sdm_host *, const sdm_option_value *, const double *,
+                   uint32_t, double, double *);
+};
+struct measure_added {
+    const char *name, *unit, *help;
+    int of_depth;
 };
 
 #define SAME_OFFSET(v1, now, field)                                                                \
@@ -134,6 +142,13 @@ SAME_OFFSET(shape_v1, sdm_shape, velocity);
 SAME_OFFSET(shape_v1, sdm_shape, distance);
 SAME_OFFSET(shape_added, sdm_shape, distributions);
 SAME_OFFSET(shape_added, sdm_shape, mirror);
+SAME_OFFSET(shape_added, sdm_shape, measures);
+SAME_OFFSET(shape_added, sdm_shape, n_measures);
+SAME_OFFSET(shape_added, sdm_shape, measure);
+SAME_OFFSET(measure_added, sdm_measure, unit);
+SAME_OFFSET(measure_added, sdm_measure, help);
+SAME_OFFSET(measure_added, sdm_measure, of_depth);
+_Static_assert(sizeof(struct measure_added) == sizeof(sdm_measure), "sdm_measure has changed");
 SAME_OFFSET(distribution_added, sdm_distribution, mean);
 SAME_OFFSET(distribution_added, sdm_distribution, deviation);
 _Static_assert(sizeof(struct distribution_added) == sizeof(sdm_distribution),

@@ -30,6 +30,13 @@ near "$(pose translation_mm 3)" 1 0.3
 present fit.nrrd fit.ply fit.json
 sdmgen info fit.nrrd | grep -Eq 'network: cochlea' || bad 'the file must say that the network made the map'
 
+# In a table each case may have its own model; its path starts from the folder of the table.
+mkdir cohort
+printf 'id,image,model,keep,tolerance\na,../ct.nii,../%s,parameters,0.1\n' $model >cohort/cases.csv
+expect 0 - sdmgen fit $start --mirror no --cases cohort/cases.csv -o cohort/out -q
+[ "$(sed 's/.*\("translation_mm": [^]]*\).*/\1/' cohort/out/a/fit.json)" = "$(sed 's/.*\("translation_mm": [^]]*\).*/\1/' fit.json)" ] ||
+    bad "the fit of a table differs: $(cat cohort/out/a/log.txt)"
+
 # Exact maps of the model's shape on its grid, and the same fit started with the network.
 expect 0 - sdmgen fit $model ct.nii $start $coarse --keep parameters --exact -o exact.nrrd --json
 [ "$(json maps_network)" = 0 ] && [ "$(json maps_exact)" -gt 0 ] || bad 'maps must be exact'

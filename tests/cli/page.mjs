@@ -1,4 +1,4 @@
-// The pages of page.sh in chromium: node page.mjs CHROMIUM, in the folder of live.html, still.html, native.npy and beyond.npy.
+// The pages of page.sh in chromium: node page.mjs CHROMIUM, in the folder of live.html, still.html, fitted.html, hostile.html, native.npy and beyond.npy.
 import { readFileSync, writeFileSync } from 'node:fs';
 import { argv, exit } from 'node:process';
 import { startBrowser } from './browser.mjs';
@@ -85,33 +85,85 @@ async function checkLive(browser) {
   await page.evaluate(`document.querySelector('#sliders input[type=range]').focus()`);
   await page.command('Input.dispatchKeyEvent', { type: 'keyDown', key: 'ArrowLeft', code: 'ArrowLeft', windowsVirtualKeyCode: 37 });
   check(await page.evaluate(`Number(document.querySelector('#sliders input[type=number]').value) < 5`), 'the arrow key does not move the slider');
-  // times from the event of a slider until the page has drawn, and until the pixels can be read
+  // times from the event of a slider until the page has drawn, and until the pixels of WebGL (here software) can be read; none is judged
   const times = await page.evaluate(`(async () => {
-    const slider = document.querySelector('#sliders input[type=range]'), drawn = [], pixels = [];
+    const slider = document.querySelector('#sliders input[type=range]'), computed = [], drawn = [], pixels = [];
     const gl = document.getElementById('surface').getContext('webgl2');
-    for (let i = 0; i < 25; i++) {
+    for (let i = 0; i < 50; i++) {
       const start = performance.now();
-      slider.value = 2.5 + i / 20;
+      slider.value = 2.5 + i / 40;
       slider.dispatchEvent(new Event('input'));
       await sdmgen.drawn();
       drawn.push(performance.now() - start);
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
-      pixels.push(performance.now() - start);
+      computed.push(state.map.mapTime + state.map.surfaceTime);
+      if (i % 5 === 0) {
+        gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+        pixels.push(performance.now() - start);
+      }
       await new Promise(requestAnimationFrame);
     }
-    return [drawn, pixels].map(times => times.sort((a, b) => a - b)[times.length >> 1]);
+    return [computed, drawn, pixels].map(times => times.sort((a, b) => a - b)[times.length >> 1].toFixed(1));
   })()`);
-  console.log(`slider to picture: median of 25: drawn after ${times[0].toFixed(1)} ms, pixels of WebGL in software after ${times[1].toFixed(1)} ms`);
+  console.log(`slider to picture: medians of 50: map and surface ${times[0]} ms, page drawn after ${times[1]} ms, pixels of WebGL after ${times[2]} ms (10)`);
   // compared with the exact map
   await page.evaluate(`document.getElementById('compare').click()`);
   await waitFor(page, `/exact engine/.test(document.getElementById('readings').textContent)`);
   clean(page, 'live.html');
 }
 
+// The page of a fit: image, contours, verdict; and the standard deviation at the end of the x axis of the ellipsoid, where the distance
+// depends on rx and on the translation along the axis alone, both with slope -1.
+async function checkFit(browser) {
+  const page = await browser.open('fitted.html');
+  if (!(await waitFor(page, 'window.sdmgen && sdmgen.map() && document.body.classList.contains("ready")'))) return;
+  const [sd, tip] = await page.evaluate(`(() => {
+    const { fit: { parameters, covariance, unknowns, pose }, grid: { size, spacing, origin } } = figures, n = unknowns.length;
+    const turn = pose.rotation_rad, angle = Math.hypot(...turn), axis = turn.map(v => v / (angle || 1)), c = Math.cos(angle);
+    // the x axis of the shape in the world (Rodrigues)
+    const x = [c + (1 - c) * axis[0] ** 2, axis[2] * Math.sin(angle) + (1 - c) * axis[0] * axis[1], -axis[1] * Math.sin(angle) + (1 - c) * axis[0] * axis[2]];
+    const slope = unknowns.map(name => name === 'rx' ? -1 : name.startsWith('translation') ? -x['xyz'.indexOf(name.at(-1))] : 0);
+    let variance = 0;
+    for (let i = 0; i < n; i++) for (let k = 0; k < n; k++) variance += slope[i] * covariance[i][k] * slope[k];
+    const at = [parameters.rx, 0, 0].map((v, a) => Math.round((v - origin[a]) / spacing[a]));
+    return [Math.sqrt(variance), fit.sd[(at[2] * size[1] + at[1]) * size[0] + at[0]]];
+  })()`);
+  check(Math.abs(tip - sd) < 0.15 * sd, `standard deviation at the end of the x axis ${tip} mm, from the covariance ${sd} mm`);
+  const looks = () => page.evaluate(`[...document.querySelectorAll('#slices canvas')].map(c => {
+    const copy = Object.assign(document.createElement('canvas'), { width: c.width, height: c.height }).getContext('2d', { willReadFrequently: true });
+    copy.drawImage(c, 0, 0);
+    const { data } = copy.getImageData(0, 0, c.width, c.height), counts = { teal: 0, orange: 0, grey: new Set() };
+    for (let i = 0; i < data.length; i += 4) {
+      const [r, g, b] = data.slice(i, i + 3);
+      if (g > r + 80) counts.teal++;
+      else if (r > b + 120) counts.orange++;
+      else if (r === g && g === b) counts.grey.add(r);
+    }
+    return [counts.teal, counts.orange, counts.grey.size];
+  })`);
+  const before = await looks();
+  check(before.every(([teal, orange, grey]) => teal > 100 && orange === 0 && grey > 50), `slices of the fit: ${JSON.stringify(before)}`);
+  await move(page, 'rx', 3.6);
+  const after = await looks();
+  check(after.every(([teal, orange]) => teal > 50) && after[2][1] > 50, `slices after a slider: ${JSON.stringify(after)}`);
+  check(await page.evaluate(`document.querySelectorAll('#correlations rect').length === figures.fit.unknowns.length ** 2`), 'no correlations');
+  check(await page.evaluate(`document.querySelectorAll('#verdict li').length === figures.fit.verdict.checks.length`), 'not all checks of the verdict');
+  await page.evaluate(`document.querySelector('.buttons button').click()`);
+  await waitFor(page, `state.map.parameters.every((v, i) => v === home[i])`);
+  clean(page, 'fitted.html');
+}
+
+// Texts of a fit that try to be code are text.
+async function checkHostile(browser) {
+  const page = await browser.open('hostile.html');
+  await waitFor(page, 'window.sdmgen');
+  check(/<script>alert\(1\)/.test(await page.evaluate('document.getElementById("verdict").textContent')), 'the text of the doubt is not shown as it is');
+  clean(page, 'hostile.html');
+}
+
 // The layout keeps to the width of the window, in light and in dark, and differs between them.
-async function checkLayout(browser, file, name) {
+async function checkLayout(browser, file, name, widths = [390, 1280]) {
   const pictures = new Set();
-  for (const width of [390, 1280]) {
+  for (const width of widths) {
     for (const value of ['light', 'dark']) {
       const page = await browser.open(file, { width, height: 844, features: [{ name: 'prefers-color-scheme', value }, { name: 'prefers-reduced-motion', value: 'reduce' }] });
       await waitFor(page, 'window.sdmgen && (!sdmgen.figures.live || sdmgen.map())');
@@ -123,7 +175,7 @@ async function checkLayout(browser, file, name) {
       clean(page, `${name} ${width} ${value}`);
     }
   }
-  check(pictures.size === 4, `${name}: ${pictures.size} different pictures instead of 4`);
+  check(pictures.size === 2 * widths.length, `${name}: ${pictures.size} different pictures instead of ${2 * widths.length}`);
 }
 
 async function checkWithoutWebgl(program) {
@@ -141,6 +193,9 @@ const browser = startBrowser(argv[2]);
 await checkLive(browser);
 await checkLayout(browser, 'live.html', 'live');
 await checkLayout(browser, 'still.html', 'still');
+await checkFit(browser);
+await checkHostile(browser);
+await checkLayout(browser, 'fitted.html', 'fitted', [390]);
 await browser.close();
 await checkWithoutWebgl(argv[2]);
 exit(failures ? 1 : 0);

@@ -6,10 +6,10 @@
 expect 0 - sdmgen --version
 has '^sdmgen [0-9]+\.[0-9]+\.[0-9]+$'
 expect 0 - sdmgen --help
-for command in train generate exact mesh eval report shapes info verify config bench experiment phantom export help; do
+for command in train generate exact mesh eval report shapes info verify config bench experiment phantom export fit collect help; do
     has "^  $command "
 done
-for command in train generate exact mesh eval report shapes info verify config bench experiment phantom export help; do
+for command in train generate exact mesh eval report shapes info verify config bench experiment phantom export fit collect help; do
     expect 0 - sdmgen $command --help
     has "^usage: sdmgen $command"
     expect 0 - sdmgen help $command

@@ -38,14 +38,14 @@ check() {
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
         own("core", "blocks export grid memory pose shape status") # shape: types alone
-         own("core", "block_border box checksum clock container distribution envelope file heap json_describe json_read mat3 near processor rng rotation sampling sha256 shared table team text threads units utf8 vec3")
+         own("core", "block_border box checksum clock container distribution envelope file heap json_describe json_read mat3 near processor rng rotation sampling sanitized sha256 shared table team text threads units utf8 vec3")
          own("config", "config experiment mistakes")
         own("geom", "exact isosurface mesh")
         own("geom", "brute_force builder methods part_audit")
         own("nn", "model")
         own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template")
         own("io", "glb image meshfile npy picture ssm volume")
-        own("shape", "callback registry shape_box shape_survey")
+        own("shape", "callback conformance isolation mesh_measures registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
          own("all", "sdmgen") # the header that includes all public ones
@@ -66,8 +66,8 @@ check() {
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit/judge fit vdb")
         rooms("trainer/", "numerics ssm data state pod fine template direct .")
-        rooms("cli/", "args slicer report inputs shapes phantom fit ssm study page .")
-        rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", "."); rooms("shapes/", ".")
+        rooms("cli/", "args slicer report inputs measure shapes phantom fit cohort ssm study page .")
+        rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", ". survey"); rooms("shapes/", ".")
         while ((getline line < files) > 0) {
             exists[line] = 1
             name = basename(line); folder = substr(line, 1, length(line) - length(name))

@@ -34,14 +34,21 @@ def compare(result, text):
         assert told["overlap"]["dice"] == pytest.approx(result.dice, abs=1e-12)
 
 
+def compare_measures(result, text):
+    told = json.loads(text)["measures"]
+    found = [{"name": m.name, "value": m.value, "sd": m.sd, "unit": m.unit, "not_determined": m.not_determined} for m in result.measures()]
+    assert found == told and [m["name"] for m in told][:2] == ["volume", "area"] and all(m["sd"] > 0 for m in told)
+
+
 def test_an_image(run, ct):
-    words = ["--rotation", "0,0,0", "--spacing", "0.5", "--threads", "1", "--reference", ct["label.nii.gz"], "--json"]
+    words = ["--rotation", "0,0,0", "--spacing", "0.5", "--threads", "1", "--reference", ct["label.nii.gz"], "--measure", "--json"]
     told = run("fit", "--shape", "torus", ct["ct.nii.gz"], *words)
     seen = []
     shape = sdmgen.Shape("torus")
     named = {"rotation": (0, 0, 0), "spacing": 0.5, "threads": 1, "reference": ct["label.nii.gz"]}
     result = sdmgen.fit(shape, sdmgen.read(ct["ct.nii.gz"]), **named, progress=seen.append)
     compare(result, told)
+    compare_measures(result, told)
     assert abs(result.values["major"] - 2.6) < 0.1 and result.dice > 0.9 and result.evidence > 0
     assert len(seen) >= result.iterations and seen[-1].phase == "fit" and seen[0].params.shape == (2,)
     assert abs(result.surface().audit().volume - shape.mesh(result.values).audit().volume) < 3

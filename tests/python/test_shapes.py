@@ -51,6 +51,20 @@ def test_a_shape_in_python_is_a_shape():
         shape.mesh(radius=3)
 
 
+def test_measures():
+    cochlea = sdmgen.Shape("cochlea", edge=1.0)
+    found = {(m.name, m.depth): m for m in cochlea.measures(a=4.0, depths=[0, 90])}
+    assert found["frequency", 0.0].value == pytest.approx(20677, abs=1) and found["frequency", 0.0].unit == "Hz"
+    assert np.isnan(found["frequency", 90.0].value) and found["diameter_a", None].sd is None
+    assert found["volume", None].value == pytest.approx(cochlea.mesh(a=4.0).audit().volume, rel=0.2)
+    assert {name for name, _ in found} >= {"area", "extent_x", "extent_y", "extent_z", "length_wall", "turns"}
+    egg_measures = sdmgen.Shape(egg, PARAMS).measures(radius=1.1)
+    assert [m.name for m in egg_measures] == ["volume", "area", "extent_x", "extent_y", "extent_z"]
+    assert egg_measures[4].value == pytest.approx(2.2 * 1.2)
+    with pytest.raises(sdmgen.ArgumentError, match="no measure of a depth"):
+        sdmgen.Shape("torus").measures(depths=[1])
+
+
 def test_names_options_and_distributions():
     assert "torus" in sdmgen.shapes() and "egg" not in sdmgen.shapes()
     box = sdmgen.Shape(lambda radius, stretch: egg(radius, stretch), PARAMS, name="egg_2", summary="an egg")

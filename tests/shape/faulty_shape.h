@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -17,7 +18,8 @@ static const sdm_param FAULTY_PARAMS[] = {{"size", "mm", 1, 3, 2.5, "edge of the
 static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
-     "exit|trained|metres",
+     "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
+     "edge",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -35,6 +37,35 @@ static inline void faulty_box(sdm_mesh_out *out, size_t box, const double low[3]
     }
 }
 
+/* Faults that a process of its own keeps from the program. */
+static inline void faulty_process(const char *fault)
+{
+    if (!strcmp(fault, "crash")) raise(SIGSEGV);
+    if (!strcmp(fault, "abort")) abort();
+    if (!strcmp(fault, "exit")) exit(0);
+    if (!strcmp(fault, "print")) puts("a line for the user");
+    while (!strcmp(fault, "hang")) pause();
+    while (!strcmp(fault, "flood")) {
+        char *volatile block = (char *)malloc(1 << 20);
+        memset(block, 1, 1 << 20);
+    }
+    if (!strcmp(fault, "heap")) {
+        char *volatile block = (char *)malloc(24);
+        volatile char *byte = block;
+        for (int i = -8; i < 0; i++) byte[i] = -1; // where malloc() keeps the size
+        free(block);
+    }
+}
+
+/* Faults with the arrays of the host. */
+static inline void faulty_arrays(const char *fault, const double *p, sdm_mesh_out *out)
+{
+    double *volatile vert = out->vert;
+    if (!strcmp(fault, "beyond")) vert[3 * out->n_vert + 2] = 1;
+    if (!strcmp(fault, "before")) vert[-1] = 1;
+    if (!strcmp(fault, "write")) *(double *)p = 1;
+}
+
 static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                        const double *p, sdm_mesh_out *out)
 {
@@ -42,13 +73,12 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     (void)self;
     const char *fault = options[0].text;
     const int is_large = p[0] > 2;
+    if (!strcmp(fault, "edge") && !(p[0] >= 1 && p[0] <= 3)) abort();
     // in parentheses: cmocka defines a macro fail()
     if (!strcmp(fault, "fail") && is_large) return (host->fail)(host, "too large");
     if (!strcmp(fault, "trained") && !access("trained/model.sdm", F_OK))
         return (host->fail)(host, "a model is there");
-    if (!strcmp(fault, "crash") && is_large) raise(SIGSEGV);
-    if (!strcmp(fault, "abort") && is_large) abort();
-    if (!strcmp(fault, "exit") && is_large) exit(0);
+    if (is_large) faulty_process(fault);
     const size_t boxes = !strcmp(fault, "sizes") && is_large ? 3 : 2;
     const size_t less = !strcmp(fault, "open");
     const int failed = host->reserve(host, out, 8 * boxes, 12 * boxes - less);
@@ -57,7 +87,11 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "jump")) shift = is_large ? 0.125 : 0;
     if (!strcmp(fault, "kink")) shift = fabs(p[0] - 2) / 4;
     if (!strcmp(fault, "unlike")) shift = 1e-6 * ++calls;
-    const double body[2][3] = {{-p[0], -p[0], -p[0]}, {p[0], p[0], p[0]}};
+    static volatile double shared; // for threads that call at once
+    shared = p[0];
+    for (int i = 0; i < 20000 && !strcmp(fault, "shared"); i++) shift += 0 * shared;
+    const double r = !strcmp(fault, "shared") ? shared : p[0];
+    const double body[2][3] = {{-r, -r, -r}, {r, r, r}};
     const double handle[2][3] = {{p[0] - 0.5, -0.25, -0.25 + shift},
                                  {p[0] + p[1], 0.25, 0.25 + shift}};
     if (boxes == 3) {
@@ -78,6 +112,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         memcpy(out->tri, OTHER, sizeof OTHER);
     }
     for (size_t i = 0; i < 24 * boxes && !strcmp(fault, "metres"); i++) out->vert[i] /= 1000;
+    if (is_large) faulty_arrays(fault, p, out);
     return 0;
 }
 

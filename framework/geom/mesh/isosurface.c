@@ -11,8 +11,6 @@
 #include "sdm/internal/heap.h"
 #include "sdm/isosurface.h"
 
-#define NO_VERTEX UINT32_MAX
-
 /* Minimum distance of a vertex from a voxel centre, in voxels: voxels exactly at the level would
  * give triangles without area. */
 #define STEP_MIN 1e-4
@@ -27,7 +25,8 @@ static int edge_start(int edge)
 }
 
 /* State of the extraction, which goes through the grid layer by layer in z. Vertex indices are kept
- * for the edges along x and y in two layers, and for the edges along z between them. */
+ * for the edges along x and y in two layers, and for the edges along z between them. Bits say which
+ * voxels are inside: so words of bits find the few edges and cells that the surface meets. */
 typedef struct tracer {
     const sdm_grid *g;
     const float *values;
@@ -35,7 +34,9 @@ typedef struct tracer {
     bool mirrored; /* the grid's axes form a left-handed system */
     bool cut;      /* the surface leaves the grid */
     size_t nx, ny, nz;
-    uint32_t *edge[2][2]; /* [layer & 1][axis]: [ny][nx] */
+    size_t words;        /* of the bits of a row of voxels */
+    uint64_t *inside[2]; /* [layer & 1]: [ny][words], a bit a voxel: its value is below the level */
+    uint32_t *edge[2][2]; /* [layer & 1][axis]: [ny][nx], set where the level is crossed */
     uint32_t *edge_z;     /* [ny][nx] */
     sdm_builder b;
 } tracer;
@@ -43,7 +44,7 @@ typedef struct tracer {
 /* A cell that the surface passes through. */
 typedef struct cell {
     double v[8];         /* value minus level at the corners; < 0: inside */
-    uint32_t vertex[12]; /* vertex on each edge, or NO_VERTEX */
+    uint32_t vertex[12]; /* vertex on each edge that the level crosses */
     int next[12];        /* the edge to which the segment from each edge leads; -1: none */
 } cell;
 
@@ -52,21 +53,39 @@ static double value_at(const tracer *t, size_t i, size_t j, size_t k)
     return (double)t->values[(k * t->ny + j) * t->nx + i] - t->level;
 }
 
-/* Adds the vertex on the grid edge from voxel `at` along `axis`; *vertex = NO_VERTEX when the level
- * is not crossed there. */
+/* Sets the bits of the voxels in layer k that are inside. */
+static void mark_layer(tracer *t, size_t k)
+{
+    const float level = (float)t->level;
+    for (size_t j = 0; j < t->ny; j++) {
+        const float *row = t->values + (k * t->ny + j) * t->nx;
+        uint64_t *bits = t->inside[k & 1] + j * t->words;
+        for (size_t w = 0; w < t->words; w++) bits[w] = 0;
+        for (size_t i = 0; i < t->nx; i++) bits[i / 64] |= (uint64_t)(row[i] < level) << i % 64;
+    }
+}
+
+/* The bits of the voxels that follow those of word w along x, and of those that have a follower. */
+static uint64_t next_along_x(const tracer *t, const uint64_t *row, size_t w)
+{
+    return row[w] >> 1 | (w + 1 < t->words ? row[w + 1] << 63 : 0);
+}
+static uint64_t have_next(const tracer *t, size_t w)
+{
+    return w + 1 < t->words ? UINT64_MAX : ((uint64_t)1 << (t->nx - 1) % 64) - 1;
+}
+
+/* Adds the vertex on the grid edge from voxel `at` along `axis`, on which the level is crossed. */
 static sdm_status add_crossing(tracer *t, const size_t at[3], int axis, uint32_t *vertex,
                                sdm_error *err)
 {
     const size_t n[3] = {t->nx, t->ny, t->nz};
-    *vertex = NO_VERTEX;
-    if (at[axis] + 1 >= n[axis]) return SDM_OK;
-    const double a = value_at(t, at[0], at[1], at[2]);
-    const double b = value_at(t, at[0] + (axis == 0), at[1] + (axis == 1), at[2] + (axis == 2));
-    if ((a < 0) == (b < 0)) return SDM_OK;
     // a vertex on the boundary of the grid
     for (int d = 0; d < 3; d++) t->cut = t->cut || (d != axis && (at[d] == 0 || at[d] + 1 == n[d]));
     // a grid with a single layer of voxels has no cells, so the vertex would not be used
     if (t->nx < 2 || t->ny < 2 || t->nz < 2) return SDM_OK;
+    const double a = value_at(t, at[0], at[1], at[2]);
+    const double b = value_at(t, at[0] + (axis == 0), at[1] + (axis == 1), at[2] + (axis == 2));
     double index[3] = {(double)at[0], (double)at[1], (double)at[2]}, world[3];
     index[axis] += fmin(fmax(a / (a - b), STEP_MIN), 1 - STEP_MIN);
     sdm_grid_world(t->g, index, world);
@@ -74,26 +93,44 @@ static sdm_status add_crossing(tracer *t, const size_t at[3], int axis, uint32_t
     return sdm_builder_vertex(&t->b, world, err);
 }
 
+/* Adds the vertices on the edges from the voxels of word w of row (j, k); crossed[axis]: bits of
+ * the edges along an axis on which the level is crossed. */
+static sdm_status add_word(tracer *t, size_t j, size_t k, size_t w, const uint64_t crossed[3],
+                           sdm_error *err)
+{
+    for (uint64_t any = crossed[0] | crossed[1] | crossed[2]; any; any &= any - 1) {
+        const int bit = __builtin_ctzll(any);
+        const size_t i = 64 * w + (size_t)bit, at[3] = {i, j, k}, slot = j * t->nx + i;
+        for (int axis = 0; axis < 3; axis++) {
+            if (!(crossed[axis] >> bit & 1)) continue;
+            uint32_t *vertex = axis == 2 ? &t->edge_z[slot] : &t->edge[k & 1][axis][slot];
+            const sdm_status s = add_crossing(t, at, axis, vertex, err);
+            if (s) return s;
+        }
+    }
+    return SDM_OK;
+}
+
 /* Adds the vertices on the grid edges along x and y in layer k, or with `upwards` those on the
  * edges from layer k to layer k + 1. */
 static sdm_status add_layer(tracer *t, size_t k, bool upwards, sdm_error *err)
 {
-    for (size_t j = 0; j < t->ny; j++) {
-        for (size_t i = 0; i < t->nx; i++) {
-            const size_t at[3] = {i, j, k}, slot = j * t->nx + i;
-            sdm_status s;
+    sdm_status s = SDM_OK;
+    for (size_t j = 0; j < t->ny && !s; j++) {
+        const uint64_t *row = t->inside[k & 1] + j * t->words,
+                       *above = t->inside[(k + 1) & 1] + j * t->words;
+        for (size_t w = 0; w < t->words && !s; w++) {
+            uint64_t crossed[3] = {0};
             if (upwards) {
-                s = add_crossing(t, at, 2, &t->edge_z[slot], err);
-                if (s) return s;
-                continue;
+                crossed[2] = row[w] ^ above[w];
+            } else {
+                crossed[0] = (row[w] ^ next_along_x(t, row, w)) & have_next(t, w);
+                crossed[1] = j + 1 < t->ny ? row[w] ^ row[t->words + w] : 0;
             }
-            for (int axis = 0; axis < 2; axis++) {
-                s = add_crossing(t, at, axis, &t->edge[k & 1][axis][slot], err);
-                if (s) return s;
-            }
+            s = add_word(t, j, k, w, crossed, err);
         }
     }
-    return SDM_OK;
+    return s;
 }
 
 /* Draws the directed segments on one face of the cell: the lower (side 0) or upper (side 1) face
@@ -222,33 +259,50 @@ static void collect_vertices(const tracer *t, size_t i, size_t j, size_t k, cell
     }
 }
 
+/* Bits of the cells that the surface passes through: with lower corners in word w of row j, between
+ * the layers of the tracer. */
+static uint64_t met_cells(const tracer *t, size_t j, size_t w)
+{
+    uint64_t some = 0, all = UINT64_MAX;
+    for (int corner = 0; corner < 4; corner++) {
+        const uint64_t *row = t->inside[corner >> 1] + (j + (size_t)(corner & 1)) * t->words;
+        const uint64_t here = row[w], next = next_along_x(t, row, w);
+        some |= here | next;
+        all &= here & next;
+    }
+    return some & ~all & have_next(t, w);
+}
+
+/* Adds the triangles of the cell with lower corner (i, j, k). */
+static sdm_status add_cell(tracer *t, size_t i, size_t j, size_t k, sdm_error *err)
+{
+    cell c;
+    for (size_t n = 0; n < 8; n++)
+        c.v[n] = value_at(t, i + (n & 1), j + (n >> 1 & 1), k + (n >> 2));
+    collect_vertices(t, i, j, k, &c);
+    return trace_cell(t, &c, err);
+}
+
 /* Adds the triangles of the cells between layers k and k + 1. */
 static sdm_status trace_layer(tracer *t, size_t k, sdm_error *err)
 {
-    for (size_t j = 0; j + 1 < t->ny; j++) {
-        for (size_t i = 0; i + 1 < t->nx; i++) {
-            cell c;
-            int inside = 0;
-            for (size_t n = 0; n < 8; n++) {
-                c.v[n] = value_at(t, i + (n & 1), j + (n >> 1 & 1), k + (n >> 2));
-                inside += c.v[n] < 0;
-            }
-            if (inside == 0 || inside == 8) continue;
-            collect_vertices(t, i, j, k, &c);
-            const sdm_status s = trace_cell(t, &c, err);
-            if (s) return s;
-        }
-    }
-    return SDM_OK;
+    sdm_status s = SDM_OK;
+    for (size_t j = 0; j + 1 < t->ny; j++)
+        for (size_t w = 0; w < t->words; w++)
+            for (uint64_t met = met_cells(t, j, w); met && !s; met &= met - 1)
+                s = add_cell(t, 64 * w + (size_t)__builtin_ctzll(met), j, k, err);
+    return s;
 }
 
 static sdm_status trace_grid(tracer *t, sdm_error *err)
 {
+    mark_layer(t, 0);
     sdm_status s = add_layer(t, 0, false, err);
-    for (size_t k = 0; k < t->nz && !s; k++) {
-        if (k + 1 < t->nz) s = add_layer(t, k + 1, false, err);
+    for (size_t k = 0; k + 1 < t->nz && !s; k++) {
+        mark_layer(t, k + 1);
+        s = add_layer(t, k + 1, false, err);
         if (!s) s = add_layer(t, k, true, err);
-        if (!s && k + 1 < t->nz) s = trace_layer(t, k, err);
+        if (!s) s = trace_layer(t, k, err);
     }
     return s ? s : sdm_builder_finish(&t->b, err);
 }
@@ -266,6 +320,20 @@ static sdm_status check_values(const sdm_grid *g, const float *values, float lev
     return SDM_OK;
 }
 
+/* Makes the memory of the layers: edge_z and inside[0] are its beginnings. */
+static sdm_status make_layers(tracer *t, sdm_error *err)
+{
+    const size_t area = t->nx * t->ny, bits = t->words * t->ny;
+    size_t five;
+    sdm_status s = sdm_mul(area, 5, &five, err);
+    if (!s) s = SDM_ALLOC(&t->edge_z, five, "layers of an iso-surface", err);
+    if (!s) s = SDM_ALLOC(&t->inside[0], 2 * bits, "layers of an iso-surface", err);
+    if (s) return s;
+    for (size_t i = 0; i < 4; i++) t->edge[i >> 1][i & 1] = t->edge_z + (i + 1) * area;
+    t->inside[1] = t->inside[0] + bits;
+    return SDM_OK;
+}
+
 sdm_status sdm_isosurface(const sdm_grid *grid, const float *values, float level, sdm_mesh *out,
                           bool *cut, sdm_error *err)
 {
@@ -279,23 +347,16 @@ sdm_status sdm_isosurface(const sdm_grid *grid, const float *values, float level
     t.nx = (size_t)grid->n[0];
     t.ny = (size_t)grid->n[1];
     t.nz = (size_t)grid->n[2];
+    t.words = (t.nx + 63) / 64;
     // sign of the determinant of the direction matrix
     const double *r = grid->dir;
     t.mirrored = r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) +
                      r[2] * (r[3] * r[7] - r[4] * r[6]) <
                  0;
-    // five layers of vertex indices: two of edges along x, two along y, one along z
-    uint32_t *layers = NULL;
-    const size_t area = t.nx * t.ny;
-    size_t five;
-    s = sdm_mul(area, 5, &five, err);
-    if (!s) s = SDM_ALLOC(&layers, five, "layers of an iso-surface", err);
-    if (!s) {
-        for (int i = 0; i < 4; i++) t.edge[i >> 1][i & 1] = layers + (size_t)i * area;
-        t.edge_z = layers + 4 * area;
-        s = trace_grid(&t, err);
-    }
-    sdm_free(layers);
+    s = make_layers(&t, err);
+    if (!s) s = trace_grid(&t, err);
+    sdm_free(t.inside[0]);
+    sdm_free(t.edge_z);
     if (s) sdm_mesh_dispose(out);
     if (!s && cut) *cut = t.cut;
     return s;

@@ -103,6 +103,40 @@ SDM_API sdm_status sdm_instance_velocity(const sdm_instance *s, const double *p,
 SDM_API sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const double x[3],
                                          double *distance, sdm_error *err);
 
+/* A measure of a shape and its value. */
+typedef struct sdm_measured {
+    /* texts that live as long as the shape and the library */
+    const char *name, *unit, *help;
+    double depth; /* mm, of a measure at a depth; else NaN */
+    /* NaN: beyond the end of the shape; the volume of a mesh that is not closed; or not measured */
+    double value;
+    /* standard deviation by sdm_fit_measure(): 0 where the measure depends on nothing that was
+     * fitted; NaN: unknown, or not of a fit */
+    double sd;
+    /* sdm_fit_measure(): true: the data say no more about the measure than the priors and ranges of
+     * the parameters, as sdm_fit_result.by_prior says it of a parameter */
+    bool not_determined;
+} sdm_measured;
+
+/* largest number of measures of a shape, each depth counted */
+#define SDM_MEASURES_MAX 128
+
+/* The measures of a shape: its own, those of a depth for each depth; then volume (mm^3), area
+ * (mm^2) and extents (mm) along the axes of its frame, all of the union of the mesh's volumes
+ * (sdm_exact_surface()). */
+typedef struct sdm_measures {
+    size_t n;
+    sdm_measured at[SDM_MEASURES_MAX];
+} sdm_measures;
+
+/* Measures the shape at p[n_params]; p NULL: only names, units and texts. depths[n_depths] (mm, >=
+ * 0): where measures of a depth are taken; without depths these are left out. SDM_E_ARG: a depth
+ * that is negative or not finite, too many, or any if the shape has no measure of a depth;
+ * SDM_E_RANGE; SDM_E_PLUGIN: names shape, measure, parameters and reason; SDM_E_MESH, SDM_E_NOMEM.
+ * [any thread] */
+SDM_API sdm_status sdm_shape_measure(const sdm_instance *s, const double *p, const double *depths,
+                                     size_t n_depths, sdm_measures *out, sdm_error *err);
+
 #ifdef __cplusplus
 }
 #endif

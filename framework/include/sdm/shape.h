@@ -62,6 +62,16 @@ typedef struct sdm_distribution {
     double mean, deviation;
 } sdm_distribution;
 
+/* A measure: a number that describes the shape at given parameters, such as a length. */
+typedef struct sdm_measure {
+    const char *name; /* matches [a-z][a-z0-9_]*, unique within the shape */
+    const char *unit; /* "mm", "deg", "Hz", ... or "" */
+    const char *help; /* what is measured, with its source (author, year) if it has one */
+    /* 1: the measure is a function of a depth, mm: how far in from the beginning of the shape;
+     * 0: it is one number */
+    int of_depth;
+} sdm_measure;
+
 /* Mesh output: after host->reserve() the plug-in writes vert[n_vert][3] (mm) and tri[n_tri][3]
  * (vertex indices, counter-clockwise seen from outside). */
 typedef struct sdm_mesh_out {
@@ -142,6 +152,16 @@ typedef struct sdm_shape {
      * mirror image of the other at the same parameters ("ear" of "left|right"). A fit tries both.
      * NULL: the shape states none. */
     const char *mirror;
+
+    /* Optional, all or none: measures of the shape's own. measure() computes measures[index] at p.
+     * depth: mm, >= 0, for a measure with of_depth; else 0. *value is finite, or NaN where a depth
+     * lies beyond the end of the shape; smooth in p, so that a fit can state its standard
+     * deviation. Returns 0 on success. Volume, area and extents need no callback: every shape has
+     * them from its mesh, and the names volume, area, extent_x, extent_y and extent_z are taken. */
+    const sdm_measure *measures;
+    uint32_t n_measures;
+    int (*measure)(const void *self, const sdm_host *host, const sdm_option_value *options,
+                   const double *p, uint32_t index, double depth, double *value);
 } sdm_shape;
 
 /* The only symbol that the shared object of a plug-in exports: returns shape `index`, NULL beyond

@@ -113,6 +113,16 @@ SDM_API sdm_status sdm_volume_find_segment(const sdm_volume *v, const char *name
 SDM_API sdm_status sdm_volume_write(const char *path, const sdm_grid *grid, const void *values,
                                     sdm_voxel_type type, const char *text, sdm_error *err);
 
+/* Writes a 3D Slicer segmentation, whose name ends in .seg.nrrd: labels[nz][ny][nx], of which
+   segment i of segments[n] are the voxels equal to its `value`, 1 to 255, with its name and id
+   (without an id: the name), a colour and the code of tissue; `layer` is ignored. `text` (may be
+   NULL) is a one-line description. The file appears under its name only when it is complete.
+   SDM_E_ARG, also for a segment without a voxel; SDM_E_IO, SDM_E_NOMEM; SDM_E_UNSUPPORTED for
+   another ending. */
+SDM_API sdm_status sdm_segmentation_write(const char *path, const sdm_grid *grid,
+                                          const uint8_t *labels, const sdm_segment *segments,
+                                          size_t n, const char *text, sdm_error *err);
+
 #ifdef __cplusplus
 }
 #endif

@@ -41,6 +41,8 @@ typedef struct sdm_image {
     sdm_voxel_type type;
     /* description; never NULL */
     const char *text;
+    /* NRRD: further lines of the header, each with its line feed; NULL: none */
+    const char *keys;
 } sdm_image;
 
 /* Write header and voxels into an open file, which the caller commits. sdm_nifti_write():

@@ -33,7 +33,7 @@ static void add_header(sdm_text *t, const sdm_image *m)
                     "\"mm\" \"mm\" \"mm\"\n");
     sdm_text_add(t, "space origin: ");
     add_vector(t, g->origin);
-    sdm_text_add(t, "\n\n");
+    sdm_text_add(t, "\n%s\n", m->keys ? m->keys : "");
 }
 
 sdm_status sdm_nrrd_write(sdm_outfile *f, const sdm_image *m, sdm_error *err)

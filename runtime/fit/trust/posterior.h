@@ -3,6 +3,10 @@
 
 #include "fit/solver/problem.h"
 
+/* A parameter or a measure is not determined by the data if its standard deviation exceeds this
+   share of the one before the fit. */
+#define FIT_BY_PRIOR 0.9
+
 /* Fills covariance, sd, correlation, noise_factor and model_error_mm of *out, whose arrays must be
    allocated. SDM_E_QUALITY: the information is singular; the matrices then keep their values. */
 sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_error *err);

@@ -450,6 +450,10 @@ typedef struct sdm_fit_result {
 
     /* whether and why the fit is to be trusted; sdm_fit() gives SDM_E_QUALITY where it failed */
     sdm_fit_verdict verdict;
+
+    /* [n_params] standard deviation of each parameter before the fit: that of its prior or, without
+       a prior, of a uniform distribution over its range */
+    double *prior_sd;
 } sdm_fit_result;
 
 /* Fits the shape of source to target. Errors: SDM_E_ARG: source, options or start, or no voxel near
@@ -461,6 +465,16 @@ typedef struct sdm_fit_result {
 SDM_API sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
                            const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err);
 SDM_API void sdm_fit_dispose(sdm_fit_result *r);
+
+/* sdm_shape_measure() at the estimate of a fit, with the standard deviations that follow from its
+   covariance to first order: sqrt(g^T C g), with the covariance C of the parameters and the
+   gradient g of the measure by differences over one standard deviation of each parameter to either
+   side. The pose changes no measure. `shape`: the shape
+   of the fit's source or, for a fit with a model alone, one by sdm_runtime_instance(). SDM_E_ARG:
+   another number of parameters; errors of sdm_shape_measure(). [any thread] */
+SDM_API sdm_status sdm_fit_measure(const sdm_instance *shape, const sdm_fit_result *fit,
+                                   const double *depths, size_t n_depths, sdm_measures *out,
+                                   sdm_error *err);
 
 /* points[n][3] = points on the surface of a mesh (mm), for a fit to the mesh: its vertices are
    dense where it bends and absent from flat faces, and would weigh these places accordingly. The

@@ -19,6 +19,10 @@ typedef struct sdm_callback {
  * called in a signal handler. */
 const sdm_callback *sdm_callback_running(void);
 
+/* What it means that a signal ended a callback, "the plug-in divided an integer by zero"; may be
+ * called in a signal handler. */
+const char *sdm_callback_crash_reason(int signal_number);
+
 #ifdef __cplusplus
 }
 #endif

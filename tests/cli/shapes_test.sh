@@ -1,0 +1,33 @@
+#!/bin/bash
+# sdmgen shapes test: one line for each test, the verdict as exit code, JSON, and mistakes on the command line.
+# Tests: shapes_test.c only_shape.c
+. "$(dirname "$0")/common.sh"
+plugins=$(cd ../../plugins && pwd)
+unfit=$plugins/unfit/unfit.so
+
+expect 0 - sdmgen shapes test "$plugins/good/octahedron.so" --samples 8
+has '^octahedron: the default shape, 2 corners of the ranges, 8 random shapes$'
+[ "$(grep -cE '^(passed|skipped|doubtful|failed) +[a-z]+ +.' out)" -eq 10 ] || bad "not ten tests: $(cat out)"
+has '^fine: the shape keeps the contract'
+expect 0 - sdmgen shapes test octahedron --plugin "$plugins/good/octahedron.so" --samples 8
+expect 0 - sdmgen shapes test torus --samples 8
+has '^skipped +outside'
+expect 4 '^sdmgen: error: unfit_jump: 1 of 10 tests failed: maps, derivatives or trainings would suffer$' \
+    sdmgen shapes test unfit_jump --plugin "$unfit" --samples 8
+has '^failed +continuous vertex (8|9|1[0-5]) jumps by 0\.125 mm along size; at size=2\.0*[0-9]* reach=1\.[0-9]+$'
+expect 3 'unfit_open: 1 of 10 tests failed: meshes are broken' sdmgen shapes test unfit_open --plugin "$unfit" --samples 8 --json
+has '^\{"shape": "unfit_open", "verdict": "broken", "corners": 4, "samples": 8, "tests": \[\{"test": "meshes", "outcome": "passed"'
+has '"test": "closed", "outcome": "failed", "figure": 3, "text": "[^"]*", "at": \{"size": '
+
+# a shape that crashes is tested to the end
+expect 4 '1 of 10 tests failed' sdmgen shapes test picky --plugin "$unfit" --samples 8
+has '^failed +options +with mode=abort: .*unfit\.so: mesh\(\): the plug-in called abort\(\)'
+
+expect 2 '^sdmgen: error: shapes test: --plugin has 12 shapes: name one' sdmgen shapes test "$unfit"
+expect 2 "unexpected argument 'more'" sdmgen shapes test torus more
+expect 2 'o needs .shapes check' sdmgen shapes test torus -o x.png
+expect 2 'usage: sdmgen shapes test NAME\|PLUGIN\.so' sdmgen shapes test
+expect 2 "unknown shape 'toru'; did you mean 'torus'" sdmgen shapes test toru
+expect 3 'no_symbol/plugin\.so: exports no function' sdmgen shapes test "$plugins/no_symbol/plugin.so"
+expect 3 'missing\.so' sdmgen shapes test missing.so
+finish

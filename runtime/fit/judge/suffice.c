@@ -66,7 +66,7 @@ void sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sdm_fit_
                       "many, or keep the parameters or the pose",
                       n, unknowns);
     fit_extent e;
-    if (sdm_fit_extent(&p->maps, &e, NULL)) return;
+    if (n < unknowns || sdm_fit_extent(&p->maps, &e, NULL)) return;
     const double wide = spread(p, s);
     sdm_fit_judge_add(v, SDM_FIT_CHECK_SIZE, wide >= SPREAD_MIN * e.reach, SDM_FIT_FAILED, wide,
                       SPREAD_MIN * e.reach,
@@ -133,7 +133,7 @@ void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm
 {
     size_t known = 0;
     for (size_t k = 0; k < p->n_params; k++) known += !r->by_prior[k];
-    if (known || p->opts->keep_params) return;
+    if (known || p->opts->keep_params || v->grade == SDM_FIT_FAILED) return;
     sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_FAILED, 0, 1,
                       "the data determine none of the %zu parameters: their standard deviations "
                       "are those of the priors",

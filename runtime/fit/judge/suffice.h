@@ -4,7 +4,7 @@
 
 #include "residuals.h"
 
-/* Adds the findings "data" and "size" of a fit to points. */
+/* Adds the finding "data" of a fit to points, and "size" where they are enough. */
 void sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sdm_fit_verdict *v);
 
 /* What the voxels of the maps do not show. */
@@ -25,5 +25,6 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p);
 void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, double blur,
                           sdm_fit_verdict *v);
 
-/* Adds the finding "data" if the data determine none of the parameters. */
+/* Adds the finding "data" if nothing failed before, and the data determine none of the parameters.
+ */
 void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v);

@@ -132,15 +132,16 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, fit_coars
     char cause[200] = "another shape lies there, or the organ differs from the model (then say by "
                       "how much it may: sdm_fit_opts.tolerance)";
     if (isfinite(coarse.edge))
-        snprintf(cause, sizeof cause,
-                 "the voxels of the maps, %.2g mm, are coarse beside %s: exact maps with voxels of "
-                 "%.2g mm (sdm_fit_source.grid) tell whether it is the right one",
-                 voxel, coarse.detail, coarse.edge);
+        snprintf(
+            cause, sizeof cause,
+            "the voxels of the maps, %.2g mm, are coarse beside %s: try exact maps with voxels "
+            "of %.2g mm (sdm_fit_source.grid)",
+            voxel, coarse.detail, coarse.edge);
     sdm_fit_judge_add(
         v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1], inside, m->chi_square[1],
         m->limit[1],
-        "the residuals inside the shape are not noise: neighbourhoods deviate by %.2g times what "
-        "noise explains; %s",
+        "the residuals inside the shape are not noise, they deviate by %.2g times what noise "
+        "explains: %s",
         sqrt(m->chi_square[1]), cause);
     if (points) return;
     sdm_fit_judge_add(
@@ -293,7 +294,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err
         v->n_units = misfit.n_units[0] + misfit.n_units[1];
         v->chi_square = misfit.noise_chi_square;
     }
-    if (!s && p->target->kind == SDM_FIT_POINTS) sdm_fit_check_points(p, &residuals, v);
+    if (!s && p->target->kind == SDM_FIT_POINTS) s = sdm_fit_check_points(p, &residuals, v, err);
     if (!s && is_image(p)) check_tissues(p, &residuals, r, v);
     if (!s) sdm_fit_check_voxels(p, coarse, is_image(p) ? r->blur : 0, v);
     if (!s) sdm_fit_check_determined(p, r, v);

@@ -4,8 +4,9 @@
 
 #include "residuals.h"
 
-/* Adds the finding "data" of a fit to points, and "size" where they are enough. */
-void sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sdm_fit_verdict *v);
+/* Adds the findings "data" and "size" of a fit to points. SDM_E_NOMEM. */
+sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sdm_fit_verdict *v,
+                                sdm_error *err);
 
 /* What the voxels of the maps do not show. */
 typedef struct fit_coarseness {
@@ -16,8 +17,7 @@ typedef struct fit_coarseness {
     const char *detail;
 } fit_coarseness;
 
-/* Judges the maps by the fitted shape and by labels; nothing is coarse while the parameters are
- * kept. */
+/* Judges the maps by the fitted shape and by labels. */
 fit_coarseness sdm_fit_coarseness(const fit_problem *p);
 
 /* Adds the finding "map voxels", unless the parameters are kept. blur: sd of the point spread, mm;

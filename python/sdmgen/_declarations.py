@@ -72,7 +72,7 @@ typedef struct sdm_shape { uint32_t abi; uint32_t size; const char *name; const 
 enum { SDM_MODEL_NAME_MAX = 64 };
 typedef struct sdm_model_param { char name[SDM_MODEL_NAME_MAX], unit[16]; double min, max, def; sdm_distribution distribution; } sdm_model_param;
 typedef struct sdm_accuracy { int64_t samples; double mse_mm2, rmse_mm, mae_mm, max_abs_mm; double rmse_near_mm; double q50_mm, q90_mm, q99_mm; double near_mm; } sdm_accuracy;
-typedef struct sdm_model_quality { char grade[16]; double cut; double between_mm; } sdm_model_quality;
+typedef struct sdm_model_quality { char grade[16]; double cut; double between_mm; double thickness_mm; } sdm_model_quality;
 typedef struct sdm_model_info { char shape[SDM_MODEL_NAME_MAX]; char kind[16]; char version[16]; size_t n_params; const sdm_model_param *params; size_t n_options; const char *const *option_names, *const *option_values; sdm_grid grid; sdm_accuracy accuracy; uint64_t seed; double train_seconds; int64_t train_samples; uint64_t checksum; size_t file_bytes, weight_bytes; double macs; const char *config; const char *folder; size_t fine_width; sdm_model_quality quality; } sdm_model_info;
 typedef struct sdm_model sdm_model;
 sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
@@ -145,6 +145,7 @@ void sdm_volume_dispose(sdm_volume *v);
 bool sdm_volume_knows(const char *path);
 sdm_status sdm_volume_find_segment(const sdm_volume *v, const char *name, const sdm_segment **out, sdm_error *err);
 sdm_status sdm_volume_write(const char *path, const sdm_grid *grid, const void *values, sdm_voxel_type type, const char *text, sdm_error *err);
+sdm_status sdm_segmentation_write(const char *path, const sdm_grid *grid, const uint8_t *labels, const sdm_segment *segments, size_t n, const char *text, sdm_error *err);
 sdm_status sdm_builtin_shapes_add(sdm_registry *registry, sdm_error *err);
 enum { SDM_CHECK_POINTS = 1000 };
 typedef struct sdm_check { double mean_mm, rmse_mm, q95_mm, max_mm; double bias_mm; size_t used; size_t outside; } sdm_check;

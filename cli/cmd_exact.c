@@ -20,6 +20,7 @@
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/methods.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/threads.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
@@ -256,8 +257,11 @@ static void notice_mesh(const job *j)
         cli_warn_cut_shape(&j->grid, j->mesh.vert, j->mesh.n_vert,
                            "a larger grid (--size, --spacing, --origin) holds it");
     cli_warn_audit(a);
-    // a single part that meets no other cannot be inside out after the engine has turned it
-    if (a->components > 1) cli_warn_parts(&j->mesh, j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
+    // a closed part that meets no other cannot be inside out after the engine has turned it; the
+    // audit of the single part of a file, which may be large, would only tell its thickness
+    if (a->components > 1 || !a->closed || j->args->shape)
+        cli_warn_parts(&j->mesh, j->args->points ? 0 : sdm_grid_coarsest(&j->grid),
+                       j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
                    "triangles (error at most %.2g mm)",

@@ -213,6 +213,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
                         "--measure or --json");
     sdm_status s = open_model(j, err);
     if (!s) s = choose_grid(j, err);
+    if (!s) cli_warn_thin_model(args->files.items[0], j->info, &j->grid);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);

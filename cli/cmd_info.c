@@ -65,6 +65,7 @@ static void json_quality(sdm_json *j, const sdm_model_quality *q)
     sdm_json_text(j, "grade", q->grade);
     sdm_json_real(j, "cut", q->cut);
     sdm_json_real(j, "between_mm", q->between_mm);
+    sdm_json_real(j, "thickness_mm", q->thickness_mm);
     sdm_json_close(j, '}');
 }
 

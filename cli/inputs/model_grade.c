@@ -6,7 +6,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "report/report_audit.h"
 #include "report/terminal.h"
+#include "sdm/internal/shape_box.h"
 
 /* Largest fraction of the shapes that the grid of a good model cuts (docs/network.md). */
 #define CUT_MAX 0.05
@@ -27,6 +29,14 @@ void cli_warn_quality(const char *path, const sdm_model_info *m)
                  poor && cut ? "; " : "", shapes);
 }
 
+void cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_grid *g)
+{
+    const double thick = m->quality.thickness_mm,
+                 voxel = fmax(sdm_grid_coarsest(&m->grid), sdm_grid_coarsest(g));
+    if (sdm_too_thin(thick, voxel))
+        cli_warn("%s: a part of its shapes is " CLI_THIN_PART, path, thick, voxel, 0.5 * thick);
+}
+
 void cli_print_quality(const sdm_model_quality *q)
 {
     if (!*q->grade) {
@@ -40,4 +50,7 @@ void cli_print_quality(const sdm_model_quality *q)
             "             between the voxels exact maps, interpolated linearly, miss the surface "
             "by %.5f mm RMS\n",
             q->between_mm);
+    if (!isnan(q->thickness_mm))
+        cli_print("             the thinnest part of the held-out shapes is %.2g mm thick\n",
+                  q->thickness_mm);
 }

@@ -7,5 +7,9 @@
  * shapes of its family. Says nothing about models without a verdict. */
 void cli_warn_quality(const char *path, const sdm_model_info *m);
 
+/* Warns in one line if the thinnest part of the shapes of the training is too thin for the voxels
+ * of the model or of the grid g, whichever are larger. */
+void cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_grid *g);
+
 /* Prints the verdict as lines of `info`. */
 void cli_print_quality(const sdm_model_quality *q);

@@ -169,7 +169,34 @@ void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
     sdm_text_add(text, "it is subtracted from what it overlaps and is not solid itself");
 }
 
-static void warn_parts(const sdm_part_audit *audit, const char *mend)
+void cli_describe_thin(const sdm_part_audit *a, size_t index, double voxel, sdm_text *text)
+{
+    const sdm_part *p = &a->part[index];
+    sdm_text_add(text,
+                 "part %zu of %zu (box %.4g..%.4g, %.4g..%.4g, %.4g..%.4g mm) is " CLI_THIN_PART,
+                 index + 1, a->n, p->min[0], p->max[0], p->min[1], p->max[1], p->min[2], p->max[2],
+                 p->thick, voxel, 0.5 * p->thick);
+}
+
+static void warn_open(const sdm_part_audit *audit)
+{
+    sdm_text text = {0};
+    cli_describe_open(audit, &text);
+    if (text.size && !text.failed) cli_warn("%s", text.data);
+    sdm_text_dispose(&text);
+}
+
+static void warn_thin(const sdm_part_audit *audit, double voxel)
+{
+    const size_t i = sdm_part_audit_thinnest(audit);
+    if (i == audit->n || !sdm_too_thin(audit->part[i].thick, voxel)) return;
+    sdm_text text = {0};
+    cli_describe_thin(audit, i, voxel, &text);
+    if (!text.failed) cli_warn("%s", text.data);
+    sdm_text_dispose(&text);
+}
+
+static void warn_inside_out(const sdm_part_audit *audit, const char *mend)
 {
     size_t told = 0;
     for (size_t i = 0; i < audit->n && told < NOTICES; i++) {
@@ -184,11 +211,13 @@ static void warn_parts(const sdm_part_audit *audit, const char *mend)
         cli_warn("%zu more parts are inside out", audit->inside_out - told);
 }
 
-void cli_warn_parts(const sdm_mesh *mesh, const char *mend)
+void cli_warn_parts(const sdm_mesh *mesh, double voxel, const char *mend)
 {
     sdm_part_audit audit;
     if (sdm_part_audit_make(mesh, false, &audit, NULL)) return;
-    warn_parts(&audit, mend);
+    warn_open(&audit);
+    warn_inside_out(&audit, mend);
+    warn_thin(&audit, voxel);
     sdm_part_audit_dispose(&audit);
 }
 
@@ -197,7 +226,8 @@ void cli_warn_mesh(const sdm_mesh *mesh, const char *mend)
     sdm_part_audit audit;
     if (sdm_part_audit_make(mesh, false, &audit, NULL)) return;
     cli_warn_audit(&audit.mesh);
-    warn_parts(&audit, mend);
+    warn_open(&audit);
+    warn_inside_out(&audit, mend);
     sdm_part_audit_dispose(&audit);
 }
 

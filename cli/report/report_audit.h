@@ -24,6 +24,10 @@ void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text);
  * edge is, and what to do; nothing if the mesh is closed. */
 void cli_describe_open(const sdm_part_audit *a, sdm_text *text);
 
+/* Writes one line about part `index`, whose thickness is known and too small for voxels of this
+ * size (mm), to `text`: where it is, what becomes of it, and which spacing shows it. */
+void cli_describe_thin(const sdm_part_audit *a, size_t index, double voxel, sdm_text *text);
+
 /* Judges the mesh. SDM_E_MESH: it is not closed; SDM_E_QUALITY: parts are inside out and not turned
  * by the engine, or it encloses no volume. The message says what is wrong and what the user can do
  * (mend, for parts that are inside out). */
@@ -32,16 +36,23 @@ sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_erro
 /* "fine", "warning" or "broken", for the results of cli_audit_verdict(). */
 const char *cli_verdict_name(sdm_status verdict);
 
-/* Audits the parts of the mesh and warns of each of the first parts that are inside out and that
- * the engine does not turn. mend: what the user can do. Says nothing if the audit fails: the engine
- * reports that. */
-void cli_warn_parts(const sdm_mesh *mesh, const char *mend);
+/* Audits the parts of the mesh and warns of the part with most open edges, of each of the first
+ * parts that are inside out and that the engine does not turn, and of the thinnest part if it is
+ * too thin for voxels of this size (mm; 0: there is no grid). mend: what the user can do about an
+ * inside-out part. Says nothing if the audit fails: the engine reports that. */
+void cli_warn_parts(const sdm_mesh *mesh, double voxel, const char *mend);
 
-/* Warns of the defects of the mesh, as the two functions above together. */
+/* Warns of the defects of the mesh, as the two functions above together without a grid. */
 void cli_warn_mesh(const sdm_mesh *mesh, const char *mend);
 
 /* Turns the parts of the mesh that are inside out (--turn-parts) and says how many. */
 sdm_status cli_turn_parts(sdm_mesh *mesh, sdm_error *err);
+
+/* What is said of a part that is too thin. printf(): its thickness, the voxel, the spacing that
+ * shows it, mm */
+#define CLI_THIN_PART                                                                              \
+    "%.2g mm thick, too thin for voxels of %.2g mm: it will be missing or broken in surfaces; a "  \
+    "spacing of at most %.2g mm shows it"
 
 /* What to do about an inside-out part: of the mesh of a shape, and of a mesh file. */
 #define CLI_MEND_SHAPE "reverse the vertices of its triangles in mesh() of the shape"

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "report_audit.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/train.h"
 #include "terminal.h"
 
@@ -221,6 +222,28 @@ static void tell_cut(teller *t)
     tell(t, f->cut.shapes ? SDM_E_QUALITY : SDM_OK, &text);
 }
 
+/* One line about the thinnest part of the shape in which it is thinnest. */
+static void tell_thin(teller *t)
+{
+    const sdm_survey_count *c = &t->s->found.thin;
+    sdm_text text = {0};
+    sdm_mesh mesh = {0};
+    sdm_part_audit audit = {0};
+    if (!c->shapes) return;
+    if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
+        cli_describe_thin(&audit, sdm_part_audit_thinnest(&audit), sdm_grid_coarsest(t->s->grid),
+                          &text);
+        sdm_text_add(&text, " (at ");
+        add_params(t->s, c->worst, SIZE_MAX, &text);
+        sdm_text_add(&text, "; parts are too thin ");
+        add_share(t->s, c, &text);
+        sdm_text_add(&text, ")");
+        tell(t, SDM_E_QUALITY, &text);
+    }
+    sdm_part_audit_dispose(&audit);
+    sdm_mesh_dispose(&mesh);
+}
+
 /* One line if the vertices are hardly in mm. */
 static void tell_unit(teller *t)
 {
@@ -292,6 +315,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_jumps(&t);
     tell_unit(&t);
     tell_cut(&t);
+    tell_thin(&t);
     tell_callbacks(&t);
     tell_notes(&t);
     return t.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the findings") : SDM_OK;

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "report_audit.h"
+
 /* The part of the error with its share of the sum of all parts. */
 static void print_part(const sdm_verdict *v, sdm_cause cause, double sum, bool first)
 {
@@ -45,6 +47,9 @@ void cli_print_verdict(const sdm_verdict *v)
         printf("; not for the %.2g %% of the shapes that the grid cuts", fmin(99, 100 * v->cut));
     if (sdm_verdict_errs_far(v))
         printf("; not for distances far from the surface: wrong by up to %.2g mm", v->largest_mm);
+    if (sdm_too_thin(v->thickness_mm, v->coarse_mm))
+        printf("; not for its thinnest part, which is " CLI_THIN_PART, v->thickness_mm,
+               v->coarse_mm, 0.5 * v->thickness_mm);
     printf("\n");
     print_far(v);
     print_parts(v);

@@ -72,7 +72,7 @@ typedef struct sdm_shape { uint32_t abi; uint32_t size; const char *name; const 
 enum { SDM_MODEL_NAME_MAX = 64 };
 typedef struct sdm_model_param { char name[SDM_MODEL_NAME_MAX], unit[16]; double min, max, def; sdm_distribution distribution; } sdm_model_param;
 typedef struct sdm_accuracy { int64_t samples; double mse_mm2, rmse_mm, mae_mm, max_abs_mm; double rmse_near_mm; double q50_mm, q90_mm, q99_mm; double near_mm; } sdm_accuracy;
-typedef struct sdm_model_quality { char grade[16]; double cut; double between_mm; } sdm_model_quality;
+typedef struct sdm_model_quality { char grade[16]; double cut; double between_mm; double thickness_mm; } sdm_model_quality;
 typedef struct sdm_model_info { char shape[SDM_MODEL_NAME_MAX]; char kind[16]; char version[16]; size_t n_params; const sdm_model_param *params; size_t n_options; const char *const *option_names, *const *option_values; sdm_grid grid; sdm_accuracy accuracy; uint64_t seed; double train_seconds; int64_t train_samples; uint64_t checksum; size_t file_bytes, weight_bytes; double macs; const char *config; const char *folder; size_t fine_width; sdm_model_quality quality; } sdm_model_info;
 typedef struct sdm_model sdm_model;
 sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);

@@ -1,5 +1,5 @@
 /* Audits of the parts of a mesh: boxes whose volumes, unions and orientations are known.
- * Tests: part_audit.c */
+ * Tests: part_audit.c part_thickness.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -165,6 +165,46 @@ static void test_open_and_flat_parts(void **state)
     sdm_mesh_dispose(&m);
 }
 
+/* The thickness of a box is its shortest edge, also of the part of it that sticks out of another
+ * box, and of one that runs the wrong way. */
+static void test_thickness(void **state)
+{
+    (void)state;
+    for (int inside_out = 0; inside_out < 2; inside_out++) {
+        sdm_mesh m = {0};
+        add_box(&m, 0, 4, 2, inside_out);
+        add_box(&m, 3, 16, 0.25, inside_out);
+        sdm_part_audit a = audit_of(&m);
+        near(a.part[0].thick, 4);
+        near(a.part[1].thick, 0.5);
+        assert_int_equal(sdm_part_audit_thinnest(&a), 1);
+        assert_true(sdm_too_thin(a.part[1].thick, 0.36) && !sdm_too_thin(a.part[1].thick, 0.35));
+        sdm_part_audit_dispose(&a);
+        // a box that lies wholly in the first one has no surface of its own
+        add_box(&m, 1, 2, 0.125, inside_out);
+        a = audit_of(&m);
+        assert_int_equal(a.n, 3);
+        near(a.part[1].thick, 0.5);
+        sdm_part_audit_dispose(&a);
+        sdm_mesh_dispose(&m);
+    }
+    // a wall: a box with a cavity
+    sdm_mesh m = {0};
+    add_box(&m, 0, 4, 2, false);
+    add_box(&m, 1, 3, 1, true);
+    sdm_part_audit a = audit_of(&m);
+    assert_int_equal(a.part[1].state, SDM_PART_CAVITY);
+    near(a.part[0].thick, 1);
+    assert_true(isnan(a.part[1].thick));
+    sdm_part_audit_dispose(&a);
+    // an open mesh
+    m.n_tri--;
+    a = audit_of(&m);
+    assert_int_equal(sdm_part_audit_thinnest(&a), a.n);
+    sdm_part_audit_dispose(&a);
+    sdm_mesh_dispose(&m);
+}
+
 static void test_refusals(void **state)
 {
     (void)state;
@@ -195,6 +235,7 @@ int main(void)
         cmocka_unit_test(test_overlapping_parts),
         cmocka_unit_test(test_cavity_and_parts_apart),
         cmocka_unit_test(test_open_and_flat_parts),
+        cmocka_unit_test(test_thickness),
         cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -263,16 +263,17 @@ static void quality_is_kept(void **state)
     const size_t without = sdm_model_get_info(m)->file_bytes;
     assert_true(!*q->grade && isnan(q->cut) && isnan(q->between_mm));
     sdm_model_free(m);
-    t.info.quality = (sdm_model_quality){"poor", 0.25, NAN};
+    t.info.quality = (sdm_model_quality){"poor", 0.25, NAN, 0.5};
     m = toy_open(&t);
     q = &sdm_model_get_info(m)->quality;
     assert_string_equal(q->grade, "poor");
-    assert_true(q->cut == 0.25 && isnan(q->between_mm));
+    assert_true(q->cut == 0.25 && isnan(q->between_mm) && q->thickness_mm == 0.5);
     assert_true(sdm_model_get_info(m)->file_bytes > without);
     sdm_model_free(m);
     // an unknown grade and an impossible share are damage
-    const sdm_model_quality wrong[] = {{"fine", 0, 0}, {"good", 1.5, 0}, {"good", 0, -1}};
-    for (size_t i = 0; i < 3; i++) {
+    const sdm_model_quality wrong[] = {
+        {"fine", 0, 0, 1}, {"good", 1.5, 0, 1}, {"good", 0, -1, 1}, {"good", 0, 0, -1}};
+    for (size_t i = 0; i < 4; i++) {
         uint8_t *bytes;
         size_t size;
         t.info.quality = wrong[i];

@@ -186,8 +186,8 @@ static void a_grid_that_cuts(void **state)
 {
     (void)state;
     // the handle reaches to size + reach, at most 5 mm; the grid ends at x = 4
-    const int64_t n[3] = {11, 9, 9};
-    sdm_grid grid = sdm_grid_centred(n, 1, (const double[3]){-1, 0, 0});
+    const int64_t n[3] = {41, 33, 33};
+    sdm_grid grid = sdm_grid_centred(n, 0.25, (const double[3]){-1, 0, 0});
     sdm_shape_survey s = survey_with("none", &(sdm_survey_opts){.samples = 64, .grid = &grid});
     size_t cut = 0;
     for (size_t i = s.n_corners + 1; i < s.n; i++) cut += s.p[2 * i] + s.p[2 * i + 1] > 4;
@@ -203,6 +203,27 @@ static void a_grid_that_cuts(void **state)
     assert_int_equal(sdm_shape_survey_verdict(&s), SDM_OK);
     assert_true(s.p[0] == 2);
     sdm_shape_survey_dispose(&s);
+}
+
+// The handle is 0.5 mm thick, outside of the body as inside.
+static void a_grid_that_is_too_coarse(void **state)
+{
+    (void)state;
+    static const struct {
+        double spacing;
+        bool thin;
+    } cases[] = {{0.35, false}, {0.36, true}};
+    for (size_t i = 0; i < 2; i++) {
+        const sdm_grid grid = sdm_grid_centred((const int64_t[3]){60, 60, 60}, cases[i].spacing,
+                                               (const double[3]){0});
+        sdm_shape_survey s =
+            survey_with("none", &(sdm_survey_opts){.samples = 8, .grid = &grid, .brief = true});
+        assert_int_equal(s.cut.shapes, 0);
+        assert_int_equal(s.thin.shapes, cases[i].thin ? s.n : 0);
+        assert_true(!cases[i].thin || fabs(s.thin.amount - 0.72) < 1e-9);
+        assert_int_equal(sdm_shape_survey_verdict(&s), cases[i].thin ? SDM_E_QUALITY : SDM_OK);
+        sdm_shape_survey_dispose(&s);
+    }
 }
 
 static void threads_and_brief_surveys(void **state)
@@ -283,6 +304,7 @@ int main(void)
         cmocka_unit_test(breaks_along_a_parameter),
         cmocka_unit_test(callbacks),
         cmocka_unit_test(a_grid_that_cuts),
+        cmocka_unit_test(a_grid_that_is_too_coarse),
         cmocka_unit_test(threads_and_brief_surveys),
         cmocka_unit_test(refusals),
         cmocka_unit_test(built_in_shapes_pass),

@@ -103,12 +103,15 @@ static bool is_cut(const sdm_mesh *m, const sdm_grid *g)
     return false;
 }
 
-/* Adds 1 to *n if parts of the mesh are inside out and stay so. */
-static sdm_status count_inside_out(const sdm_mesh *m, size_t *n, sdm_error *err)
+/* Adds 1 to *n if parts of the mesh are inside out and stay so; lowers *thickness to that of the
+ * thinnest part. */
+static sdm_status check_parts(const sdm_mesh *m, size_t *n, double *thickness, sdm_error *err)
 {
     sdm_part_audit audit = {0};
     const sdm_status s = sdm_part_audit_make(m, false, &audit, err);
     *n += !s && audit.inside_out;
+    const size_t thinnest = sdm_part_audit_thinnest(&audit);
+    if (thinnest < audit.n) *thickness = fmin(*thickness, audit.part[thinnest].thick);
     sdm_part_audit_dispose(&audit);
     return s;
 }
@@ -120,6 +123,7 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
     surface_sums sums = {0};
     sdm_mesh mesh = {0};
     float *map = NULL;
+    double thickness = NAN; // fmin() ignores NaN
     size_t cut = 0, compared = 0, inside_out = 0;
     sdm_status s = SDM_ALLOC(&map, sdm_grid_count(d->grid), "surface", err);
     for (size_t i = 0; i < d->n_holdout && !s; i++) {
@@ -127,7 +131,7 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
         s = sdm_instance_mesh(d->shape, d->holdout_params + i * d->n_params, &mesh, err);
         if (!s) cut += is_cut(&mesh, d->grid);
         if (s || i >= SHAPES) continue;
-        s = count_inside_out(&mesh, &inside_out, err);
+        s = check_parts(&mesh, &inside_out, &thickness, err);
         compared++;
         if (!s) s = sdm_exact_create(&mesh, &opts, &e, err);
         if (!s) s = check_surface(d, e, i, map, &sums, err);
@@ -137,6 +141,7 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
     sdm_free(map);
     *out = (surface_check){.rms_mm = sums.n > 0 ? sqrt(sums.square / sums.n) : NAN,
                            .thin = sums.n > 0 ? sums.thin / sums.n : NAN,
+                           .thickness_mm = thickness,
                            .cut = d->n_holdout ? (double)cut / (double)d->n_holdout : 0,
                            .inside_out = compared ? (double)inside_out / (double)compared : 0};
     return s;

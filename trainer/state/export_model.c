@@ -334,7 +334,7 @@ void trainer_export_path(const trainer *t, char path[SDM_PATH_TEXT_MAX])
 /* What the model file keeps of the verdict. */
 static void set_quality(const sdm_verdict *v, sdm_model_quality *q)
 {
-    *q = (sdm_model_quality){"", v->cut, sqrt(v->part_mm2[SDM_CAUSE_GRID])};
+    *q = (sdm_model_quality){"", v->cut, sqrt(v->part_mm2[SDM_CAUSE_GRID]), v->thickness_mm};
     snprintf(q->grade, sizeof q->grade, "%s", sdm_grade_name(v->grade));
 }
 

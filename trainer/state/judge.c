@@ -9,6 +9,7 @@
 #include "data/surface_check.h"
 #include "history.h"
 #include "progress.h"
+#include "sdm/internal/shape_box.h"
 
 /* If the last third of the steps took away more of the error than this, more steps help. */
 static const double STILL_FALLING = 0.1;
@@ -276,7 +277,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
 {
     error_measures m = {
         .network = {NAN, NAN}, .bases = {NAN, NAN}, .modes = NAN, .motion_mm = NAN, .warp_mm = NAN};
-    surface_check surface = {NAN, NAN, 0, 0};
+    surface_check surface = {NAN, NAN, NAN, 0, 0};
     history h = {0};
     const dataset *d = &t->data;
     sdm_status s = t->kind->parts(t, &m, err);
@@ -299,6 +300,8 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                          .motion_mm = m.motion_mm,
                          .warp_mm = m.warp_mm,
                          .thin = surface.thin,
+                         .thickness_mm = surface.thickness_mm,
+                         .coarse_mm = sdm_grid_coarsest(d->grid),
                          .cut = surface.cut,
                          .inside_out = surface.inside_out,
                          .saved_seconds = t->saved_seconds,

@@ -66,6 +66,7 @@ void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
     sdm_json_real(j, "motion_mm", v->motion_mm);
     sdm_json_real(j, "warp_mm", v->warp_mm);
     sdm_json_real(j, "thin", v->thin);
+    sdm_json_real(j, "thickness_mm", v->thickness_mm);
     sdm_json_real(j, "cut", v->cut);
     sdm_json_real(j, "inside_out", v->inside_out);
     sdm_json_real(j, "fall", v->fall);

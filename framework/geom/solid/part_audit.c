@@ -6,12 +6,16 @@
 #include <math.h>
 #include <string.h>
 
+#include "part_thickness.h"
 #include "parts.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 #include "union_hull.h"
 
 #define NO_PART UINT32_MAX
+
+/* Thicknesses are measured of at most so many parts: the debris of a segmentation has many. */
+enum { MEASURED = 1000 };
 
 /* The state of an audit. */
 typedef struct job {
@@ -51,7 +55,8 @@ static sdm_status number_parts(job *j, sdm_error *err)
                 a->part[a->n++] = (sdm_part){.first_tri = t,
                                              .first_vert = SIZE_MAX,
                                              .min = {INFINITY, INFINITY, INFINITY},
-                                             .max = {-INFINITY, -INFINITY, -INFINITY}};
+                                             .max = {-INFINITY, -INFINITY, -INFINITY},
+                                             .thick = NAN};
             }
         }
     }
@@ -196,6 +201,14 @@ static sdm_status find_parts(job *j, sdm_error *err)
     return SDM_OK;
 }
 
+static sdm_status measure_thickness(job *j, sdm_error *err)
+{
+    sdm_part_audit *a = j->out;
+    if (!a->mesh.closed) return SDM_OK;
+    return sdm_part_thickness(&j->turned, &j->survey.tree, j->part_of, a->part,
+                              a->n < MEASURED ? a->n : MEASURED, err);
+}
+
 static void job_dispose(job *j)
 {
     sdm_arena_dispose(&j->arena);
@@ -211,6 +224,7 @@ sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audi
     *out = (sdm_part_audit){.union_volume = NAN, .union_area = NAN};
     job j = {.given = m, .out = out};
     sdm_status s = find_parts(&j, err);
+    if (!s) s = measure_thickness(&j, err);
     if (!s && with_union) s = measure_union(&j, err);
     job_dispose(&j);
     if (s) sdm_part_audit_dispose(out);
@@ -221,6 +235,16 @@ void sdm_part_audit_dispose(sdm_part_audit *a)
 {
     sdm_free(a->part);
     *a = (sdm_part_audit){0};
+}
+
+size_t sdm_part_audit_thinnest(const sdm_part_audit *a)
+{
+    size_t thinnest = a->n;
+    for (size_t i = 0; i < a->n; i++)
+        if (isfinite(a->part[i].thick) &&
+            (thinnest == a->n || a->part[i].thick < a->part[thinnest].thick))
+            thinnest = i;
+    return thinnest;
 }
 
 sdm_status sdm_mesh_turn_parts(sdm_mesh *m, size_t *n, sdm_error *err)

@@ -41,6 +41,9 @@ typedef struct sdm_model_quality {
     /* Between the voxels: how far exact maps, interpolated linearly, miss the surface of held-out
        shapes, root mean square, mm. sdm_accuracy holds errors at the voxels only. */
     double between_mm;
+    /* thickness of the thinnest part of a few held-out shapes, mm; NaN: not known. Surfaces on
+       voxels larger than about 0.7 of it lack such a part, or show it broken. */
+    double thickness_mm;
 } sdm_model_quality;
 
 /* Description of a model. All pointers stay valid until sdm_model_free(); texts are

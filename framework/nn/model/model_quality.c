@@ -11,21 +11,24 @@ void sdm_quality_describe(const sdm_model_quality *q, sdm_text *t)
     sdm_text_add(t, "grade=%s\n", q->grade);
     if (!isnan(q->cut)) sdm_text_add_real(t, "cut", q->cut);
     if (!isnan(q->between_mm)) sdm_text_add_real(t, "between_mm", q->between_mm);
+    if (!isnan(q->thickness_mm)) sdm_text_add_real(t, "thickness_mm", q->thickness_mm);
 }
 
 sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sdm_error *err)
 {
     static const char *const grades[] = {"good", "usable", "poor"};
-    *q = (sdm_model_quality){"", NAN, NAN};
+    *q = (sdm_model_quality){"", NAN, NAN, NAN};
     if (!section) return SDM_OK;
     sdm_lines r = {.at = section->data};
     r.end = r.at + section->size;
     sdm_lines_text(&r, "grade", q->grade, sizeof q->grade);
     if (sdm_lines_next_is(&r, "cut")) q->cut = sdm_lines_real(&r, "cut");
     if (sdm_lines_next_is(&r, "between_mm")) q->between_mm = sdm_lines_real(&r, "between_mm");
+    if (sdm_lines_next_is(&r, "thickness_mm")) q->thickness_mm = sdm_lines_real(&r, "thickness_mm");
     bool known = false;
     for (size_t i = 0; i < sizeof grades / sizeof *grades; i++)
         known = known || !strcmp(q->grade, grades[i]);
-    if (!known || q->cut < 0 || q->cut > 1 || q->between_mm < 0) r.failed = true;
+    if (!known || q->cut < 0 || q->cut > 1 || q->between_mm < 0 || q->thickness_mm < 0)
+        r.failed = true;
     return sdm_lines_check(&r, err);
 }

@@ -24,6 +24,7 @@ typedef struct finding {
     uint64_t crc_vert, crc_tri;
     size_t open, inside_out, turned, overlaps, degenerate, duplicate;
     double volume, area, min[3], max[3];
+    double thick;        /* of the thinnest part, mm; NaN: not known */
     double beyond[3][2]; /* mm */
 } finding;
 
@@ -78,6 +79,8 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
         out->open += audit.part[i].open_edges;
         out->turned += audit.part[i].turned && audit.part[i].volume < 0;
     }
+    const size_t thinnest = sdm_part_audit_thinnest(&audit);
+    out->thick = thinnest < audit.n ? audit.part[thinnest].thick : NAN;
     out->inside_out = audit.inside_out;
     out->overlaps = audit.mesh.self_intersections;
     out->degenerate = audit.mesh.degenerate;
@@ -172,6 +175,11 @@ static void count_beyond(sdm_shape_survey *s, size_t i, const finding *f)
     if (i > s->n_corners) count(&s->cut, i, most);
 }
 
+static void count_thin(sdm_shape_survey *s, size_t i, double thick, double voxel)
+{
+    if (sdm_too_thin(thick, voxel)) count(&s->thin, i, voxel / thick);
+}
+
 static void spread(double range[2], double x)
 {
     range[0] = fmin(range[0], x); // fmin() and fmax() ignore NaN
@@ -214,6 +222,7 @@ static void sum_up(survey *v)
             s->high[a] = fmax(s->high[a], f->max[a]);
         }
         count_beyond(s, i, f);
+        if (v->opts->grid) count_thin(s, i, f->thick, sdm_grid_coarsest(v->opts->grid));
     }
     double sum = 0;
     for (int a = 0; a < 3; a++) sum += (s->high[a] - s->low[a]) * (s->high[a] - s->low[a]);
@@ -413,8 +422,8 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
 {
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
     bool bad = s->inside_out.shapes || (s->turned.shapes && s->turned.shapes < s->n) ||
-               s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->unlike ||
-               s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
+               s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->thin.shapes ||
+               s->unlike || s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
                s->scale.odd_speed;
     for (size_t k = 0; k < s->n_params && s->jump; k++)
         bad = bad || s->jump[k].kind != SDM_BREAK_NONE;

@@ -37,6 +37,11 @@ typedef struct sdm_part {
     double min[3], max[3]; /* bounding box, mm */
     bool turned;           /* the engine reverses its triangles, alone or with the whole mesh */
     sdm_part_state state;
+    /* thickness, mm: one in ten of the chords through the union, from points of this part's surface
+     * against the normal, is shorter. Where another part takes over, chords go on through it. NaN:
+     * the mesh is open, the part is not solid or lies inside others, or it is not one of the first
+     * 1000 parts. */
+    double thick;
 } sdm_part;
 
 /* Zero-initialise; sdm_part_audit_dispose() frees. */
@@ -57,6 +62,14 @@ typedef struct sdm_part_audit {
 sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audit *out,
                                sdm_error *err);
 void sdm_part_audit_dispose(sdm_part_audit *a);
+
+/* Index of the part with the smallest thickness; a->n: none is known. */
+size_t sdm_part_audit_thinnest(const sdm_part_audit *a);
+
+/* Is a part so thin that it is missing or broken in the surface of a map with voxels of this size
+ * (mm)? A tube along an axis of the grid passes between the voxel centres if it is thinner than
+ * sqrt(2) voxels. false if the thickness is NaN. */
+static inline bool sdm_too_thin(double thick, double voxel) { return thick < 1.4142 * voxel; }
 
 /* Orients the parts of the mesh: reverses those that the engine would turn and those of the state
  * SDM_PART_INSIDE_OUT, so that every closed part is solid or a cavity. *n = number of parts

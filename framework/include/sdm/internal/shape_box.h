@@ -27,6 +27,15 @@ sdm_status sdm_shape_box(const sdm_instance *shape, const double (*range)[2], si
  * distance below the first voxel (side 0) and above the last one (side 1). [any thread] */
 double sdm_grid_beyond(const sdm_grid *g, const double x[3], double beyond[3][2]);
 
+/* The largest spacing of the grid, mm. */
+static inline double sdm_grid_coarsest(const sdm_grid *g)
+{
+    double most = g->spacing[0];
+    for (int i = 1; i < 3; i++)
+        if (g->spacing[i] > most) most = g->spacing[i];
+    return most;
+}
+
 /* Voxels between the box and the boundary of the grid. */
 #define SDM_GRID_MARGIN 3
 

@@ -89,6 +89,9 @@ typedef struct sdm_shape_survey {
 
     /* the samples whose vertices lie beyond the centres of the outer voxels; amount: mm beyond */
     sdm_survey_count cut;
+    /* shapes with a part that is too thin for the grid (part_audit.h); amount: the largest spacing
+     * of the grid, in thicknesses of the part */
+    sdm_survey_count thin;
     double beyond[3][2]; /* mm, of all shapes: below the first and above the last voxel of each axis
                             of the grid; 0: not beyond */
 
@@ -118,8 +121,8 @@ size_t sdm_survey_samples(const sdm_instance *shape, size_t samples);
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
  * are usable, but a training or derivatives would suffer: parts that are inside out (at some of the
  * parameters also those that the engine turns), sizes, triangles or vertices that jump, a grid that
- * cuts, wrong velocities, results that differ from call to call, or an odd size or speed (another
- * unit than mm). Else SDM_OK. */
+ * cuts or is too coarse for a part, wrong velocities, results that differ from call to call, or an
+ * odd size or speed (another unit than mm). Else SDM_OK. */
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 
 /* velocity_error above this is wrong. */

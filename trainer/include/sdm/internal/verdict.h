@@ -60,8 +60,10 @@ typedef struct sdm_verdict {
     double motion_mm, warp_mm; /* `template`: frames and amplitudes, and warp, at the vertices */
     double thin; /* fraction of the surface where the shape is thinner than two voxels or has an
                     edge */
-    double cut;  /* fraction of the held-out shapes whose surfaces leave the grid: there they end
-                    open */
+    double thickness_mm; /* of the thinnest part of a few held-out shapes; NaN: not known */
+    double coarse_mm;    /* largest spacing of the grid */
+    double cut; /* fraction of the held-out shapes whose surfaces leave the grid: there they end
+                   open */
     /* fraction of a few held-out shapes with parts that are inside out and overlap others */
     double inside_out;
     double saved_seconds; /* that train.patience has saved */

@@ -1,0 +1,158 @@
+/* Measures the thickness of the parts of a mesh by chords: rays from points of the surface, against
+ * the normal, to the wall of the union on the other side. */
+#include "part_thickness.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "sdm/internal/vec3.h"
+#include "sdm/memory.h"
+
+enum { CHORDS = 64, CHORDS_MIN = 8, CROSSINGS_MAX = 128 };
+
+/* The thickness is the chord at this share of the chords, from the shortest. Shorter chords belong
+ * to edges and tips, which every solid has. */
+static const double SHARE = 0.1;
+
+/* A place where a ray crosses the surface. */
+typedef struct crossing {
+    double at; /* along the ray, mm */
+    int step;  /* of the winding number: -1 where the ray leaves, 1 where it enters */
+} crossing;
+
+typedef struct ray {
+    double from[3], dir[3]; /* dir: a unit vector */
+    uint32_t triangle;      /* on which it begins */
+    crossing found[CROSSINGS_MAX];
+    size_t n;      /* of all crossings, also of those without a place in found[] */
+    int64_t inner; /* winding number just behind `from` */
+} ray;
+
+/* The chords of one part. */
+typedef struct chords {
+    double area; /* of its triangles so far, mm^2 */
+    size_t tried, n;
+    double length[CHORDS]; /* [n] mm */
+} chords;
+
+static bool meets_box(const ray *r, const sdm_bvh_node *node)
+{
+    double first = 0, last = INFINITY;
+    for (int d = 0; d < 3; d++) {
+        const double a = (node->lo[d] - r->from[d]) / r->dir[d],
+                     b = (node->hi[d] - r->from[d]) / r->dir[d];
+        first = fmax(first, fmin(a, b)); // fmin() and fmax() ignore NaN
+        last = fmin(last, fmax(a, b));
+    }
+    return first <= last;
+}
+
+static const double *corner(const sdm_mesh *m, size_t t, size_t c)
+{
+    return m->vert + 3 * (size_t)m->tri[3 * t + c];
+}
+
+/* Adds the crossing with triangle t, if there is one (Moeller and Trumbore 1997). */
+static void cross(ray *r, const sdm_mesh *m, uint32_t t)
+{
+    double u[3], v[3], w[3], p[3], q[3];
+    v3_sub(corner(m, t, 1), corner(m, t, 0), u);
+    v3_sub(corner(m, t, 2), corner(m, t, 0), v);
+    v3_sub(r->from, corner(m, t, 0), w);
+    v3_cross(r->dir, v, p);
+    v3_cross(w, u, q);
+    const double det = v3_dot(u, p), a = v3_dot(w, p) / det, b = v3_dot(r->dir, q) / det,
+                 at = v3_dot(v, q) / det;
+    if (t == r->triangle || !(det != 0 && a >= 0 && b >= 0 && a + b <= 1 && at > 0)) return;
+    // det > 0: the triangle faces the origin of the ray
+    const int step = det > 0 ? 1 : -1;
+    r->inner -= step; // the winding number is 0 at the end of the ray
+    if (r->n < CROSSINGS_MAX) r->found[r->n] = (crossing){at, step};
+    r->n++;
+}
+
+static void follow(ray *r, const sdm_mesh *m, const sdm_bvh *tree)
+{
+    uint32_t stack[SDM_BVH_DEPTH + 2];
+    size_t n = 0;
+    stack[n++] = 0;
+    while (n) {
+        const sdm_bvh_node *node = &tree->node[stack[--n]];
+        if (!meets_box(r, node)) continue;
+        for (uint32_t i = 0; i < node->count; i++) cross(r, m, tree->order[node->first + i]);
+        if (node->count) continue;
+        stack[n++] = node->first;
+        stack[n++] = node->first + 1;
+    }
+}
+
+static int by_place(const void *a, const void *b)
+{
+    const double x = ((const crossing *)a)->at, y = ((const crossing *)b)->at;
+    return (x > y) - (x < y);
+}
+
+/* The way from the origin to the first place outside the union, mm; NaN: the origin does not lie on
+ * the surface of the union. */
+static double chord(ray *r)
+{
+    int64_t winding = r->inner;
+    if (winding != 1 || r->n > CROSSINGS_MAX) return NAN;
+    qsort(r->found, r->n, sizeof *r->found, by_place);
+    for (size_t i = 0; i < r->n; i++) {
+        winding += r->found[i].step;
+        if (winding <= 0) return r->found[i].at;
+    }
+    return NAN;
+}
+
+/* Starts chord number k in triangle t, whose normal is n[3]. The places follow the golden ratio, so
+ * that no ray meets an edge on the other side of a symmetric part. */
+static void add_chord(const sdm_mesh *m, const sdm_bvh *tree, uint32_t t, const double n[3],
+                      chords *c)
+{
+    const double length = v3_norm(n), x = fmod(0.754877666 * (double)(c->tried + 1), 1),
+                 y = fmod(0.569840291 * (double)(c->tried + 1), 1), root = sqrt(x),
+                 share[3] = {1 - root, root * (1 - y), root * y};
+    ray r = {.triangle = t};
+    for (size_t d = 0; d < 3; d++) {
+        for (size_t k = 0; k < 3; k++) r.from[d] += share[k] * corner(m, t, k)[d];
+        r.dir[d] = -n[d] / length;
+    }
+    c->tried++;
+    follow(&r, m, tree);
+    const double mm = chord(&r);
+    if (mm > 0) c->length[c->n++] = mm;
+}
+
+static int by_length(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+sdm_status sdm_part_thickness(const sdm_mesh *m, const sdm_bvh *tree, const uint32_t *part_of,
+                              sdm_part *parts, size_t n, sdm_error *err)
+{
+    chords *of = NULL;
+    const sdm_status s = SDM_ALLOC(&of, n, "thicknesses of parts", err);
+    if (s) return s;
+    for (uint32_t t = 0; t < m->n_tri; t++) {
+        const uint32_t i = part_of[t];
+        if (i >= n || parts[i].state != SDM_PART_SOLID) continue;
+        double normal[3];
+        v3_triangle_normal(corner(m, t, 0), corner(m, t, 1), corner(m, t, 2), normal);
+        of[i].area += 0.5 * v3_norm(normal);
+        // chord k begins where the sum of the areas passes (k + 1/2) / CHORDS of the whole
+        while (of[i].tried < CHORDS &&
+               CHORDS * of[i].area > ((double)of[i].tried + 0.5) * parts[i].area)
+            add_chord(m, tree, t, normal, &of[i]);
+    }
+    for (size_t i = 0; i < n; i++) {
+        if (of[i].n < CHORDS_MIN) continue;
+        qsort(of[i].length, of[i].n, sizeof *of[i].length, by_length);
+        parts[i].thick = of[i].length[(size_t)(SHARE * (double)of[i].n)];
+    }
+    sdm_free(of);
+    return SDM_OK;
+}

@@ -11,7 +11,8 @@ say() { printf '\n== %s\n' "$*"; }
 missing_packages() {
     local name
     for name in "${packages[@]}"; do
-        [ "$(dpkg-query -W -f '${db:Status-Status}' "$name" 2>/dev/null || true)" = installed ] || printf '%s ' "$name"
+        # one line for each architecture of the package
+        dpkg-query -W -f '${db:Status-Status}\n' "$name" 2>/dev/null | grep -qx installed || printf '%s ' "$name"
     done
 }
 

@@ -156,7 +156,7 @@ static void notice_start(const cli_fit *f, const double centre[3])
                    "or --rotation make the search shorter",
                    f->opts.n_turns, at);
     else if (!given && f->target.kind == SDM_FIT_IMAGE)
-        cli_notice("no start pose is given: the shape starts in the %s", at);
+        cli_notice("no start centre is given: the shape starts in the %s", at);
 }
 
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err)

@@ -109,7 +109,7 @@ within rx 3.5 4
 expect 0 - sdmgen phantom --shape cochlea --random-params --random-pose 20,1 --spacing 0.3 --seed 111 -o small.nii --label small-label.nii --quiet
 expect 0 - sdmgen fit --shape cochlea small.nii --spacing 0.4 --start-centre 0.6,1,1.3 --start-axis 0,0,1 --eps 1e-3 --reference small-label.nii --json
 awk -v d="$(json dice)" 'BEGIN { exit !(d > 0.95) }' || bad "another turn was found: Dice $(json dice)"
-expect 0 'no start pose is given.*20.*-30.*10' sdmgen fit $fit ct.nii.gz --turns-sphere 3 --spacing 0.5 --json
+expect 0 'no start centre is given.*20.*-30.*10' sdmgen fit $fit ct.nii.gz --turns-sphere 3 --spacing 0.5 --json
 awk -v d="$(json evidence)" 'BEGIN { exit !(d > 0) }' || bad "evidence $(json evidence)"
 
 sdmgen fit $fit label.nrrd --label 1 --spacing 0.8 --max-iterations 1 >out 2>err

@@ -29,3 +29,11 @@ function(sdm_part name)
   target_include_directories(${name} PUBLIC ${PART_INCLUDE} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE sdm_flags PUBLIC ${PART_LINK})
 endfunction()
+
+# gcc 12.2 for 64-bit ARM fails ("internal compiler error: in vect_transform_reduction") on loops that
+# compute the maximum of differences. The options of a source file with such a loop; empty elsewhere.
+set(SDM_MAXIMUM_LOOP)
+if(CMAKE_C_COMPILER_ID STREQUAL GNU AND CMAKE_C_COMPILER_VERSION VERSION_LESS 12.3 AND
+   CMAKE_SYSTEM_PROCESSOR STREQUAL aarch64)
+  set(SDM_MAXIMUM_LOOP -fno-tree-loop-vectorize)
+endif()

@@ -1,5 +1,4 @@
 /* Reads and checks the table of a cohort: its columns and the ids of the cases. */
-#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,16 +7,13 @@
 #include "cohort.h"
 #include "report/output.h"
 #include "sdm/memory.h"
+#include "slicer/slicer.h"
 
 /* Options of `fit` that concern the whole run; a table must not load code (--plugin). */
-static const char *const of_the_run[] = {"cases",    "part",   "claim",   "json", "quiet",
-                                         "progress", "plugin", "threads", "help", "max-memory"};
-
 static bool is_of_the_run(const char *name)
 {
-    for (size_t i = 0; i < sizeof of_the_run / sizeof *of_the_run; i++)
-        if (!strcmp(name, of_the_run[i])) return true;
-    return false;
+    return slicer_has_word("cases part claim json quiet progress plugin threads help max-memory",
+                           name);
 }
 
 /* ---- columns ---- */

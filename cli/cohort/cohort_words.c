@@ -9,6 +9,7 @@
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/heap.h"
 #include "sdm/volume.h"
+#include "slicer/slicer.h"
 
 /* ---- lists of words ---- */
 
@@ -56,25 +57,20 @@ static sdm_status list(cli_list *l, const char *item, sdm_error *err)
 
 /* ---- options ---- */
 
-static bool is_one_of(const cli_option *o, const char *names) // separated by spaces
+static bool is_input(const cli_option *o)
 {
-    const size_t length = strlen(o->name);
-    for (const char *at = strstr(names, o->name); at; at = strstr(at + 1, o->name))
-        if ((at == names || at[-1] == ' ') && (at[length] == ' ' || !at[length])) return true;
-    return false;
+    return slicer_has_word("reference start-points plugin", o->name);
 }
-
-static bool is_input(const cli_option *o) { return is_one_of(o, "reference start-points plugin"); }
 
 static bool is_output(const cli_option *o)
 {
-    return is_one_of(o, "output label-out returnparameterfile");
+    return slicer_has_word("output label-out returnparameterfile", o->name);
 }
 
-/* Options that do not change the result, or belong to the run. */
+/* Options that belong to the run. */
 static bool is_of_no_case(const cli_option *o)
 {
-    return is_one_of(o, "cases part claim json quiet progress");
+    return slicer_has_word("cases part claim json quiet progress", o->name);
 }
 
 /* base/name, or name where it is absolute or `base` is empty. */
@@ -94,7 +90,8 @@ static sdm_status add_value(cli_words *w, const char *out, const char *id, const
                             const cli_option *o, const char *value, sdm_error *err)
 {
     char begin[CLI_CASE_PATH_MAX], folder[CLI_CASE_PATH_MAX];
-    if (!is_one_of(o, "threads max-memory")) sdm_text_add(&w->settings, "%s=%s\n", o->name, value);
+    if (!slicer_has_word("threads max-memory", o->name))
+        sdm_text_add(&w->settings, "%s=%s\n", o->name, value);
     snprintf(begin, sizeof begin, "--%s%s", o->name, o->kind == CLI_FLAG ? "" : "=");
     if (o->kind == CLI_FLAG) return add(w, begin, "", "", err) ? SDM_OK : SDM_E_NOMEM;
     if (is_output(o)) {

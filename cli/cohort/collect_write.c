@@ -41,13 +41,15 @@ void cli_collect_json(const cli_collect *t, sdm_json *json)
         if (row->state != CLI_CASE_MISSING) sdm_json_int(json, "exit_code", row->exit_code);
         sdm_json_text(json, "verdict", row->verdict);
         sdm_json_text(json, "outliers", outliers_of(row));
+        sdm_json_text(json, "reason", row->reason);
+        sdm_json_open(json, "figures", '{');
         for (size_t k = 0; k < t->n_columns; k++) {
             char name[120];
             snprintf(name, sizeof name, "%s%s", t->columns[k].name,
                      t->columns[k].is_sd ? "_sd" : "");
             sdm_json_real(json, name, t->values[i * t->n_columns + k]);
         }
-        sdm_json_text(json, "reason", row->reason);
+        sdm_json_close(json, '}');
         sdm_json_close(json, '}');
     }
     sdm_json_close(json, ']');

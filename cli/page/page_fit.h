@@ -33,7 +33,7 @@ typedef struct cli_page_fit {
 /* Takes the JSON of a fit, text[size] with a zero byte behind it, and finds the files that it
  * names: from the working folder or beside `name`. SDM_E_FORMAT: it is no result of a fit;
  * SDM_E_UNSUPPORTED: a fit without a model; SDM_E_IO: the model is gone. */
-sdm_status cli_page_fit_take(const char *name, char *text, size_t size, cli_page_fit *out,
+sdm_status cli_page_fit_take(const char *name, char *text, size_t size, cli_page_fit *f,
                              sdm_error *err);
 
 /* Computes the maps at the estimate, samples the image if it is there, and packs them. shape: of

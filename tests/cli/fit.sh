@@ -5,11 +5,12 @@
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 
-# Removes lines of progress from stderr; they appear only when the machine is slow.
+# Removes lines of progress from stderr, which appear only when the machine is slow, and the notice about the tissues, which all fits to
+# images give here.
 sdmgen() {
     "$program" "$@" 2>raw
     local code=$?
-    grep -Ev '^sdmgen: (search|fit|polish) [0-9]+ %' raw >&2
+    grep -Ev '^sdmgen: (search|fit|polish) [0-9]+ %|of which the default is fluid in bone' raw >&2
     return $code
 }
 

@@ -69,7 +69,7 @@ sdmgen fit $shape points.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>
 grep -q 'lengths are mm' err && bad "millimetres: $(cat err)"
 # degrees where radians are wanted, and fewer points than unknowns
 expect 2 "--rotation '0,0,90': need three numbers X,Y,Z in radians, .* \(90 degrees are 1.5708\)" sdmgen fit $shape points.csv --rotation 0,0,90
-expect 4 'points.csv: 4 points cannot determine [6-9] unknowns' sdmgen fit $shape points.csv --rotation 0,0,0 --quiet
+expect 4 'points.csv: [0-4] points on the surface cannot determine [6-9] unknowns' sdmgen fit $shape points.csv --rotation 0,0,0 --quiet
 # options have the names of the command line
 sdmgen fit $shape image.nii --rotation 0,0,0 --spacing 0.8 --max-iterations 1 --quiet >out 2>err
 grep -q -- '(--max-iterations)' err || bad "no option in: $(cat err)"

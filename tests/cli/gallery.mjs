@@ -11,7 +11,7 @@ function check(fine, text) {
 }
 
 const browser = startBrowser(argv[2]);
-for (const [name, values] of [['linkage', { q1: 0.5 }], ['statistical', { m1: 0.5 }], ['gear', { radius: 3.75 }]]) {
+for (const [name, values] of [['linkage', { q1: 0.5 }], ['statistical', { m1: 0.5 }], ['cochlea', { a: 3.5 }]]) {
   const page = await browser.open(`pages/${name}.html`, { features: [{ name: 'prefers-reduced-motion', value: 'reduce' }] });
   const { bits, filled } = await page.evaluate(`(async () => {
     for (let i = 0; i < 1200 && !(window.sdmgen?.map() && document.body.classList.contains('ready')); i++) await new Promise(done => setTimeout(done, 50));

@@ -32,6 +32,6 @@ if [ -z "$chromium" ] || ! command -v node >/dev/null; then
 fi
 "$baseline" pages/runs/linkage/model.sdm linkage.npy q1=0.5 >/dev/null
 "$baseline" pages/runs/statistical/model.sdm statistical.npy m1=0.5 >/dev/null
-"$baseline" pages/runs/gear/model.sdm gear.npy radius=3.75 >/dev/null
+"$baseline" pages/runs/cochlea/model.sdm cochlea.npy a=3.5 >/dev/null
 node --no-warnings "$source_folder/tests/cli/gallery.mjs" "$chromium" || bad 'the gallery in the browser: see above'
 finish

@@ -16,13 +16,13 @@ documented() {
     "$@" >out 2>err || bad "$*: exit code $? ($(cat err))"
     [ -n "$(words "$row")" ] || bad "no row '$row'"
     { words "$row" && words 'all'; } | sort -u >known
-    sed -E 's/"(parameters|parameters_sd|options|at)": *\{[^}]*\}/"\1": 0/g' out | grep -oE '"[A-Za-z_0-9]+": ' | tr -d '": ' | sort -u >printed
+    sed -E 's/"(parameters|parameters_sd|options|at|figures)": *\{[^}]*\}/"\1": 0/g' out | grep -oE '"[A-Za-z_0-9]+": ' | tr -d '": ' | sort -u >printed
     [ "$(wc -l <printed)" -ge 3 ] || bad "$*: few keys: $(cat out)"
     [ -z "$(comm -13 known printed)" ] || bad "not in the row '$row' of docs/command-line.md: $(comm -13 known printed | tr '\n' ' ')"
 }
 
 model=$source_folder/tests/golden/pod_f32.sdm
-documented exact sdmgen exact --shape torus --size 12,12,8 --certify --json -o map.nrrd
+documented exact sdmgen exact --shape torus --size 12,12,8 --certify --measure --json -o map.nrrd
 volume=$(json volume_mm3)
 documented 'info of an image' sdmgen info map.nrrd --json
 near "$(json volume_mm3)" "$volume" 1e-9
@@ -35,11 +35,14 @@ documented shapes sdmgen shapes --json
 documented 'shapes NAME' sdmgen shapes cochlea --json
 documented 'shapes new' sdmgen shapes new knob --json
 documented 'shapes check' sdmgen shapes check torus --samples 4 --json
-documented generate sdmgen generate "$model" --json
+documented generate sdmgen generate "$model" --measure --json
 documented verify sdmgen verify map.nrrd --json
 documented phantom sdmgen phantom --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 --spacing 0.8 -o ct.nii --label label.nii --json
 sdmgen info ct.nii --json | grep -q volume_mm3 && bad 'an image of a scanner has a volume'
-documented fit sdmgen fit --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 label.nii --label 1 --rotation 0,0,0 --spacing 0.8 --json
+documented fit sdmgen fit --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 label.nii --label 1 --rotation 0,0,0 --spacing 0.8 --measure --json
+printf 'id,image,label\na,label.nii,1\n' >cohort.csv
+documented 'fit --cases' sdmgen fit --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 --rotation 0,0,0 --spacing 0.8 --cases cohort.csv -o cohort --json
+documented collect sdmgen collect cohort --json
 for rx in 2 3 4; do sdmgen mesh --shape ellipsoid -O edge=1 -p rx=$rx -o m$rx.ply -q; done
 mkdir meshes && mv m?.ply meshes
 documented 'import ssm, info of a shape model' sdmgen import ssm meshes -o model.ssm --json

@@ -55,7 +55,7 @@ near "$(measure length_wall value)" "$expected" 1e-9
 # fit: the deviations of a ball-like shape are those of its half axes
 shape='--shape ellipsoid -O edge=0.6'
 expect 0 - sdmgen phantom $shape -p rx=3.5 -p ry=2.5 -p rz=2 --rotation 0.1,-0.2,0.3 --spacing 0.4 -o ct.nii.gz
-fit="fit $shape ct.nii.gz --rotation 0,0,0 --start-centre 0.2,0,0 --spacing 0.35 --eps 1e-4"
+fit="fit $shape ct.nii.gz --rotation 0,0,0 --start-centre 0.2,0,0 --spacing 0.35 --eps 1e-4 -q"
 expect 0 - sdmgen $fit --measure
 has '^  extent_x +[67]\.[0-9]+ \+- 0\.[0-9]+ +mm$'
 has '^  volume +[67][0-9]\.[0-9]+ \+- [0-9.]+ +mm\^3$'

@@ -109,7 +109,7 @@ if [ "$runtime" != ON ]; then
 fi
 expect 0 - sdmgen report run -o live.html
 bytes=$(($(stat -c %s live.html) - ($(stat -c %s $model) + 2) / 3 * 4))
-[ $bytes -lt 320000 ] || bad "live.html: $bytes bytes without the model"
+[ $bytes -lt 330000 ] || bad "live.html: $bytes bytes without the model"
 [ "$failures" -eq 0 ] || finish
 
 chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome)

@@ -4,7 +4,7 @@
      FAIL_AT=n         the n-th allocation, from 1, fails; 0: none
      FAIL_MODE=lasting all later ones fail, too
      FAIL_OWN=1        only calls from the program itself count, none of shared libraries
-     FAIL_COUNT=file   receives the number of allocations at the exit */
+     FAIL_COUNT=file   file.memory receives the number of allocations at the exit */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -79,9 +79,10 @@ __attribute__((destructor)) static void end(void)
     const char *path = getenv("FAIL_COUNT");
     started = false;
     if (!path) return;
-    char text[32];
+    char text[32], name[4096];
+    snprintf(name, sizeof name, "%s.memory", path);
     const int n = snprintf(text, sizeof text, "%ld\n", (long)allocations),
-              fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0666);
+              fd = open(name, O_WRONLY | O_CREAT | O_TRUNC, 0666);
     if (fd >= 0 && write(fd, text, (size_t)n) == n) close(fd);
 }
 

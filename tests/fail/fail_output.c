@@ -6,7 +6,7 @@
                lasting that one and all later ones, with ENOSPC
                kill    SIGKILL before that one
                half    SIGKILL after half of it, if it is a write
-     FAIL_COUNT=file   receives the number of operations at the exit */
+     FAIL_COUNT=file   file.output receives the number of operations at the exit */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -42,9 +42,10 @@ __attribute__((destructor)) static void end(void)
 {
     const char *path = getenv("FAIL_COUNT");
     if (!path) return;
-    char text[32];
+    char text[32], name[4096];
+    snprintf(name, sizeof name, "%s.output", path);
     const int n = snprintf(text, sizeof text, "%ld\n", (long)operations),
-              fd = REAL(open)(path, O_WRONLY | O_CREAT | O_TRUNC, 0666);
+              fd = REAL(open)(name, O_WRONLY | O_CREAT | O_TRUNC, 0666);
     if (fd >= 0 && REAL(write)(fd, text, (size_t)n) == n) REAL(close)(fd);
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# search.sh BUILD SECONDS [NAME...]: lets the fuzz targets in BUILD (preset "fuzz"; all, or fuzz_NAME...) look for inputs that break a
+# search.sh BUILD SECONDS [NAME...]: lets the fuzz targets in BUILD (preset "fuzz"; all but h5, or fuzz_NAME...) look for inputs that break a
 # promise, SECONDS each, from their corpora. One line each: inputs tried, inputs kept, what was found. The inputs are kept in BUILD/found;
 # exit code 1: something was found.
 set -uo pipefail
@@ -7,7 +7,8 @@ build=$(cd "$1" && pwd)
 seconds=$2
 shift 2
 source=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-[ $# -gt 0 ] || set -- $(cd "$build/tests/fuzz" && find . -maxdepth 1 -name 'fuzz_*' -type f -perm -u+x | sed 's/.*fuzz_//' | sort)
+# not h5: faults of libhdf5 itself would end the search; the program reads such files in a child process
+[ $# -gt 0 ] || set -- $(cd "$build/tests/fuzz" && find . -maxdepth 1 -name 'fuzz_*' -type f -perm -u+x | sed 's/.*fuzz_//' | grep -vx h5 | sort)
 TMPDIR=$(mktemp -d "$([ -w /dev/shm ] && echo /dev/shm || echo /tmp)/fuzz.XXXXXX")
 export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT

@@ -67,7 +67,7 @@ check() {
         rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit/judge fit vdb")
         rooms("trainer/", "numerics ssm data state pod fine template direct .")
         rooms("cli/", "args slicer report inputs measure shapes phantom fit cohort ssm study page .")
-        rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", "."); rooms("shapes/", ".")
+        rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", ". survey"); rooms("shapes/", ".")
         while ((getline line < files) > 0) {
             exists[line] = 1
             name = basename(line); folder = substr(line, 1, length(line) - length(name))

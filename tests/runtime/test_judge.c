@@ -321,15 +321,17 @@ static void test_few_points_are_refused(void **state)
     (void)state;
     size_t n;
     double *x = points_with_strays(SIZE_MAX, &n), few[3 * 24];
-    for (size_t i = 0; i < 24; i++) memcpy(few + 3 * i, x + 3 * (i * n / 24), 3 * sizeof *few);
+    // every eighth of 24 comes first
+    for (size_t i = 0; i < 24; i++)
+        memcpy(few + 3 * i, x + 3 * ((i % 3 * 8 + i / 3) * n / 24 + 1), 3 * sizeof *few);
     sdm_fit_result r;
     sdm_error err;
     assert_int_equal(fit_to(few, 3, &r, &err), SDM_E_QUALITY);
     const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_DATA);
     if (!f) fail_msg("not judged: %s", err.text);
-    assert_true(f->grade == SDM_FIT_FAILED && f->figure == 3);
+    assert_true(f->grade == SDM_FIT_FAILED && f->figure <= 3);
     assert_true(f->limit > 3 && f->limit <= 9);
-    assert_non_null(strstr(err.text, "3 points cannot determine"));
+    assert_non_null(strstr(err.text, "points on the surface cannot determine"));
     sdm_fit_dispose(&r);
     (void)fit_to(few, 24, &r, &err);
     assert_int_equal(finding(&r, SDM_FIT_CHECK_DATA)->grade, SDM_FIT_PASSED);
@@ -348,8 +350,9 @@ static void test_points_in_metres_are_refused(void **state)
     sdm_fit_result r;
     sdm_error err;
     assert_int_equal(fit_to(x, n, &r, &err), SDM_E_QUALITY);
-    assert_int_equal(finding(&r, SDM_FIT_CHECK_SIZE)->grade, SDM_FIT_FAILED);
-    assert_non_null(strstr(err.text, "unit is not mm"));
+    const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_SIZE);
+    if (!f || f->grade != SDM_FIT_FAILED || !strstr(err.text, "unit is not mm"))
+        fail_msg("%g mm, limit %g: %s", f ? f->figure : -1, f ? f->limit : -1, err.text);
     sdm_fit_dispose(&r);
     free(x);
 }

@@ -37,11 +37,12 @@ static bool advise_double(sdm_verdict *v, const char *key, double value, double 
     return true;
 }
 
-/* Twice the budget. */
-static void advise_budget(sdm_verdict *v, const sdm_config *c)
+/* Twice the budget; four times the minutes that did not reach the first step. */
+static void advise_budget(const verdict_input *in, sdm_verdict *v)
 {
+    const sdm_config *c = in->config;
     if (c->train.minutes > 0)
-        advise(v, "train.minutes", c->train.minutes, 2 * c->train.minutes);
+        advise(v, "train.minutes", c->train.minutes, (in->steps > 0 ? 2 : 4) * c->train.minutes);
     else if (c->train.steps > 0)
         advise(v, "train.steps", (double)c->train.steps, 2 * (double)c->train.steps);
     else
@@ -62,11 +63,11 @@ static const char *advise_network(const verdict_input *in, sdm_verdict *v)
         return "Polynomials alone limit it";
     }
     if (in->steps < FEW_STEPS) {
-        advise_budget(v, c);
+        advise_budget(in, v);
         return "The training was too short";
     }
     if (v->fall > STILL_FALLING && !in->ended_early) {
-        advise_budget(v, c);
+        advise_budget(in, v);
         return "The training was too short, its error was still falling";
     }
     // the head sees more than the modes, but the MLP learns only them
@@ -86,7 +87,7 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
 {
     const sdm_config *c = in->config;
     if (in->cut) {
-        advise_budget(v, c);
+        advise_budget(in, v);
         return "The number of maps limits it, which the time for them limits";
     }
     // `start` counts for bases and polynomials, too

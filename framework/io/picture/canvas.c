@@ -182,7 +182,8 @@ sdm_status sdm_canvas_finish(sdm_canvas *c, sdm_error *err)
         status = cairo_surface_write_to_png_stream(c->surface, write_bytes, c);
     cairo_surface_finish(c->surface);
     if (!status) status = cairo_surface_status(c->surface);
-    sdm_status s = status ? canvas_fail(c, status, err) : SDM_OK;
+    // cairo forgets errors of write_bytes() in PDF files
+    sdm_status s = status || c->error.status ? canvas_fail(c, status, err) : SDM_OK;
     if (!s && c->format == FORMAT_SVG) s = write_svg(c, err);
     if (!s) s = sdm_outfile_commit(&c->file, err);
     sdm_canvas_discard(c);

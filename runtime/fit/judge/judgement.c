@@ -26,6 +26,8 @@
 #define COARSE 0.5
 // labels and points: residuals beyond this multiple of their limit refuse the fit
 #define FAR_BEYOND 3.0
+// the same where they contradict little of the volume
+#define VERY_FAR_BEYOND 6.0
 // largest share of points that may belong to another surface
 #define STRAY_MAX 0.35
 // part of a voxel by which the border of the maps may be inside the shape
@@ -110,18 +112,17 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
 // The residuals on both sides of the surface. The older observation model is biased in blurred
 // images, and labels and points show a surface with errors of their own: their residuals are not
 // noise alone, so that only a multiple of the limit refuses the fit.
-static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
+static void check_residuals(const fit_problem *p, const fit_misfit *m, fit_coarseness coarse,
+                            sdm_fit_verdict *v)
 {
-    const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
-                 contradicted = m->empty + m->missing;
-    const bool coarse = voxel > COARSE * radius, image = is_image(p),
-               exact = image && p->maps.share && !(p->opts->tolerance > 0),
-               far = !image && !(p->opts->tolerance > 0) && contradicted > SERIOUS_MIN,
-               points = p->target->kind == SDM_FIT_POINTS;
-    const sdm_fit_grade inside = (exact && (contradicted > SERIOUS_MIN || coarse)) ||
-                                         (far && m->chi_square[1] > FAR_BEYOND * m->limit[1])
-                                     ? SDM_FIT_FAILED
-                                     : SDM_FIT_DOUBTFUL;
+    const double voxel = fit_longest_edge(&p->maps.grid), beyond = m->chi_square[1] / m->limit[1];
+    const bool image = is_image(p), points = p->target->kind == SDM_FIT_POINTS,
+               serious = m->empty + m->missing > SERIOUS_MIN,
+               thin = voxel > COARSE * sdm_fit_inradius(&p->maps),
+               refused = image ? p->maps.share && (serious || thin)
+                               : beyond > (serious ? FAR_BEYOND : VERY_FAR_BEYOND);
+    const sdm_fit_grade inside =
+        refused && !(p->opts->tolerance > 0) ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL;
     if (points && !m->n_units[1]) {
         sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL, 0, NAN,
                           "the points lie too far apart to tell their scatter from errors of the "
@@ -130,17 +131,17 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, sdm_fit_v
     }
     char cause[200] = "another shape lies there, or the organ differs from the model (then say by "
                       "how much it may: sdm_fit_opts.tolerance)";
-    if (coarse)
-        snprintf(cause, sizeof cause,
-                 "the voxels of the maps, %.2g mm, are coarse for a shape whose largest ball has a "
-                 "radius of %.2g mm: exact maps with voxels of %.2g mm are needed "
-                 "(sdm_fit_source.grid)",
-                 voxel, radius, sdm_fit_voxel_for_thickness(&p->maps));
+    if (isfinite(coarse.edge))
+        snprintf(
+            cause, sizeof cause,
+            "the voxels of the maps, %.2g mm, are coarse beside %s: try exact maps with voxels "
+            "of %.2g mm (sdm_fit_source.grid)",
+            voxel, coarse.detail, coarse.edge);
     sdm_fit_judge_add(
         v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1], inside, m->chi_square[1],
         m->limit[1],
-        "the residuals inside the shape are not noise: neighbourhoods deviate by %.2g times what "
-        "noise explains; %s",
+        "the residuals inside the shape are not noise, they deviate by %.2g times what noise "
+        "explains: %s",
         sqrt(m->chi_square[1]), cause);
     if (points) return;
     sdm_fit_judge_add(
@@ -265,7 +266,9 @@ static const sdm_fit_finding *reason(const sdm_fit_verdict *v)
     for (size_t i = 0; i < v->n_findings; i++) {
         const sdm_fit_finding *x = &v->findings[i];
         if (x->grade != SDM_FIT_FAILED) continue;
-        if (x->kind == SDM_FIT_CHECK_DATA || x->kind == SDM_FIT_CHECK_SIZE) return x;
+        if (x->kind == SDM_FIT_CHECK_SIZE) return x;
+        if (x->kind == SDM_FIT_CHECK_DATA) why = x;
+        if (why && why->kind == SDM_FIT_CHECK_DATA) continue;
         const bool cut = x->kind == SDM_FIT_CHECK_GRID && why && why->kind > SDM_FIT_CHECK_CONTRAST;
         if (!why || cut) why = x;
     }
@@ -281,18 +284,20 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err
     const double robust = s ? 0 : sdm_fit_residual_correlation(&residuals),
                  factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
     if (is_image(p)) r->evidence = evidence_of(p, r, factor);
+    const fit_coarseness coarse = sdm_fit_coarseness(p);
     check_basics(p, r, v);
     check_maps(p, v);
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     if (!s) {
-        check_residuals(p, &misfit, v);
+        check_residuals(p, &misfit, coarse, v);
         check_volumes(p, &misfit, r, v);
         v->n_units = misfit.n_units[0] + misfit.n_units[1];
         v->chi_square = misfit.noise_chi_square;
     }
-    if (!s && p->target->kind == SDM_FIT_POINTS) sdm_fit_check_points(p, &residuals, v);
+    if (!s && p->target->kind == SDM_FIT_POINTS) s = sdm_fit_check_points(p, &residuals, v, err);
     if (!s && is_image(p)) check_tissues(p, &residuals, r, v);
-    if (!s) sdm_fit_check_voxels(p, is_image(p) ? r->blur : 0, v);
+    if (!s) sdm_fit_check_voxels(p, coarse, is_image(p) ? r->blur : 0, v);
+    if (!s) sdm_fit_check_determined(p, r, v);
     sdm_fit_residuals_dispose(&residuals);
     if (!s && is_image(p)) s = check_blob(p, factor, v, err);
     const sdm_fit_finding *why = s ? NULL : reason(v);

@@ -147,6 +147,18 @@ static sdm_status members_create(const fit_residuals *r, member **out, size_t *n
     return s;
 }
 
+// number of voxels inside by the labels that lie too far from the shape to be samples, in samples
+static double label_beyond(const fit_problem *p)
+{
+    const size_t n = sdm_grid_count(&p->target->grid);
+    double all = 0, near = 0;
+    // of samples at every second voxel, the near ones are known too coarsely
+    if (p->opts->use_box || p->stride > 1) return 0;
+    for (size_t v = 0; v < n; v++) all += p->target->values[v] > 0.5f;
+    for (size_t i = 0; i < p->samples.n; i++) near += p->samples.value[i] > 0.5f;
+    return fmax(all - near, 0);
+}
+
 sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *out, sdm_error *err)
 {
     const bool points = p->target->kind == SDM_FIT_POINTS;
@@ -161,6 +173,7 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
     const bool labels = p->given_labels || p->target->kind == SDM_FIT_LABEL;
     const double least = labels ? fmax(LABEL_ERROR / r->edge[0], MEAN_SD_MIN) : MEAN_SD_MIN;
     const double factor = points ? points_volume_factor(p) : 1;
+    if (labels) out->missing = label_beyond(p) / volume;
     for (size_t from = 0, to; from < n && !s; from = to) {
         for (to = from; to < n && m[to].unit == m[from].unit; to++) {
         }

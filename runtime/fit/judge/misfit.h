@@ -24,7 +24,8 @@ typedef struct fit_misfit {
     double limit[2];
     /* Volume that the data contradict over the volume of the shape: inside the surface without the
        material of the inside (empty), and outside of it with this material (missing). Only units
-       count whose mean exceeds three standard deviations. Points: the volumes between the surface
+       count whose mean exceeds three standard deviations; labels also miss what lies beyond the
+       samples. Points: the volumes between the surface
        of the shape and that of the points, inside and outside of the shape */
     double empty, missing;
 } fit_misfit;

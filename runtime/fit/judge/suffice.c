@@ -4,8 +4,11 @@
 #include <math.h>
 
 #include "finding.h"
+#include "noise.h"
+#include "sdm/internal/vec3.h"
+#include "sdm/memory.h"
 
-// smallest rms distance of the points from their centroid, over the reach of the shape
+// smallest median distance of the points from their middle, over the reach of the shape
 #define SPREAD_MIN 0.1
 
 // edge of a voxel that shows the thickness, over the radius of the largest ball inside
@@ -39,43 +42,47 @@ static size_t free_unknowns(const fit_problem *p)
     return n + pose - open;
 }
 
-/* rms distance (mm) from their centroid of the points that belong to the surface. */
-static double spread(const fit_problem *p, const fit_residuals *s)
+/* *wide = median distance (mm) of the points from their coordinate-wise median: outliers hardly
+ * change it. */
+static sdm_status spread(const fit_problem *p, double *wide, sdm_error *err)
 {
-    double n = 0, sum[3] = {0}, square = 0;
-    for (size_t i = 0; i < s->n; i++) {
-        n += s->used[i];
-        for (size_t a = 0; a < 3 && s->used[i]; a++) {
-            sum[a] += p->samples.world[3 * i + a];
-            square += p->samples.world[3 * i + a] * p->samples.world[3 * i + a];
-        }
+    const double *x = p->target->points;
+    const size_t n = p->target->n_points;
+    double middle[3], *list = NULL;
+    const sdm_status s = SDM_ALLOC(&list, n, "points of the fit", err);
+    if (s) return s;
+    for (size_t a = 0; a < 3; a++) {
+        for (size_t i = 0; i < n; i++) list[i] = x[3 * i + a];
+        middle[a] = sdm_fit_median(list, n);
     }
-    if (!(n > 0)) return 0;
-    for (size_t a = 0; a < 3; a++) square -= sum[a] * sum[a] / n;
-    return sqrt(fmax(square / n, 0));
+    for (size_t i = 0; i < n; i++) list[i] = sqrt(v3_dist2(x + 3 * i, middle));
+    *wide = sdm_fit_median(list, n);
+    sdm_free(list);
+    return SDM_OK;
 }
 
-void sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sdm_fit_verdict *v)
+sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sdm_fit_verdict *v,
+                                sdm_error *err)
 {
-    const size_t n = p->target->n_points, unknowns = free_unknowns(p);
+    const size_t unknowns = free_unknowns(p);
+    size_t n = 0;
+    for (size_t i = 0; i < s->n; i++) n += s->used[i];
+    fit_extent e = {.reach = 0};
+    double wide;
+    (void)sdm_fit_extent(&p->maps, &e, NULL);
+    const sdm_status status = spread(p, &wide, err);
+    if (status) return status;
     sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, n >= unknowns, SDM_FIT_FAILED, (double)n,
                       (double)unknowns,
-                      "%zu points cannot determine %zu unknowns: give at least as many points, or "
-                      "keep the parameters or the pose",
+                      "%zu points on the surface cannot determine %zu unknowns: give at least as "
+                      "many, or keep the parameters or the pose",
                       n, unknowns);
-    fit_extent e;
-    if (sdm_fit_extent(&p->maps, &e, NULL)) return;
-    const double wide = spread(p, s);
     sdm_fit_judge_add(v, SDM_FIT_CHECK_SIZE, wide >= SPREAD_MIN * e.reach, SDM_FIT_FAILED, wide,
                       SPREAD_MIN * e.reach,
                       "the points lie within %.2g mm of their middle, but the fitted shape reaches "
                       "%.3g mm from its own: they show too little of it, or their unit is not mm",
                       wide, e.reach);
-}
-
-double sdm_fit_voxel_for_thickness(const fit_maps *maps)
-{
-    return VOXEL_OVER_RADIUS * sdm_fit_inradius(maps);
+    return SDM_OK;
 }
 
 /* Share of the surface beside details that the voxels of the maps do not show: there the gradient
@@ -100,27 +107,44 @@ static double detail_share(const fit_maps *m)
     return all > 0 ? bent / all : 0;
 }
 
-void sdm_fit_check_voxels(const fit_problem *p, double blur, sdm_fit_verdict *v)
+fit_coarseness sdm_fit_coarseness(const fit_problem *p)
 {
-    if (p->opts->keep_params) return;
+    fit_coarseness c = {INFINITY, ""};
     const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
                  details = detail_share(&p->maps);
-    double fine = INFINITY;
-    const char *beside = "";
-    if (details > DETAILS_MAX) // edges: the share grows with the voxel
-        fine = voxel * DETAILS_MAX / details, beside = "the details of the shape";
-    if (voxel > VOXEL_OVER_RADIUS_MAX * radius && sdm_fit_voxel_for_thickness(&p->maps) < fine)
-        fine = sdm_fit_voxel_for_thickness(&p->maps), beside = "the thickness of the shape";
+    if (details > DETAILS_MAX) // at edges: the share grows with the voxel
+        c = (fit_coarseness){voxel * DETAILS_MAX / details, "the details of the shape"};
+    if (voxel > VOXEL_OVER_RADIUS_MAX * radius && VOXEL_OVER_RADIUS * radius < c.edge)
+        c = (fit_coarseness){VOXEL_OVER_RADIUS * radius, "the thickness of the shape"};
     const bool labels = p->given_labels || p->target->kind == SDM_FIT_LABEL;
     const double label = labels ? fit_longest_edge(&p->target->grid) : INFINITY;
-    if (voxel > VOXEL_OVER_LABEL_MAX * label && label < fine)
-        fine = label, beside = "the voxels of the labels";
-    if (blur > 0 && voxel > VOXEL_OVER_BLUR_MAX * blur && blur < fine)
-        fine = blur, beside = "the point spread of the image";
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_VOXELS, !isfinite(fine), SDM_FIT_DOUBTFUL, voxel,
-                      fmin(fine, voxel),
+    if (voxel > VOXEL_OVER_LABEL_MAX * label && label < c.edge)
+        c = (fit_coarseness){label, "the voxels of the labels"};
+    return c;
+}
+
+void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, double blur,
+                          sdm_fit_verdict *v)
+{
+    const double voxel = fit_longest_edge(&p->maps.grid);
+    if (p->opts->keep_params) return;
+    if (blur > 0 && voxel > VOXEL_OVER_BLUR_MAX * blur && blur < coarse.edge)
+        coarse = (fit_coarseness){blur, "the point spread of the image"};
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_VOXELS, !isfinite(coarse.edge), SDM_FIT_DOUBTFUL, voxel,
+                      fmin(coarse.edge, voxel),
                       "the voxels of the maps are coarse beside %s: estimates are less exact, and "
                       "standard deviations too small; exact maps with voxels of %.2g mm "
                       "(sdm_fit_source.grid) show it",
-                      beside, fine);
+                      coarse.detail, coarse.edge);
+}
+
+void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)
+{
+    size_t known = 0;
+    for (size_t k = 0; k < p->n_params; k++) known += !r->by_prior[k];
+    if (known || p->opts->keep_params || v->grade == SDM_FIT_FAILED) return;
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_FAILED, 0, 1,
+                      "the data determine none of the %zu parameters: their standard deviations "
+                      "are those of the priors",
+                      p->n_params);
 }

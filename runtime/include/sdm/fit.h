@@ -296,11 +296,12 @@ typedef enum sdm_fit_check_kind {
     /* network: fraction of the held-out shapes of its training that the grid cut; not passed also
        where the training graded the network poor, see sdm_model_quality */
     SDM_FIT_CHECK_NETWORK,
-    /* points: their number, at least that of the unknowns: the pose, and the parameters without a
-       normal distribution */
+    /* points: number of those on the surface, at least that of the unknowns: the pose, and the
+       parameters without a normal distribution. All data: failed where they determine none of the
+       parameters (sdm_fit_result.by_prior) */
     SDM_FIT_CHECK_DATA,
-    /* points: rms distance from their centroid of those that lie on the surface, mm; limit: a tenth
-       of the reach of the shape. Points within less show too little of it, or are not in mm */
+    /* points: median distance from their coordinate-wise median, mm; limit: a tenth of the reach of
+       the shape. Points within less show too little of it, or are not in mm */
     SDM_FIT_CHECK_SIZE,
     /* Longest edge of the voxels of the maps, mm. The limit is the edge that would show the
        thickness of the shape (2/5 of the radius of its largest ball), its edges and corners (the

@@ -256,12 +256,13 @@ static void notice_mesh(const job *j)
     if (inside && !j->args->points)
         cli_warn_cut_shape(&j->grid, j->mesh.vert, j->mesh.n_vert,
                            "a larger grid (--size, --spacing, --origin) holds it");
-    cli_warn_audit(a);
     // a closed part that meets no other cannot be inside out after the engine has turned it; the
     // audit of the single part of a file, which may be large, would only tell its thickness
     if (a->components > 1 || !a->closed || j->args->shape)
-        cli_warn_parts(&j->mesh, j->args->points ? 0 : sdm_grid_coarsest(&j->grid),
-                       j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
+        cli_warn_mesh(&j->mesh, j->args->points ? 0 : sdm_grid_coarsest(&j->grid),
+                      j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
+    else
+        cli_warn_audit(a);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
                    "triangles (error at most %.2g mm)",

@@ -15,7 +15,7 @@ static sdm_status report_audit(const cli_args *args, const sdm_mesh *mesh, sdm_e
     const char *mend = args->shape ? CLI_MEND_SHAPE : CLI_MEND_FILE;
     sdm_part_audit audit;
     if (!args->audit && !args->json) {
-        cli_warn_mesh(mesh, mend);
+        cli_warn_mesh(mesh, 0, mend);
         return SDM_OK;
     }
     sdm_status s = sdm_part_audit_make(mesh, true, &audit, err);

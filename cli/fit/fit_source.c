@@ -119,7 +119,7 @@ static void warn_shape(const cli_fit *f)
 {
     sdm_mesh mesh = {0};
     if (f->shape && !sdm_instance_mesh(f->shape, f->start, &mesh, NULL))
-        cli_warn_mesh(&mesh, CLI_MEND_SHAPE);
+        cli_warn_mesh(&mesh, 0, CLI_MEND_SHAPE);
     sdm_mesh_dispose(&mesh);
 }
 

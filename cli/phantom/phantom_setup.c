@@ -191,7 +191,7 @@ sdm_status cli_phantom_setup(cli_phantom *p, sdm_error *err)
     if (!s) s = draw_params(p, err);
     if (!s) s = read_pose(p, err);
     if (!s) s = sdm_instance_mesh(p->shape.instance, p->shape.values, &mesh, err);
-    if (!s) cli_warn_mesh(&mesh, CLI_MEND_SHAPE);
+    if (!s) cli_warn_mesh(&mesh, 0, CLI_MEND_SHAPE);
     if (!s) s = grid_make(p, &mesh, err);
     sdm_mesh_dispose(&mesh);
     return s;

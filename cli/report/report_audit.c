@@ -119,10 +119,6 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
 
 void cli_warn_audit(const sdm_audit *a)
 {
-    if (a->boundary_edges > 0)
-        cli_warn(
-            "the mesh is open: %zu boundary edges; inside is where the winding number exceeds 1/2",
-            a->boundary_edges);
     if (a->nonmanifold_edges > 0)
         cli_notice("%zu edges with more than two triangles", a->nonmanifold_edges);
     if (a->misoriented_edges > 0)
@@ -181,8 +177,11 @@ void cli_describe_thin(const sdm_part_audit *a, size_t index, double voxel, sdm_
 static void warn_open(const sdm_part_audit *audit)
 {
     sdm_text text = {0};
+    if (!audit->mesh.boundary_edges) return;
     cli_describe_open(audit, &text);
-    if (text.size && !text.failed) cli_warn("%s", text.data);
+    cli_warn(
+        "the mesh is open: %zu boundary edges; inside is where the winding number exceeds 1/2%s%s",
+        audit->mesh.boundary_edges, text.size ? "; " : "", text.size ? text.data : "");
     sdm_text_dispose(&text);
 }
 
@@ -211,23 +210,14 @@ static void warn_inside_out(const sdm_part_audit *audit, const char *mend)
         cli_warn("%zu more parts are inside out", audit->inside_out - told);
 }
 
-void cli_warn_parts(const sdm_mesh *mesh, double voxel, const char *mend)
+void cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend)
 {
     sdm_part_audit audit;
     if (sdm_part_audit_make(mesh, false, &audit, NULL)) return;
     warn_open(&audit);
+    cli_warn_audit(&audit.mesh);
     warn_inside_out(&audit, mend);
     warn_thin(&audit, voxel);
-    sdm_part_audit_dispose(&audit);
-}
-
-void cli_warn_mesh(const sdm_mesh *mesh, const char *mend)
-{
-    sdm_part_audit audit;
-    if (sdm_part_audit_make(mesh, false, &audit, NULL)) return;
-    cli_warn_audit(&audit.mesh);
-    warn_open(&audit);
-    warn_inside_out(&audit, mend);
     sdm_part_audit_dispose(&audit);
 }
 

@@ -12,8 +12,8 @@ void cli_print_audit(const sdm_part_audit *a);
 void cli_json_audit(sdm_json *json, const sdm_audit *a);
 void cli_json_parts(sdm_json *json, const sdm_part_audit *a);
 
-/* Warns of each defect that changes what is inside: boundary and misoriented edges; prints notices
- * about the others: non-manifold edges, degenerate or duplicate triangles. */
+/* Warns of edges whose triangles are badly oriented; prints notices about defects that change
+ * nothing: non-manifold edges, degenerate or duplicate triangles. */
 void cli_warn_audit(const sdm_audit *a);
 
 /* Writes one line about part `index`, which is inside out, to `text`: its number, box and vertices,
@@ -36,14 +36,11 @@ sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_erro
 /* "fine", "warning" or "broken", for the results of cli_audit_verdict(). */
 const char *cli_verdict_name(sdm_status verdict);
 
-/* Audits the parts of the mesh and warns of the part with most open edges, of each of the first
- * parts that are inside out and that the engine does not turn, and of the thinnest part if it is
- * too thin for voxels of this size (mm; 0: there is no grid). mend: what the user can do about an
- * inside-out part. Says nothing if the audit fails: the engine reports that. */
-void cli_warn_parts(const sdm_mesh *mesh, double voxel, const char *mend);
-
-/* Warns of the defects of the mesh, as the two functions above together without a grid. */
-void cli_warn_mesh(const sdm_mesh *mesh, const char *mend);
+/* Audits the mesh and warns as cli_warn_audit() does, and of the part with most open edges, of each
+ * of the first parts that are inside out and that the engine does not turn, and of the thinnest
+ * part if it is too thin for voxels of this size (mm; 0: there is no grid). mend: what the user can
+ * do about an inside-out part. Says nothing if the audit fails: the engine reports that. */
+void cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend);
 
 /* Turns the parts of the mesh that are inside out (--turn-parts) and says how many. */
 sdm_status cli_turn_parts(sdm_mesh *mesh, sdm_error *err);

@@ -141,7 +141,9 @@ static void tell_sizes(teller *t)
         add_share(t->s, &f->resized, &text);
         sdm_text_add(&text, ", for example %.0f vertices at ", f->resized.amount);
         add_params(t->s, f->resized.worst, SIZE_MAX, &text);
-        sdm_text_add(&text, "; derivatives need the same numbers everywhere");
+        sdm_text_add(
+            &text, "; derivatives need the same numbers everywhere: choose them by options, not by "
+                   "parameters");
         tell(t, SDM_E_QUALITY, &text);
     } else if (f->rewired.shapes) {
         sdm_text_add(&text, "the triangles get other vertices ");
@@ -229,7 +231,8 @@ static void tell_thin(teller *t)
     sdm_text text = {0};
     sdm_mesh mesh = {0};
     sdm_part_audit audit = {0};
-    if (!c->shapes) return;
+    // tell_unit() explains shapes in another unit
+    if (!c->shapes || t->s->found.scale.odd_size || t->s->found.scale.odd_speed) return;
     if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
         cli_describe_thin(&audit, sdm_part_audit_thinnest(&audit), sdm_grid_coarsest(t->s->grid),
                           &text);
@@ -260,6 +263,37 @@ static void tell_unit(teller *t)
         sdm_text_add(&text, ": if the vertices are in %s, multiply them by %g", c->unit,
                      c->unit_mm);
     tell(t, SDM_E_QUALITY, &text);
+}
+
+/* Parameters that hardly move a vertex, and units that sdmgen does not know. */
+static void tell_params(teller *t)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    const sdm_param *params = sdm_instance_params(t->s->shape, NULL);
+    for (size_t k = 0; k < f->n_params; k++) {
+        const char *unit = params[k].unit;
+        sdm_text slow = {0}, other = {0};
+        // all parameters are slow if the vertices are in another unit: tell_unit() says so
+        if (f->speed[k] == 0) {
+            sdm_text_add(&slow, "the parameter '%s' moves no vertex: does mesh() use it?",
+                         params[k].name);
+            tell(t, SDM_E_QUALITY, &slow);
+        } else if (sdm_survey_is_slow(f, t->s->shape, k) && !f->scale.odd_speed) {
+            sdm_text_add(&slow,
+                         "1 mm of the parameter '%s' moves no vertex by more than %.2g mm: are the "
+                         "vertices of a part in another unit than mm?",
+                         params[k].name, f->speed[k]);
+            tell(t, SDM_E_QUALITY, &slow);
+        }
+        if (t->s->brief || !strcmp(unit, "mm") || !strcmp(unit, "rad") || !strcmp(unit, "sd") ||
+            !*unit)
+            continue;
+        sdm_text_add(&other,
+                     "the unit '%s' of the parameter '%s' is none that sdmgen knows: mm, rad, sd "
+                     "(standard deviations) or none at all",
+                     unit, params[k].name);
+        tell(t, SDM_OK, &other);
+    }
 }
 
 static void tell_callbacks(teller *t)
@@ -293,11 +327,13 @@ static void tell_notes(teller *t)
         const char *what, *after;
     } notes[] = {{&f->overlaps, "overlaps (pairs of triangles that meet)", ": the union counts"},
                  {&f->degenerate, "triangles without area", ""},
-                 {&f->duplicate, "triangles given twice", ": they count once"}};
+                 {&f->duplicate, "triangles given twice", ": they count once"},
+                 {&f->apart, "parts that meet no other part", ": is this wanted?"}};
     for (size_t i = 0; i < sizeof notes / sizeof *notes; i++) {
         sdm_text text = {0};
         const size_t n = notes[i].count->shapes;
-        if (!n || (notes[i].count == &f->overlaps && t->s->brief && n == f->n)) continue;
+        const bool on_purpose = notes[i].count == &f->overlaps || notes[i].count == &f->apart;
+        if (!n || (on_purpose && t->s->brief && n == f->n)) continue;
         add_count(t->s, notes[i].count, notes[i].what, &text);
         sdm_text_add(&text, "%s", notes[i].after);
         tell(t, SDM_OK, &text);
@@ -314,6 +350,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_sizes(&t);
     tell_jumps(&t);
     tell_unit(&t);
+    tell_params(&t);
     tell_cut(&t);
     tell_thin(&t);
     tell_callbacks(&t);

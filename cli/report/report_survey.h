@@ -10,7 +10,8 @@ typedef struct cli_survey {
     const sdm_instance *shape;
     const sdm_grid *grid;     /* NULL: none */
     const sdm_config *config; /* whose grid it is; NULL: none */
-    /* nothing is told of shapes that all overlap themselves: they mostly do so on purpose */
+    /* nothing is told of shapes that all overlap themselves or all have parts apart: they mostly do
+     * so on purpose */
     bool brief;
     sdm_shape_survey found;
 } cli_survey;

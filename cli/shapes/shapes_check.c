@@ -170,7 +170,8 @@ static sdm_status print_json(const check *c, sdm_error *err)
                   {"degenerate", &f->degenerate},
                   {"duplicate", &f->duplicate},
                   {"cut", &f->cut},
-                  {"thin", &f->thin}};
+                  {"thin", &f->thin},
+                  {"apart", &f->apart}};
     sdm_json j = {0};
     sdm_json_open(&j, NULL, '{');
     sdm_json_text(&j, "shape", sdm_instance_shape(c->survey.shape)->name);

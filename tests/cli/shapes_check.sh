@@ -43,15 +43,21 @@ has '"verdict": "warning".*"jumps": \[\{"kind": "jump", "parameter": "size", "va
 # With a configuration: its ranges and its grid.
 cat >good.yaml <<'YAML'
 shape: {name: faulty, ranges: {size: [1, 2]}}
-grid: {size: [13, 9, 9], spacing: 1, centre: [0, 0, 0]}
+grid: {size: [49, 33, 33], spacing: 0.25, centre: [0, 0, 0]}
 train: {minutes: 0.02}
 YAML
 expect 0 - sdmgen shapes check good.yaml --plugin "$plugin" --samples 16
 has '^fine: the shape can be trained$'
-expect 4 mend sdmgen shapes check good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" --samples 16 -o cut.svg
-cuts='over the parameters the shape reaches from \(-2, -2, -2\) to \(4, 2, 2\) mm; the grid covers \(-3\.5, -4, -4\) to \(3\.5, 4, 4\) mm and cuts [0-9.]+ % of the shapes \(by up to 0\.5 mm at the upper end of x\); use grid: \{spacing: 1\} \(size: \[[0-9, ]+\], spacing: 1, origin: \[[-0-9., ]+\]\)'
+expect 4 mend sdmgen shapes check good.yaml 'grid.size=[29,33,33]' --plugin "$plugin" --samples 16 -o cut.svg
+cuts='over the parameters the shape reaches from \(-2, -2, -2\) to \(4, 2, 2\) mm; the grid covers \(-3\.5, -4, -4\) to \(3\.5, 4, 4\) mm and cuts [0-9.]+ % of the shapes \(by up to 0\.5 mm at the upper end of x\); use grid: \{spacing: 0\.25\} \(size: \[[0-9, ]+\], spacing: 0\.25, origin: \[[-0-9., ]+\]\)'
 has "^warning +$cuts$"
 present cut.svg
+# The handle is 0.5 mm thick.
+thin='part 2 of 2 \(box [^a-z]* mm\) is 0\.5 mm thick, too thin for voxels of 0\.5 mm: it will be missing or broken in surfaces; a spacing of at most 0\.25 mm shows it'
+expect 4 mend sdmgen shapes check good.yaml grid.spacing=0.5 --plugin "$plugin" --samples 16
+has "^warning +$thin \(at size=.*; parts are too thin in all 21 shapes\)$"
+expect 0 "^sdmgen: warning: $thin" sdmgen config good.yaml grid.spacing=0.5 --plugin "$plugin" -q
+expect 0 "^sdmgen: warning: $thin$" sdmgen exact --shape faulty --plugin "$plugin" --spacing 0.5 -o thin.nrrd -q
 
 # The other commands say it in one line on stderr (and that the mesh overlaps itself).
 expect 0 "warning: $inside_out" sdmgen mesh --shape faulty -O fault=handle -o x.ply --plugin "$plugin" -q
@@ -82,9 +88,9 @@ for command in "exact --shape faulty -O fault=handle -o x.nrrd" "config good.yam
     [ $? -eq 0 ] || [ "${command%% *}" = fit ] || bad "$command: $(cat err)"
     told 'part 2 of 2 .* is inside out and overlaps another'
 done
-sdmgen config good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" >out 2>err || bad 'config of a grid that cuts'
+sdmgen config good.yaml 'grid.size=[29,33,33]' --plugin "$plugin" >out 2>err || bad 'config of a grid that cuts'
 told "$cuts"
-expect 0 "^sdmgen: warning: $cuts" sdmgen config good.yaml 'grid.size=[8,9,9]' --plugin "$plugin" -q
+expect 0 "^sdmgen: warning: $cuts" sdmgen config good.yaml 'grid.size=[29,33,33]' --plugin "$plugin" -q
 has '^good\.yaml: no mistakes, 1 warning$'
 expect 0 'warning: the shape is 0\.0[0-9]+ mm in size' sdmgen config good.yaml shape.options.fault=metres --plugin "$plugin" -q
 sdmgen exact --shape faulty -O fault=handle --certify -o z.nrrd --plugin "$plugin" >out 2>err

@@ -19,7 +19,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
-     "edge",
+     "edge|centimetres|small",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -112,6 +112,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         memcpy(out->tri, OTHER, sizeof OTHER);
     }
     for (size_t i = 0; i < 24 * boxes && !strcmp(fault, "metres"); i++) out->vert[i] /= 1000;
+    for (size_t i = 0; i < 24 * boxes && !strcmp(fault, "centimetres"); i++) out->vert[i] /= 10;
+    for (size_t i = 24; i < 48 && !strcmp(fault, "small"); i++) out->vert[i] /= 1000; // the handle
     if (is_large) faulty_arrays(fault, p, out);
     return 0;
 }

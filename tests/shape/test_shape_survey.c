@@ -128,6 +128,9 @@ static void vertices_in_metres(void **state)
     assert_true(fabs(s.scale.speed - sqrt(3)) < 1e-6 && s.scale.param == 0 && s.scale.size == 8);
     assert_true(!s.scale.odd_size && !s.scale.odd_speed && !s.scale.unit);
     sdm_shape_survey_dispose(&s);
+    s = survey("centimetres");
+    assert_true(s.scale.odd_speed && !strcmp(s.scale.unit, "cm") && s.scale.unit_mm == 10);
+    sdm_shape_survey_dispose(&s);
     s = survey("metres");
     assert_true(s.scale.odd_size && s.scale.odd_speed);
     assert_true(fabs(s.scale.speed - 1e-3 * sqrt(3)) < 1e-9);
@@ -143,6 +146,22 @@ static void vertices_in_metres(void **state)
         const char *unit = sdm_unit_near(cases[i].mm, NULL);
         assert_true(!unit == !cases[i].unit && (!unit || !strcmp(unit, cases[i].unit)));
     }
+}
+
+// Only the handle is in m: it lies in the body, and its length moves nothing that counts.
+static void a_part_in_metres(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("none");
+    assert_true(s.slow == 0 && s.apart.shapes == 0 && fabs(s.speed[1] - 1) < 1e-6);
+    sdm_shape_survey_dispose(&s);
+    s = survey("small");
+    assert_true(!s.scale.odd_size && !s.scale.odd_speed && s.slow == 1);
+    assert_true(fabs(s.speed[0] - sqrt(3)) < 1e-6 && fabs(s.speed[1] - 1e-3) < 1e-8);
+    assert_int_equal(s.apart.shapes, s.n);
+    assert_int_equal((size_t)s.apart.amount, 2); // the body, too
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    sdm_shape_survey_dispose(&s);
 }
 
 static void breaks_along_a_parameter(void **state)
@@ -301,6 +320,7 @@ int main(void)
         cmocka_unit_test(parts_that_are_inside_out),
         cmocka_unit_test(broken_meshes),
         cmocka_unit_test(vertices_in_metres),
+        cmocka_unit_test(a_part_in_metres),
         cmocka_unit_test(breaks_along_a_parameter),
         cmocka_unit_test(callbacks),
         cmocka_unit_test(a_grid_that_cuts),

@@ -22,7 +22,7 @@ typedef struct finding {
     sdm_status status;
     size_t n_vert, n_tri;
     uint64_t crc_vert, crc_tri;
-    size_t open, inside_out, turned, overlaps, degenerate, duplicate;
+    size_t open, inside_out, turned, apart, overlaps, degenerate, duplicate;
     double volume, area, min[3], max[3];
     double thick;        /* of the thinnest part, mm; NaN: not known */
     double beyond[3][2]; /* mm */
@@ -78,6 +78,7 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
     for (size_t i = 0; i < audit.n; i++) {
         out->open += audit.part[i].open_edges;
         out->turned += audit.part[i].turned && audit.part[i].volume < 0;
+        out->apart += audit.n > 1 && audit.part[i].state == SDM_PART_SOLID && !audit.part[i].met;
     }
     const size_t thinnest = sdm_part_audit_thinnest(&audit);
     out->thick = thinnest < audit.n ? audit.part[thinnest].thick : NAN;
@@ -208,6 +209,7 @@ static void sum_up(survey *v)
         count(&s->open, i, (double)f->open);
         count(&s->inside_out, i, (double)f->inside_out);
         count(&s->turned, i, (double)f->turned);
+        count(&s->apart, i, (double)f->apart);
         count(&s->overlaps, i, (double)f->overlaps);
         count(&s->degenerate, i, (double)f->degenerate);
         count(&s->duplicate, i, (double)f->duplicate);
@@ -402,6 +404,7 @@ void sdm_shape_survey_dispose(sdm_shape_survey *s)
 {
     sdm_free(s->p);
     sdm_free(s->jump);
+    sdm_free(s->speed);
     *s = (sdm_shape_survey){0};
 }
 
@@ -427,5 +430,6 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
                s->scale.odd_speed;
     for (size_t k = 0; k < s->n_params && s->jump; k++)
         bad = bad || s->jump[k].kind != SDM_BREAK_NONE;
+    bad = bad || s->slow;
     return bad ? SDM_E_QUALITY : SDM_OK;
 }

@@ -6,9 +6,23 @@
 #include <string.h>
 
 #include "sdm/internal/units.h"
+#include "sdm/memory.h"
 
 /* The step of a parameter, as a fraction of its range. */
 static const double STEP = 0.01;
+
+/* Samples at which the speed of slow parameters is measured again. */
+enum { SLOW_SAMPLES = 3 };
+
+static bool is_length(const sdm_instance *shape, size_t k)
+{
+    return !strcmp(shape->params[k].unit, "mm");
+}
+
+bool sdm_survey_is_slow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k)
+{
+    return s->speed[k] == 0 || (is_length(shape, k) && s->speed[k] < SDM_SURVEY_SPEED_SLOW);
+}
 
 /* *speed = how far a vertex moves per unit of parameter k beside p[], at most; NaN: not known. */
 static sdm_status measure_speed(const shape_family *f, const double *p, size_t k,
@@ -33,32 +47,49 @@ static sdm_status measure_speed(const shape_family *f, const double *p, size_t k
     return SDM_OK;
 }
 
-/* Sets speed and param. */
-static sdm_status find_speed(const shape_family *f, const double *p, sdm_survey_scale *out,
-                             sdm_error *err)
+/* Raises the speeds s->speed[] of the parameters that are slow so far by those beside shape
+ * `shape`. */
+static sdm_status raise_speeds(const shape_family *f, sdm_shape_survey *s, size_t shape,
+                               sdm_error *err)
 {
+    const double *p = s->p + shape * s->n_params;
     sdm_mesh here = {0}, there = {0};
-    sdm_status s = sdm_instance_mesh(f->shape, p, &here, err);
-    out->speed = NAN;
-    for (size_t k = 0; k < f->shape->n_params && !s; k++) {
+    sdm_status status = sdm_instance_mesh(f->shape, p, &here, err);
+    for (size_t k = 0; k < s->n_params && !status; k++) {
         double speed;
-        if (strcmp(f->shape->params[k].unit, "mm")) continue;
-        s = measure_speed(f, p, k, &here, &there, &speed, err);
-        if (isfinite(speed) && !(speed <= out->speed)) out->speed = speed, out->param = k;
+        if (shape && !sdm_survey_is_slow(s, f->shape, k)) continue;
+        status = measure_speed(f, p, k, &here, &there, &speed, err);
+        if (speed * (f->max[k] - f->min[k]) <= 1e-9 * s->scale.size) speed = 0;
+        s->speed[k] = fmax(s->speed[k], speed); // fmax() ignores NaN
     }
     sdm_mesh_dispose(&there);
     sdm_mesh_dispose(&here);
-    return s == SDM_E_NOMEM ? s : SDM_OK;
+    return status == SDM_E_NOMEM ? status : SDM_OK;
+}
+
+/* Measures the speeds and sets speed and param: the fastest parameter in mm. */
+static sdm_status find_speed(const shape_family *f, sdm_shape_survey *s, sdm_error *err)
+{
+    sdm_status status = SDM_OK;
+    for (size_t i = 0; i <= SLOW_SAMPLES && i <= s->n_samples && !status; i++)
+        status = raise_speeds(f, s, i ? s->n - i : 0, err);
+    for (size_t k = 0; k < s->n_params; k++)
+        if (is_length(f->shape, k) && isfinite(s->speed[k]) && !(s->speed[k] <= s->scale.speed))
+            s->scale.speed = s->speed[k], s->scale.param = k;
+    for (size_t k = 0; k < s->n_params; k++) s->slow += sdm_survey_is_slow(s, f->shape, k);
+    return status;
 }
 
 sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, sdm_error *err)
 {
     sdm_survey_scale *c = &s->scale;
     *c = (sdm_survey_scale){.speed = NAN};
-    if (s->failed.shapes == s->n) return SDM_OK;
+    sdm_status status = SDM_ALLOC(&s->speed, s->n_params, "speeds of parameters", err);
+    for (size_t k = 0; k < s->n_params && !status; k++) s->speed[k] = NAN;
+    if (status || s->failed.shapes == s->n) return status;
     for (int a = 0; a < 3; a++) c->size = fmax(c->size, s->high[a] - s->low[a]);
     c->odd_size = c->size < SDM_SURVEY_SIZE_MIN || c->size > SDM_SURVEY_SIZE_MAX;
-    const sdm_status status = find_speed(f, s->p, c, err);
+    status = find_speed(f, s, err);
     if (status) return status;
     c->odd_speed =
         c->speed > 0 && (c->speed < SDM_SURVEY_SPEED_MIN || c->speed > SDM_SURVEY_SPEED_MAX);

@@ -59,7 +59,7 @@ static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_err
     sdm_fail(err, SDM_E_QUALITY,
              "not converged after %zu iterations (%s%s): allow more iterations "
              "(sdm_fit_opts.max_iterations), "
-             "give a nearer start, or a prior of what the data hardly determine",
+             "give a nearer start or a prior",
              r->n_iterations, r->reason, moves);
 }
 

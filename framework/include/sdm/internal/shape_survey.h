@@ -86,6 +86,12 @@ typedef struct sdm_shape_survey {
                                   alone; NaN in a brief survey */
     double low[3], high[3];    /* box of all meshes, mm; a search widens it unless `brief` */
     sdm_survey_scale scale;
+    /* [n_params] how far a vertex moves per unit of the parameter, at most, mm; NaN: not known. Of
+     * the first shape; of a few samples, too, if it is slow there. 0: it moves no vertex by 1e-9 of
+     * the size over the range. */
+    double *speed;
+    size_t slow;            /* parameters that are odd by themselves: sdm_survey_is_slow() */
+    sdm_survey_count apart; /* solid parts that meet no other part of the mesh */
 
     /* the samples whose vertices lie beyond the centres of the outer voxels; amount: mm beyond */
     sdm_survey_count cut;
@@ -122,17 +128,26 @@ size_t sdm_survey_samples(const sdm_instance *shape, size_t samples);
  * are usable, but a training or derivatives would suffer: parts that are inside out (at some of the
  * parameters also those that the engine turns), sizes, triangles or vertices that jump, a grid that
  * cuts or is too coarse for a part, wrong velocities, results that differ from call to call, or an
- * odd size or speed (another unit than mm). Else SDM_OK. */
+ * odd size or speed (another unit than mm, or a
+ * parameter that does nothing). Else SDM_OK. */
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 
 /* velocity_error above this is wrong. */
 #define SDM_SURVEY_VELOCITY_LIMIT 1e-3
 
-/* Sizes (mm) and speeds beyond these are odd. A screw of many turns moves fast with its pitch. */
+/* Sizes (mm) and speeds beyond these are odd: the diameter of a tube moves its vertices by 0.5 mm
+ * per mm, by 0.05 if they are in cm. A screw of many turns moves fast with its pitch. */
 #define SDM_SURVEY_SIZE_MIN 1.0
 #define SDM_SURVEY_SIZE_MAX 1000.0
-#define SDM_SURVEY_SPEED_MIN 0.1
+#define SDM_SURVEY_SPEED_MIN 0.25
 #define SDM_SURVEY_SPEED_MAX 100.0
+
+/* A single parameter in mm whose speed is lower is odd, even if others are fast. */
+#define SDM_SURVEY_SPEED_SLOW 0.02
+
+/* Is parameter k of the survey odd by itself: it moves no vertex, or its unit is mm and it is slow?
+ * false if its speed is not known. */
+bool sdm_survey_is_slow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k);
 
 #ifdef __cplusplus
 }

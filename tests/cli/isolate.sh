@@ -30,7 +30,7 @@ has '^broken +no mesh in [4-8] of 9 shapes: .*faulty\.so: mesh\(\): the plug-in 
 # the same bits
 for k in "" --isolate; do
     expect 0 - sdmgen exact --shape faulty -O fault=kink --plugin "$plugin" $k -o map$k.nrrd --jacobian jacobian$k.npy -q
-    expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" 'shape={name: faulty}' 'grid={size: [16, 14, 14], spacing: 0.8, centre: [1, 0, 0]}' \
+    expect 0 - coarse train "$source_folder/tests/cli/tiny.yaml" 'shape={name: faulty}' 'grid={size: [16, 14, 14], spacing: 0.8, centre: [1, 0, 0]}' \
         --plugin "$plugin" $k --out run$k -q
 done
 for file in map%.nrrd jacobian%.npy run%/model.sdm; do

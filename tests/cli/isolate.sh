@@ -9,7 +9,7 @@ isolated=(--plugin "$plugin" --isolate)
 fault() {
     expect 3 "error: shape 'faulty' at size=2.5 reach=1.5: $2" \
         sdmgen exact --shape faulty -O fault="$1" "${isolated[@]}" --isolate-seconds "${3:-60}" --isolate-memory 0.2 -o ended.nrrd
-    expect 0 - sdmgen exact --shape faulty -O fault="$1" -p size=1.5 --size 8,8,8 "${isolated[@]}" -q -o fine.nrrd
+    expect 0 - coarse exact --shape faulty -O fault="$1" -p size=1.5 --size 8,8,8 "${isolated[@]}" -q -o fine.nrrd
 }
 fault crash '.*/faulty\.so: mesh\(\): the plug-in used memory that is not its own'
 fault exit '.*/faulty\.so: mesh\(\): the plug-in called exit\(0\)'

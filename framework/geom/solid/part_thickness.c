@@ -1,5 +1,6 @@
 /* Measures the thickness of the parts of a mesh by chords: rays from points of the surface, against
- * the normal, to the wall of the union on the other side. */
+ * the normal, to the wall of the union on the other side. The thickness is their median: shorter
+ * ones belong to edges and tips, which every solid has. */
 #include "part_thickness.h"
 
 #include <math.h>
@@ -9,10 +10,6 @@
 #include "sdm/memory.h"
 
 enum { CHORDS = 64, CHORDS_MIN = 8, CROSSINGS_MAX = 128 };
-
-/* The thickness is the chord at this share of the chords, from the shortest. Shorter chords belong
- * to edges and tips, which every solid has. */
-static const double SHARE = 0.1;
 
 /* A place where a ray crosses the surface. */
 typedef struct crossing {
@@ -151,7 +148,7 @@ sdm_status sdm_part_thickness(const sdm_mesh *m, const sdm_bvh *tree, const uint
     for (size_t i = 0; i < n; i++) {
         if (of[i].n < CHORDS_MIN) continue;
         qsort(of[i].length, of[i].n, sizeof *of[i].length, by_length);
-        parts[i].thick = of[i].length[(size_t)(SHARE * (double)of[i].n)];
+        parts[i].thick = of[i].length[of[i].n / 2];
     }
     sdm_free(of);
     return SDM_OK;

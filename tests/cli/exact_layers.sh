@@ -44,7 +44,7 @@ numbers n.npy 3 f4 | awk '{ w = NR == 2 ? 0 : sqrt(0.5); if ($1 - w > 1e-6 || w 
 awk 'NR == 2 { print "10 12 0"; next } { print } NR > 2 && NR < 8 { v[NR] = $1 " " $2 " " $3 + 1 }
      NR == 7 { for (i = 3; i < 8; i++) print v[i] } NR > 7 { t[NR] = "3 " $2 + 5 " " $3 + 5 " " $4 + 5 }
      END { for (i = 8; i < 14; i++) print t[i] }' pyramid.off >two.off
-expect 0 - coarse exact --mesh two.off --size 1,1,1 --spacing 1 --origin '3,0.1,3' --quiet --triangle t.npy
+expect 0 - sdmgen exact --mesh two.off --size 1,1,1 --spacing 1 --origin '3,0.1,3' --quiet --triangle t.npy
 [ "$(numbers t.npy 1 u4)" = 9 ] || bad "triangle of the second pyramid: $(numbers t.npy 1 u4)"
 
 # Torus: d = hypot(r - major, z) - minor.

@@ -31,7 +31,7 @@ compare() {
 
 # pod: with bytes, halves and floats, one or several levels, blocks that the grid cuts, with and without MLP; the others on a grid whose
 # sizes are odd on lower levels
-train() { expect 0 - coarse train "$source_folder/tests/cli/tiny.yaml" --json --quiet --out "$@"; }
+train() { expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" --json --quiet --out "$@"; }
 train pod network.levels=3
 train pod_half network.weights=f16 network.activation=tanh
 train pod_float network.weights=f32 network.depth=0 network.levels=1 network.block=5

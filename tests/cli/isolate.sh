@@ -9,7 +9,7 @@ isolated=(--plugin "$plugin" --isolate)
 fault() {
     expect 3 "error: shape 'faulty' at size=2.5 reach=1.5: $2" \
         sdmgen exact --shape faulty -O fault="$1" "${isolated[@]}" --isolate-seconds "${3:-60}" --isolate-memory 0.2 -o ended.nrrd
-    expect 0 - coarse exact --shape faulty -O fault="$1" -p size=1.5 --size 8,8,8 "${isolated[@]}" -q -o fine.nrrd
+    expect 0 - sdmgen exact --shape faulty -O fault="$1" -p size=1.5 --size 8,8,8 "${isolated[@]}" -q -o fine.nrrd
 }
 fault crash '.*/faulty\.so: mesh\(\): the plug-in used memory that is not its own'
 fault exit '.*/faulty\.so: mesh\(\): the plug-in called exit\(0\)'
@@ -30,7 +30,7 @@ has '^broken +no mesh in [4-8] of 9 shapes: .*faulty\.so: mesh\(\): the plug-in 
 # the same bits
 for k in "" --isolate; do
     expect 0 - sdmgen exact --shape faulty -O fault=kink --plugin "$plugin" $k -o map$k.nrrd --jacobian jacobian$k.npy -q
-    expect 0 - coarse train "$source_folder/tests/cli/tiny.yaml" 'shape={name: faulty}' 'grid={size: [16, 14, 14], spacing: 0.8, centre: [1, 0, 0]}' \
+    expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" 'shape={name: faulty}' 'grid={size: [16, 14, 14], spacing: 0.8, centre: [1, 0, 0]}' \
         --plugin "$plugin" $k --out run$k -q
 done
 for file in map%.nrrd jacobian%.npy run%/model.sdm; do

@@ -14,10 +14,10 @@ for kind in sdmnn deepsdf imnet template; do
     [ $kind = sdmnn ] && small="$small network.channels=4"
     [ $kind = template ] && small="$small shape.name=ellipsoid" # too few voxels for the warp of a capsule
     # shellcheck disable=SC2086 # several words
-    expect 0 - coarse train base.yaml network.kind=$kind $small --out $kind --json --quiet
+    expect 0 - sdmgen train base.yaml network.kind=$kind $small --out $kind --json --quiet
     model=$kind/model.sdm
     present $model $kind/loss.png $kind/slices.png $kind/config.yaml
-    expect 0 - coarse config $kind/config.yaml -q
+    expect 0 - sdmgen config $kind/config.yaml -q
     expect 0 - sdmgen info $model
     has "$kind"
     sdmgen verify $model --quiet --samples 4 >out 2>err

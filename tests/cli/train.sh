@@ -62,11 +62,11 @@ absent unpictured/checkpoint.sdmc
 
 # A model whose times cannot be measured is finished all the same: the summary has the figures that there are.
 faulty=("shape={name: faulty, options: {fault: trained}}" 'grid={size: [16, 14, 14], spacing: 0.8, centre: [1, 0, 0]}' --plugin ../../plugins/faulty/faulty.so)
-expect 0 'warning: the time of a map was not measured: .*a model is there' coarse train "$tiny" "${faulty[@]}" --out trained --quiet --json
+expect 0 'warning: the time of a map was not measured: .*a model is there' sdmgen train "$tiny" "${faulty[@]}" --out trained --quiet --json
 [ "$(json ms_exact)" = null ] || bad "a time of the exact engine: $(json ms_exact)"
 awk -v t="$(json ms_network)" 'BEGIN { exit !(t > 0) }' || bad "no time of the network: $(json ms_network)"
 rm -r trained
-expect 0 'not measured' coarse train "$tiny" "${faulty[@]}" --out trained --quiet
+expect 0 'not measured' sdmgen train "$tiny" "${faulty[@]}" --out trained --quiet
 has '^  time        one map on one core: network [0-9.]+ ms, exact engine not measured$'
 
 # A model that cannot be written, because a folder has its name: the error names the checkpoint, and --quiet does not hide that.

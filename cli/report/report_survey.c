@@ -265,7 +265,7 @@ static void tell_unit(teller *t)
     tell(t, SDM_E_QUALITY, &text);
 }
 
-/* Parameters that hardly move a vertex, and units that sdmgen does not know. */
+/* Parameters that hardly move a vertex, angles in degrees, and units that sdmgen does not know. */
 static void tell_params(teller *t)
 {
     const sdm_shape_survey *f = &t->s->found;
@@ -284,6 +284,13 @@ static void tell_params(teller *t)
                          "vertices of a part in another unit than mm?",
                          params[k].name, f->speed[k]);
             tell(t, SDM_E_QUALITY, &slow);
+        }
+        if (sdm_survey_is_odd_angle(&params[k])) {
+            sdm_text_add(&other,
+                         "the parameter '%s' ranges from %g to %g rad: are these degrees (times "
+                         "0.017453)?",
+                         params[k].name, params[k].min, params[k].max);
+            tell(t, SDM_E_QUALITY, &other);
         }
         if (t->s->brief || !strcmp(unit, "mm") || !strcmp(unit, "rad") || !strcmp(unit, "sd") ||
             !*unit)

@@ -427,7 +427,7 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
     bool bad = s->inside_out.shapes || (s->turned.shapes && s->turned.shapes < s->n) ||
                s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->thin.shapes ||
                s->unlike || s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
-               s->scale.odd_speed;
+               s->scale.odd_speed || s->scale.odd_angle;
     for (size_t k = 0; k < s->n_params && s->jump; k++)
         bad = bad || s->jump[k].kind != SDM_BREAK_NONE;
     bad = bad || s->slow;

@@ -85,7 +85,10 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
     sdm_survey_scale *c = &s->scale;
     *c = (sdm_survey_scale){.speed = NAN};
     sdm_status status = SDM_ALLOC(&s->speed, s->n_params, "speeds of parameters", err);
-    for (size_t k = 0; k < s->n_params && !status; k++) s->speed[k] = NAN;
+    for (size_t k = 0; k < s->n_params && !status; k++) {
+        s->speed[k] = NAN;
+        c->odd_angle = c->odd_angle || sdm_survey_is_odd_angle(&f->shape->params[k]);
+    }
     if (status || s->failed.shapes == s->n) return status;
     for (int a = 0; a < 3; a++) c->size = fmax(c->size, s->high[a] - s->low[a]);
     c->odd_size = c->size < SDM_SURVEY_SIZE_MIN || c->size > SDM_SURVEY_SIZE_MAX;

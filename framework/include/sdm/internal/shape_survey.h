@@ -2,6 +2,8 @@
  * what spoils maps, derivatives and trainings. */
 #pragma once
 
+#include <string.h>
+
 #include "sdm/grid.h"
 #include "sdm/registry.h"
 
@@ -58,10 +60,17 @@ typedef struct sdm_survey_scale {
     double speed;
     size_t param;
     bool odd_speed; /* it is below SDM_SURVEY_SPEED_MIN or above SDM_SURVEY_SPEED_MAX */
+    bool odd_angle; /* of a parameter with the unit rad, see sdm_survey_is_odd_angle() */
     /* the unit that would explain both, and its length in mm; NULL: none would */
     const char *unit;
     double unit_mm;
 } sdm_survey_scale;
+
+/* Does a parameter in rad reach beyond 30, almost five turns? It is likely to be in degrees. */
+static inline bool sdm_survey_is_odd_angle(const sdm_param *p)
+{
+    return !strcmp(p->unit, "rad") && !(p->max <= 30 && p->min >= -30);
+}
 
 /* Zero-initialise; sdm_shape_survey_dispose() frees. */
 typedef struct sdm_shape_survey {

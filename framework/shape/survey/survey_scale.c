@@ -8,6 +8,9 @@
 #include "sdm/internal/units.h"
 #include "sdm/memory.h"
 
+/* rad; larger angles are likely to be degrees. */
+static const double ANGLE_MAX = 30;
+
 /* The step of a parameter, as a fraction of its range. */
 static const double STEP = 0.01;
 
@@ -78,6 +81,11 @@ static sdm_status find_speed(const shape_family *f, sdm_shape_survey *s, sdm_err
             s->scale.speed = s->speed[k], s->scale.param = k;
     for (size_t k = 0; k < s->n_params; k++) s->slow += sdm_survey_is_slow(s, f->shape, k);
     return status;
+}
+
+bool sdm_survey_is_odd_angle(const sdm_param *p)
+{
+    return !strcmp(p->unit, "rad") && !(p->max <= ANGLE_MAX && p->min >= -ANGLE_MAX);
 }
 
 sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, sdm_error *err)

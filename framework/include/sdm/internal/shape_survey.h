@@ -2,8 +2,6 @@
  * what spoils maps, derivatives and trainings. */
 #pragma once
 
-#include <string.h>
-
 #include "sdm/grid.h"
 #include "sdm/registry.h"
 
@@ -67,10 +65,7 @@ typedef struct sdm_survey_scale {
 } sdm_survey_scale;
 
 /* Does a parameter in rad reach beyond 30, almost five turns? It is likely to be in degrees. */
-static inline bool sdm_survey_is_odd_angle(const sdm_param *p)
-{
-    return !strcmp(p->unit, "rad") && !(p->max <= 30 && p->min >= -30);
-}
+bool sdm_survey_is_odd_angle(const sdm_param *p);
 
 /* Zero-initialise; sdm_shape_survey_dispose() frees. */
 typedef struct sdm_shape_survey {

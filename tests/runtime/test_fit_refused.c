@@ -161,7 +161,7 @@ static void test_each_allocation_may_fail(void **state)
     const sdm_fit_source source = exact_source();
     const sdm_fit_opts o = near_start();
     size_t failed = 0;
-    for (unsigned long n = 1; n < 1000; n += n < 30 ? 1 : n / 3) {
+    for (unsigned long n = 1; n < 700; n += n < 30 ? 1 : n) {
         sdm_fit_result r;
         sdm_error err = {0};
         sdm_alloc_fail_after(n);

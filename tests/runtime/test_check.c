@@ -11,27 +11,12 @@
 
 #include "oracle/exact_meshes.h"
 #include "oracle/exact_tools.h"
-#include "sdm/builtin_shapes.h"
+#include "oracle/shape_registry.h"
 #include "sdm/check.h"
 #include "sdm/memory.h"
 #include "sdm/runtime.h"
 
 static const double centre[3] = {0.3, -0.2, 0.1};
-static sdm_registry *registry;
-
-static int set_up(void **state)
-{
-    (void)state;
-    return sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL);
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    sdm_registry_free(registry);
-    return 0;
-}
-
 static sdm_check check_of(const sdm_exact *e, const sdm_grid *g, const float *values)
 {
     sdm_check c;

@@ -12,24 +12,9 @@
 #include <cmocka.h>
 
 #include "oracle/exact_tools.h"
-#include "sdm/builtin_shapes.h"
+#include "oracle/shape_registry.h"
 #include "sdm/internal/heap.h"
 #include "sdm/runtime.h"
-
-static sdm_registry *registry;
-
-static int set_up(void **state)
-{
-    (void)state;
-    return sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL);
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    sdm_registry_free(registry);
-    return 0;
-}
 
 static sdm_instance *shape_make(const sdm_shape *shape, const char *option, const char *value)
 {

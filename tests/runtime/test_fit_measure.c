@@ -12,28 +12,14 @@
 
 #include <cmocka.h>
 
-#include "sdm/builtin_shapes.h"
+#include "oracle/shape_registry.h"
 #include "sdm/fit.h"
 #include "sdm/internal/rng.h"
 
 #define PI 3.14159265358979323846
 #define N_MAX 16
 
-static sdm_registry *registry;
 static sdm_error err;
-
-static int set_up(void **state)
-{
-    (void)state;
-    return sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL);
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    sdm_registry_free(registry);
-    return 0;
-}
 
 static sdm_instance *shape_make(const char *name, const sdm_named_text *options, size_t n)
 {

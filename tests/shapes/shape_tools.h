@@ -7,25 +7,10 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "sdm/builtin_shapes.h"
+#include "oracle/shape_registry.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 #include "sdm/mesh.h"
-
-static sdm_registry *registry;
-
-static int set_up(void **state)
-{
-    (void)state;
-    return sdm_registry_create(&registry, NULL) || sdm_builtin_shapes_add(registry, NULL);
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    sdm_registry_free(registry);
-    return 0;
-}
 
 // An instance of a shape; options are written as "name=value name=value".
 static sdm_instance *shape_make(const char *shape, const char *options)

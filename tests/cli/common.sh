@@ -11,6 +11,15 @@ unset SDMGEN_PLUGIN_PATH
 export LC_ALL=C
 
 sdmgen() { "$program" "$@"; }
+# sdmgen_without PATTERN ARGUMENT...: runs sdmgen without the lines of its stderr that match PATTERN.
+sdmgen_without() {
+    local pattern=$1 code
+    shift
+    "$program" "$@" 2>raw
+    code=$?
+    grep -Ev -- "$pattern" raw >&2
+    return $code
+}
 
 bad() {
     failures=$((failures + 1))

@@ -7,12 +7,7 @@ export OMP_WAIT_POLICY=passive
 
 # Removes lines of progress from stderr, which appear only when the machine is slow, and the notice about the tissues, which all fits to
 # images give here.
-sdmgen() {
-    "$program" "$@" 2>raw
-    local code=$?
-    grep -Ev '^sdmgen: (search|fit|polish) [0-9]+ %|of which the default is fluid in bone' raw >&2
-    return $code
-}
+sdmgen() { sdmgen_without '^sdmgen: (search|fit|polish) [0-9]+ %|of which the default is fluid in bone' "$@"; }
 
 # values FILE: all float32 values of a .npy file, one per line.
 values() { tail -c +129 "$1" | od -An -v -t f4 -w4 | tr -d ' '; }

@@ -7,12 +7,7 @@ model=../files-of-train/run/model.sdm
 present $model
 
 # Removes lines of progress from stderr; they appear only when the machine is slow.
-sdmgen() {
-    "$program" "$@" 2>raw
-    local code=$?
-    grep -Ev '^sdmgen: (search|fit|polish) [0-9]+ %' raw >&2
-    return $code
-}
+sdmgen() { sdmgen_without '^sdmgen: (search|fit|polish) [0-9]+ %' "$@"; }
 # pose KEY I: element I (from 1) of the array KEY of the pose.
 pose() { sed -n "s/.*\"$1\": \\[\\([^]]*\\)\\].*/\\1/p" out | head -n 1 | tr -d ' ' | cut -d, -f"$2"; }
 

@@ -7,12 +7,7 @@ model=../files-of-train/run/model.sdm
 present $model
 
 # Removes lines of progress from stderr; they appear only when the machine is slow.
-sdmgen() {
-    "$program" "$@" 2>raw
-    local code=$?
-    grep -Ev '^sdmgen: (search|fit|polish|generate) [0-9]+ %' raw >&2
-    return $code
-}
+sdmgen() { sdmgen_without '^sdmgen: (search|fit|polish|generate) [0-9]+ %' "$@"; }
 # measure NAME KEY [DEPTH]: the value of KEY of a measure in the JSON in `out`.
 measure() { tr '{' '\n' <out | grep -F "\"name\": \"$1\"" | grep -F "${3:+\"depth_mm\": $3,}" | sed -n "s/.*\"$2\": \"*\\([^,}\"]*\\).*/\\1/p" | head -n 1; }
 

@@ -89,7 +89,7 @@ static void limit_memory(uint64_t bytes)
     setrlimit(RLIMIT_AS, &limit);
 }
 
-/* Ends the process when the program has ended, also while a callback does not. */
+/* Ends this process as soon as the program has ended, even while a callback is running. */
 static void *watch_program(void *user)
 {
     const worker *w = user;
@@ -244,6 +244,15 @@ static sdm_status make_mesh(worker *w, const isolated_request *q, isolated_answe
     return status;
 }
 
+/* Ends the call of a callback. The status of its return value `failed`, 0: SDM_OK. */
+static sdm_status end_call(host_call *call, const char *name, int failed, sdm_error *err)
+{
+    const sdm_status s =
+        failed ? sdm_host_call_failed(call, name, failed, SDM_E_PLUGIN, err) : SDM_OK;
+    sdm_host_call_end(call);
+    return s;
+}
+
 static sdm_status make_velocity(worker *w, const isolated_request *q, sdm_error *err)
 {
     const sdm_instance *s = w->instance;
@@ -256,12 +265,9 @@ static sdm_status make_velocity(worker *w, const isolated_request *q, sdm_error 
     sdm_host_call_begin(&call, NULL, false);
     const int failed =
         s->shape->velocity(s->self, &call.host, s->options, p, (size_t)q->n_vert, reals_of(w));
-    sdm_status status =
-        failed ? sdm_host_call_failed(&call, "velocity", failed, SDM_E_PLUGIN, err) : SDM_OK;
+    sdm_status status = end_call(&call, "velocity", failed, err);
     if (!status) status = check_params(w, p, q->p, err);
-    if (!status) status = check_around(w, err);
-    sdm_host_call_end(&call);
-    return status;
+    return status ? status : check_around(w, err);
 }
 
 static sdm_status make_distance(worker *w, const isolated_request *q, isolated_answer *a,
@@ -271,10 +277,7 @@ static sdm_status make_distance(worker *w, const isolated_request *q, isolated_a
     host_call call;
     sdm_host_call_begin(&call, NULL, false);
     const int failed = s->shape->distance(s->self, &call.host, s->options, q->p, q->x, &a->value);
-    const sdm_status status =
-        failed ? sdm_host_call_failed(&call, "distance", failed, SDM_E_PLUGIN, err) : SDM_OK;
-    sdm_host_call_end(&call);
-    return status;
+    return end_call(&call, "distance", failed, err);
 }
 
 static sdm_status make_measure(worker *w, const isolated_request *q, isolated_answer *a,
@@ -287,10 +290,7 @@ static sdm_status make_measure(worker *w, const isolated_request *q, isolated_an
     sdm_host_call_begin(&call, NULL, false);
     const int failed =
         s->shape->measure(s->self, &call.host, s->options, q->p, q->measure, q->x[0], &a->value);
-    const sdm_status status =
-        failed ? sdm_host_call_failed(&call, "measure", failed, SDM_E_PLUGIN, err) : SDM_OK;
-    sdm_host_call_end(&call);
-    return status;
+    return end_call(&call, "measure", failed, err);
 }
 
 /* ---- requests ---- */

@@ -266,11 +266,9 @@ static const sdm_fit_finding *reason(const sdm_fit_verdict *v)
     for (size_t i = 0; i < v->n_findings; i++) {
         const sdm_fit_finding *x = &v->findings[i];
         if (x->grade != SDM_FIT_FAILED) continue;
-        if (x->kind == SDM_FIT_CHECK_SIZE) return x;
-        if (x->kind == SDM_FIT_CHECK_DATA) why = x;
-        if (why && why->kind == SDM_FIT_CHECK_DATA) continue;
-        const bool cut = x->kind == SDM_FIT_CHECK_GRID && why && why->kind > SDM_FIT_CHECK_CONTRAST;
-        if (!why || cut) why = x;
+        const bool cut = x->kind == SDM_FIT_CHECK_GRID && why && why->kind > SDM_FIT_CHECK_CONTRAST,
+                   little = x->kind == SDM_FIT_CHECK_DATA || x->kind == SDM_FIT_CHECK_SIZE;
+        if (!why || cut || little) why = x;
     }
     return why;
 }

@@ -55,7 +55,7 @@ static void notice_part(const cohort_run *r)
                    r->part, r->n_parts, r->first + 1, r->end, n);
 }
 
-/* ---- one case ---- */
+/* ---- the fit of one case: whether it is to be done, its lease, its record ---- */
 
 static bool is_later(const struct timespec *a, const struct timespec *b)
 {

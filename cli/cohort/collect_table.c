@@ -182,7 +182,8 @@ static void read_row(reader *r, const char *out)
         read_fit(r, out);
 }
 
-/* Sorts the columns by group, else as they came, and fills table->values. */
+/* Sorts the columns of the table by group, and within a group in the order in which they were
+ * found; then sets table->values[row][column]. */
 static sdm_status fill(reader *r)
 {
     cli_collect *t = r->table;

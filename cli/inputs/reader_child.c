@@ -48,7 +48,7 @@ static limits limits_of(uint64_t file_bytes)
     return (limits){512 * MEGABYTE + 32 * file_bytes, 2 + file_bytes / 1000000};
 }
 
-/* Address space that the process has now, bytes. */
+/* Size of the address space of this process, bytes. */
 static uint64_t bytes_now(void)
 {
     unsigned long long pages = 0;

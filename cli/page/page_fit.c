@@ -138,7 +138,8 @@ static sdm_status get_estimate(const sdm_model_info *m, cli_page_fit *f, sdm_err
 
 /* ---- the standard deviation of the surface ---- */
 
-/* cov[n][n] = the covariance; *known: whether it has no nulls. */
+/* cov[n][n] = the covariance of the unknowns in the JSON of the fit. *known = false if one of its
+ * elements is null there, which is NaN in cov. */
 static sdm_status get_covariance(const cli_page_fit *f, double *cov, size_t n, bool *known,
                                  sdm_error *err)
 {

@@ -1,5 +1,5 @@
-/* Fuzz target of the reader of experiments: an experiment, of which every row gives a
- * configuration, or a message. The input is that of fuzz_split(). */
+/* Fuzz target of the reader of experiment files: a file is refused with a message, or each of its
+ * rows gives a configuration. fuzz_split() says what the input holds. */
 #include "fuzz_reader.h"
 #include "sdm/internal/experiment.h"
 

@@ -65,11 +65,14 @@ static void mark_layer(tracer *t, size_t k)
     }
 }
 
-/* The bits of the voxels that follow those of word w along x, and of those that have a follower. */
+/* Bit i of the result: the bit of the voxel with the next larger x after voxel 64 w + i of the row;
+ * 0 behind the last voxel. */
 static uint64_t next_along_x(const tracer *t, const uint64_t *row, size_t w)
 {
     return row[w] >> 1 | (w + 1 < t->words ? row[w + 1] << 63 : 0);
 }
+
+/* Bit i of the result: whether voxel 64 w + i is not the last one of its row. */
 static uint64_t have_next(const tracer *t, size_t w)
 {
     return w + 1 < t->words ? UINT64_MAX : ((uint64_t)1 << (t->nx - 1) % 64) - 1;

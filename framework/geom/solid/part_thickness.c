@@ -63,7 +63,8 @@ static void cross(ray *r, const sdm_mesh *m, uint32_t t)
     if (t == r->triangle || !(det != 0 && a >= 0 && b >= 0 && a + b <= 1 && at > 0)) return;
     // det > 0: the triangle faces the origin of the ray
     const int step = det > 0 ? 1 : -1;
-    r->inner -= step; // the winding number is 0 at the end of the ray
+    // far away the winding number is 0: that at the origin is minus the sum of all steps
+    r->inner -= step;
     if (r->n < CROSSINGS_MAX) r->found[r->n] = (crossing){at, step};
     r->n++;
 }

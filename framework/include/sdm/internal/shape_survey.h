@@ -146,7 +146,8 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 #define SDM_SURVEY_SPEED_MIN 0.25
 #define SDM_SURVEY_SPEED_MAX 100.0
 
-/* A single parameter in mm whose speed is lower is odd, even if others are fast. */
+/* mm per mm: a parameter with the unit mm is suspicious if 1 mm of it moves no vertex farther than
+ * this, even where other parameters move them far. */
 #define SDM_SURVEY_SPEED_SLOW 0.02
 
 /* Is parameter k of the survey odd by itself: it moves no vertex, or its unit is mm and it is slow?

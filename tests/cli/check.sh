@@ -3,6 +3,7 @@
 # outputs report it.
 # Tests: check.c cmd_generate.c
 . "$(dirname "$0")/common.sh"
+coarse_grids=yes
 model=../files-of-train/run/model.sdm
 present $model
 grid=(--size 16,14,12 --spacing 0.9)

@@ -2,6 +2,7 @@
 # sdmgen exact --closest --normal --triangle --jacobian: shapes and values of the arrays, mistakes, no partial files.
 # Tests: exact_layers.c
 . "$(dirname "$0")/common.sh"
+coarse_grids=yes
 
 # numbers FILE COUNT TYPE: the last COUNT values of the file, one per line.
 numbers() { od -An -v -t "$3" -w4 -j $(($(wc -c <"$1") - 4 * $2)) "$1" | tr -d ' '; }

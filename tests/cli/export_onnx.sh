@@ -5,6 +5,7 @@
 # Tests: cmd_export.c model_onnx.c onnx_file.c onnx_graph.c onnx_ops.c pod_onnx.c point_onnx.c protobuf.c sdmnn_onnx.c template_onnx.c
 # template_onnx_blocks.c template_onnx_lookup.c template_onnx_warp.c
 . "$(dirname "$0")/common.sh"
+coarse_grids=yes
 tool=$source_folder/tests/cli/onnx_tool.py
 python=
 for p in python3 /usr/bin/python3; do $p -c 'import numpy' 2>/dev/null && python=$p && break; done

@@ -2,6 +2,7 @@
 # A shape outside of the source tree: the plug-in of examples/gear and its configuration, from the list of shapes to the maps of a network.
 # Tests: config_shape.c setup.c
 . "$(dirname "$0")/common.sh"
+coarse_grids=yes
 config=$source_folder/examples/gear/gear.yaml
 plugin=../../plugins/gear/gear.so
 small=(grid.size='[12, 12, 6]' grid.spacing=0.9 network='{depth: 1, width: 16, modes: 16, degree: 2, input_degree: 2}'

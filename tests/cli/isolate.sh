@@ -2,6 +2,7 @@
 # --isolate: what a plug-in does in its callbacks ends in one line and exit code 3; results have the same bits; no process is left.
 # Tests: setup.c main.c isolated_worker.c
 . "$(dirname "$0")/common.sh"
+coarse_grids=yes
 plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
 isolated=(--plugin "$plugin" --isolate)
 

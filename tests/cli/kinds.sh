@@ -2,6 +2,7 @@
 # Every kind of network through all commands, from train to eval.
 # Tests: bench_network.c
 . "$(dirname "$0")/common.sh"
+coarse_grids=yes
 cat >base.yaml <<'END'
 shape: {name: capsule}
 grid: {size: [12, 12, 14], spacing: 1.2}

@@ -2,6 +2,7 @@
 # sdmgen train: the run folder and its protection, interrupt and resume. The tests of models use the run made here.
 # Tests: cmd_train.c report_verdict.c train_progress.c
 . "$(dirname "$0")/common.sh"
+coarse_grids=yes
 tiny=$source_folder/tests/cli/tiny.yaml
 
 # interrupted FOLDER CONFIG [KEY=VALUE ...]: starts a training and stops it after 500 steps.

@@ -32,6 +32,15 @@ typedef struct template_expansion {
     float linear[4];   /* weight of the second of two stations */
 } template_expansion;
 
+/* Rows of a part's distance f s + r at n points and of its derivatives: template f with the
+   gradient g, factor s of the metric, correction r. by_u, df, dg, dr: by the index u; dg[a]: by
+   u[a]. */
+typedef struct template_slope_rows {
+    float *f, *g[3], *df[3], *dg[3][3];
+    float *factor, *by_u[3], *by_metric[6]; /* of s */
+    float *dr[3];
+} template_slope_rows;
+
 typedef struct template_table {
     /* c[n_c][64] = combinations of stations in a block of 16 lines of four voxels: the first three
        by cubic B-splines of points[line][4 stations][4], the others linear in metric[line][2
@@ -48,6 +57,17 @@ typedef struct template_table {
                       float *out);
     /* out[n] += the map at the indices u[3][n], trilinear. */
     void (*correct)(const template_correction *c, size_t n, const float *const *u, float *out);
+    /* f, g, df, dg of *out: of the template at the indices u[3][n], as for `lookup`. */
+    void (*lookup_slopes)(const template_level *l, size_t n, const float *const *u,
+                          const template_slope_rows *out);
+    /* factor, by_u, by_metric of *r from its g and dg and from metric[6][n]: the factor 1 / sqrt(q)
+       of `normalise`. */
+    void (*factor_slopes)(size_t n, const float *const *metric, const template_slope_rows *r);
+    /* out[3][n] = the derivatives by u of the map that `correct` adds. */
+    void (*correct_slopes)(const template_correction *c, size_t n, const float *const *u,
+                           float *const *out);
+    /* sum[64] = a[0] b[0] + ... + a[n-1] b[n-1], n > 0 rows of 64 each. */
+    void (*sum_products)(size_t n, const float *const *a, const float *const *b, float *sum);
     /* value[4][4][4] = a function in a block of 4 x 4 x 4 voxels, cubic interpolation (Hermite)
        from its value and slopes by blocks at the eight corners, the voxels (0, 0, 0) .. (4, 4, 4):
        corner[x][4], and the same `line` floats further along y and `plane` floats along z. */

@@ -442,9 +442,15 @@ static void displace(const float *control, size_t line, size_t plane, const floa
     sum_line(z, x[0], sum[3]);
 }
 
+#include "template_kernels_slopes.h"
+
 const template_table TABLE = {.expand = expand,
                               .lookup = lookup,
                               .normalise = normalise,
                               .correct = correct,
+                              .lookup_slopes = lookup_slopes,
+                              .factor_slopes = factor_slopes,
+                              .correct_slopes = correct_slopes,
+                              .sum_products = sum_products,
                               .block = block,
                               .displace = displace};

@@ -47,6 +47,10 @@ typedef struct template_table {
        stations][8] (n_c = 3 or 9). stride: floats from one line to the next. */
     void (*expand)(const template_expansion *e, const float *points, const float *metric,
                    size_t stride, size_t n_c, float *const *c);
+    /* out[n][4] and then out[n][8] = the points[4][n][4] and the metric[2][n][8] of neighbouring
+       layers of n stations, combined for voxel `phase` between them. */
+    void (*combine)(const template_expansion *e, const float *points, const float *metric, size_t n,
+                    size_t phase, float *out);
     /* f[n] = distance and g[3][n] = gradient of the template at the indices u[3][n] in the lattice
        `near`, interpolated in `l`; indices outside the lattice are clamped. */
     void (*lookup)(const template_level *l, size_t n, const float *const *u, float *f,
@@ -68,6 +72,11 @@ typedef struct template_table {
                            float *const *out);
     /* sum[64] = a[0] b[0] + ... + a[n-1] b[n-1], n > 0 rows of 64 each. */
     void (*sum_products)(size_t n, const float *const *a, const float *const *b, float *sum);
+    /* How many of the 64 sums base + slope . offset[3][64] are larger than value[64]? */
+    int32_t (*count_above)(float base, const float slope[3], const float *const *offset,
+                           const float *value);
+    /* The smallest of |value[64]|, none of which is NAN. */
+    float (*least)(const float *value);
     /* value[4][4][4] = a function in a block of 4 x 4 x 4 voxels, cubic interpolation (Hermite)
        from its value and slopes by blocks at the eight corners, the voxels (0, 0, 0) .. (4, 4, 4):
        corner[x][4], and the same `line` floats further along y and `plane` floats along z. */

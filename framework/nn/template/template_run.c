@@ -8,27 +8,15 @@ enum { BLOCK = SDM_TEMPLATE_STEP, VOXELS = SDM_TEMPLATE_BLOCK_VOXELS };
 
 /* Stations. */
 
-// out[n][4] and then out[n][8] = the points[4][n][4] and the metric[2][n][8] of neighbouring layers
-// of n stations, combined for voxel `phase` between them.
-static void combine(const template_expansion *e, const float *points, const float *metric, size_t n,
-                    size_t phase, float *out)
-{
-    float w[4], *out_metric = out + 4 * n;
-    for (int a = 0; a < 4; a++) w[a] = e->cubic[a][phase];
-    const float t = e->linear[phase], *p = points, *g = metric;
-    for (size_t i = 0; i < 4 * n; i++)
-        out[i] = w[0] * p[i] + w[1] * p[4 * n + i] + w[2] * p[8 * n + i] + w[3] * p[12 * n + i];
-    for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
-}
-
 void sdm_template_expand(const template_network *k, const template_block *b, warp_lines *l,
                          size_t n_c, float *const *c)
 {
     const size_t nx = k->stations[0], n = nx * k->stations[1], plane = 12 * n, line = 12 * nx;
+    const template_table *t = sdm_template_kernels();
     if (l->plane_of != b->at[2]) {
         for (size_t z = 0; z < BLOCK; z++)
-            combine(&k->expansion, l->points + 4 * n * b->at[2], l->metric + 8 * n * (b->at[2] + 1),
-                    n, z, l->plane + z * plane);
+            t->combine(&k->expansion, l->points + 4 * n * b->at[2],
+                       l->metric + 8 * n * (b->at[2] + 1), n, z, l->plane + z * plane);
         l->plane_of = b->at[2];
         l->line_of = SIZE_MAX;
     }
@@ -36,14 +24,14 @@ void sdm_template_expand(const template_network *k, const template_block *b, war
         for (size_t z = 0; z < BLOCK; z++) {
             const float *from = l->plane + z * plane;
             for (size_t y = 0; y < BLOCK; y++)
-                combine(&k->expansion, from + 4 * nx * b->at[1],
-                        from + 4 * n + 8 * nx * (b->at[1] + 1), nx, y,
-                        l->line + (BLOCK * z + y) * line);
+                t->combine(&k->expansion, from + 4 * nx * b->at[1],
+                           from + 4 * n + 8 * nx * (b->at[1] + 1), nx, y,
+                           l->line + (BLOCK * z + y) * line);
         }
         l->line_of = b->at[1];
     }
-    sdm_template_kernels()->expand(&k->expansion, l->line + 4 * b->at[0],
-                                   l->line + 4 * nx + 8 * (b->at[0] + 1), line, n_c, c);
+    t->expand(&k->expansion, l->line + 4 * b->at[0], l->line + 4 * nx + 8 * (b->at[0] + 1), line,
+              n_c, c);
 }
 
 /* Lookup. */

@@ -25,11 +25,11 @@ static void list_rows(template_slope_rows *r, float **field[ALL_ROWS])
 }
 
 void sdm_template_take_slope_rows(const template_network *k, void *memory, size_t *at,
-                                  template_slope_rows *near, template_slope_rows *far)
+                                  template_slope_rows *rows, template_slope_rows *far)
 {
     float **field[ALL_ROWS];
     const size_t bytes = sdm_template_row_bytes(k);
-    list_rows(near, field);
+    list_rows(rows, field);
     for (size_t i = 0; i < ALL_ROWS; i++) *field[i] = sdm_template_take(memory, at, bytes);
     list_rows(far, field);
     for (size_t i = 0; i < LOOKUP_ROWS; i++) *field[i] = sdm_template_take(memory, at, bytes);

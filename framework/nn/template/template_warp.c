@@ -123,20 +123,19 @@ typedef struct warp_place {
     float weights[3][2][4]; /* along x, y, z, and their derivatives */
 } warp_place;
 
-static warp_place place_of(const sdm_lattice *l, const double y[3])
+static inline void find_place(const sdm_lattice *l, const double y[3], warp_place *p)
 {
     const double per_mm = 1 / l->spacing;
-    warp_place p;
     size_t at[3];
     for (int a = 0; a < 3; a++)
-        at[a] = first_weights((y[a] - l->origin[a]) * per_mm, l->n[a], (float)per_mm, p.weights[a]);
-    p.first = 4 * (at[0] + l->n[0] * (at[1] + l->n[1] * at[2]));
-    return p;
+        at[a] =
+            first_weights((y[a] - l->origin[a]) * per_mm, l->n[a], (float)per_mm, p->weights[a]);
+    p->first = 4 * (at[0] + l->n[0] * (at[1] + l->n[1] * at[2]));
 }
 
 // The same as sdm_template_displacement() without second derivatives, faster.
-static void displacement(const sdm_lattice *l, const float *control, const warp_place *p,
-                         double u[3], double du[9])
+static inline void displacement(const sdm_lattice *l, const float *control, const warp_place *p,
+                                double u[3], double du[9])
 {
     const size_t line = 4 * (size_t)l->n[0], plane = line * l->n[1];
     float sum[4][4];
@@ -166,7 +165,8 @@ static void newton(const sdm_lattice *l, const float *control, const double q[3]
     const double stop = 0.005 * l->spacing, longest = 0.5 * l->spacing;
     for (int n = 0; n < ITERATIONS; n++) {
         double u[3], du[9], f[3], d[3];
-        const warp_place place = place_of(l, y);
+        warp_place place;
+        find_place(l, y, &place);
         displacement(l, control, &place, u, du);
         inverse_of_warp(du, inverse);
         for (int i = 0; i < 3; i++) f[i] = q[i] - y[i] - u[i];
@@ -342,7 +342,7 @@ static void prepare_station(const sdm_template_part *part, const part_pose *pose
         for (int j = 0; j < 3; j++) turned[3 * i + j] = out->b[3 * j + i];
     m3_product(out->b, turned, out->metric);
     sdm_template_displacement(&part->warp, w->control, s->y, u, du, out->bend);
-    out->place = place_of(&part->warp, s->y);
+    find_place(&part->warp, s->y, &out->place);
 }
 
 // The derivatives of a station.

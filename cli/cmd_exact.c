@@ -174,9 +174,10 @@ static sdm_status run_points(job *j, sdm_error *err)
     if (!s) s = sdm_exact_create(&j->mesh, &opts, &engine, err);
     if (!s) j->report = *sdm_exact_get_report(engine);
     if (!s) s = sdm_exact_points(engine, x, n, &j->points.at, err);
+    if (!s) s = cli_points_write(&j->points, x, j->args, err);
     sdm_exact_free(engine);
     sdm_free(x);
-    return s ? s : cli_points_write(&j->points, j->args, err);
+    return s;
 }
 
 typedef struct progress_state {

@@ -9,6 +9,7 @@
 #include "inputs/setup.h"
 #include "measure/measures.h"
 #include "report/exact_layers.h"
+#include "report/files.h"
 #include "report/json_values.h"
 #include "report/output.h"
 #include "report/points_table.h"
@@ -293,6 +294,20 @@ static sdm_status judge_signs(const job *j, sdm_error *err)
         c->below_zero);
 }
 
+/* Volume of the union of the mesh, mm^3, if a surface is written; NaN: none is, or not known. */
+static double shape_volume(const job *j)
+{
+    sdm_part_audit audit;
+    bool surface = false;
+    double volume = NAN;
+    for (size_t i = 0; i < j->args->outputs.n; i++)
+        surface = surface || cli_ends_with_any(j->args->outputs.items[i], CLI_MESH_ENDINGS);
+    if (!surface || sdm_part_audit_make(&j->mesh, true, &audit, NULL)) return NAN;
+    if (audit.mesh.closed && !audit.inside_out) volume = audit.union_volume;
+    sdm_part_audit_dispose(&audit);
+    return volume;
+}
+
 static sdm_status write_outputs(const job *j, sdm_error *err)
 {
     const cli_map map = {.grid = &j->grid,
@@ -302,6 +317,7 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
                          .params = j->params.data ? j->params.data : "",
                          .source = SDM_SOURCE_EXACT,
                          .error_mm = j->report.union_error_mm + j->bound_mm,
+                         .volume = shape_volume(j),
                          .origin = j->args->method,
                          .engine = j->args->narrow > 0 ? NULL : j->engine};
     sdm_status s = SDM_OK;

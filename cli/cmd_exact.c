@@ -310,19 +310,22 @@ static double shape_volume(const job *j)
 
 static sdm_status write_outputs(const job *j, sdm_error *err)
 {
-    const cli_map map = {.grid = &j->grid,
-                         .values = j->values,
-                         .blocks = j->blocks.tile ? &j->blocks : NULL,
-                         .shape = j->args->mesh ? j->args->mesh : j->args->shape,
-                         .params = j->params.data ? j->params.data : "",
-                         .source = SDM_SOURCE_EXACT,
-                         .error_mm = j->report.union_error_mm + j->bound_mm,
-                         .volume = shape_volume(j),
-                         .origin = j->args->method,
-                         .engine = j->args->narrow > 0 ? NULL : j->engine};
+    cli_map map = {.grid = &j->grid,
+                   .values = j->values,
+                   .blocks = j->blocks.tile ? &j->blocks : NULL,
+                   .shape = j->args->mesh ? j->args->mesh : j->args->shape,
+                   .params = j->params.data ? j->params.data : "",
+                   .source = SDM_SOURCE_EXACT,
+                   .error_mm = j->report.union_error_mm + j->bound_mm,
+                   .volume = shape_volume(j),
+                   .origin = j->args->method,
+                   .engine = j->args->narrow > 0 ? NULL : j->engine};
     sdm_status s = SDM_OK;
-    for (size_t i = 0; i < j->args->outputs.n && !s; i++)
-        s = cli_write_map(j->args->outputs.items[i], &map, j->args, err);
+    for (size_t i = 0; i < j->args->outputs.n && !s; i++) {
+        const char *path = j->args->outputs.items[i];
+        s = cli_write_map(path, &map, j->args, err);
+        if (cli_ends_with_any(path, CLI_MESH_ENDINGS)) map.volume = 0; // compared once
+    }
     return s;
 }
 

@@ -1,5 +1,5 @@
-/* Compares the size of the target with that of the shape: files in another unit than mm are the most
- * common mistake. A fit that cannot succeed is refused at once. */
+/* Compares the size of the target with that of the shape: files in another unit than mm are the
+ * most common mistake. A fit that cannot succeed is refused at once. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,8 +20,8 @@
 #define IMAGE_IN_M 30.0
 #define VOXELS_MIN 4.0
 
-/* Diagonals of boxes, mm: of the shape at the start; the smallest and the largest of these three: at
- * the start, with all parameters at their lower and at their upper ends. */
+/* Diagonals of boxes, mm: of the shape at the start; the smallest and the largest of these three:
+ * at the start, with all parameters at their lower and at their upper ends. */
 typedef struct shape_sizes {
     double start, least, most;
 } shape_sizes;
@@ -85,8 +85,7 @@ static sdm_status find_sizes(const cli_fit *f, shape_sizes *out, sdm_error *err)
     if (!s) s = SDM_ALLOC(&p, f->n_params, "parameters", err);
     for (int end = 0; end < 2 && !s; end++) {
         double size;
-        for (size_t i = 0; i < f->n_params; i++)
-            p[i] = end ? f->params[i].max : f->params[i].min;
+        for (size_t i = 0; i < f->n_params; i++) p[i] = end ? f->params[i].max : f->params[i].min;
         if (shape_size(f, p, &size, NULL) || !(size > 0)) continue;
         out->least = fmin(out->least, size);
         out->most = fmax(out->most, size);
@@ -98,8 +97,7 @@ static sdm_status find_sizes(const cli_fit *f, shape_sizes *out, sdm_error *err)
 /* Refuses a fit that cannot succeed, unless --force is given: then this is a warning. */
 static sdm_status refuse(const cli_fit *f, const char *what, sdm_error *err)
 {
-    if (!f->args->force)
-        return sdm_fail(err, SDM_E_ARG, "%s; --force fits nevertheless", what);
+    if (!f->args->force) return sdm_fail(err, SDM_E_ARG, "%s; --force fits nevertheless", what);
     cli_warn("%s", what);
     return SDM_OK;
 }
@@ -151,8 +149,8 @@ static sdm_status middle_size(const cli_fit *f, double *size, sdm_error *err)
     return s;
 }
 
-/* Points and labels: far from the size of the shape at any parameters they are refused, far from the
- * start shape a warning is printed. */
+/* Points and labels: far from the size of the shape at any parameters they are refused, far from
+ * the start shape a warning is printed. */
 static sdm_status check_surface(const cli_fit *f, const shape_sizes *shape, sdm_error *err)
 {
     sdm_box b = SDM_BOX_EMPTY;

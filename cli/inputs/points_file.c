@@ -79,9 +79,8 @@ static sdm_status read_line(const char *path, size_t number, char *line, const c
         for (size_t a = 0; a < 3; a++)
             if (n == c->place[a] && !sdm_parse_real(cell, &x[a]) && !wrong) wrong = cell;
     if (wrong)
-        return sdm_fail(err, SDM_E_FORMAT,
-                        "%s:%zu: '%.100s' is not a finite number; a line is %s", path, number,
-                        wrong, c->n == 3 ? "x,y,z" : "as the header says");
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%.100s' is not a finite number; a line is %s",
+                        path, number, wrong, c->n == 3 ? "x,y,z" : "as the header says");
     if (n != c->n && c->n == 3)
         return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %zu values, a line needs three: x,y,z (mm)",
                         path, number, n);

@@ -59,6 +59,12 @@ has "^warning +$thin \(at size=.*; parts are too thin in all 21 shapes\)$"
 expect 0 "^sdmgen: warning: $thin" sdmgen config good.yaml grid.spacing=0.5 --plugin "$plugin" -q
 expect 0 "^sdmgen: warning: $thin$" sdmgen exact --shape faulty --plugin "$plugin" --spacing 0.5 -o thin.nrrd -q
 
+# A mesh file in metres: a question about its units.
+sdmgen mesh --shape faulty -o mm.off --plugin "$plugin" -q
+awk 'NF == 3 && NR > 2 { print $1 / 1000, $2 / 1000, $3 / 1000; next } { print }' mm.off >metres.off
+sdmgen mesh --mesh metres.off --audit >out 2>err
+has '^units: the mesh measures 0\.0[0-9]* mm across: is it in m\? lengths are mm$'
+
 # The other commands say it in one line on stderr (and that the mesh overlaps itself).
 expect 0 "warning: $inside_out" sdmgen mesh --shape faulty -O fault=handle -o x.ply --plugin "$plugin" -q
 expect 4 "error: $inside_out" sdmgen mesh --shape faulty -O fault=handle --audit -o y.ply --plugin "$plugin"

@@ -52,8 +52,7 @@ static void score_change(const fit_problem *p, const fit_field *coarse, double *
         for (size_t i = s->n * slice / FIT_SLICES; i < s->n * (slice + 1) / FIT_SLICES; i++) {
             if (s->row[i] == SIZE_MAX) continue;
             const float *column = s->jacobian + s->row[i] * s->n_columns;
-            const double more =
-                sdm_fit_field_at(coarse, &p->state, s->world + 3 * i) - s->field[i];
+            const double more = sdm_fit_field_at(coarse, &p->state, s->world + 3 * i) - s->field[i];
             fit_likelihood r;
             sdm_fit_likelihood(&p->observation, 0, NULL, s->field[i], true, &r);
             for (size_t a = 0; a < n; a++)

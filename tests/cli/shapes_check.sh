@@ -60,9 +60,8 @@ expect 0 "^sdmgen: warning: $thin" sdmgen config good.yaml grid.spacing=0.5 --pl
 expect 0 "^sdmgen: warning: $thin$" sdmgen exact --shape faulty --plugin "$plugin" --spacing 0.5 -o thin.nrrd -q
 
 # A mesh file in metres: a question about its units.
-sdmgen mesh --shape faulty -o mm.off --plugin "$plugin" -q
-awk 'NF == 3 && NR > 2 { print $1 / 1000, $2 / 1000, $3 / 1000; next } { print }' mm.off >metres.off
-sdmgen mesh --mesh metres.off --audit >out 2>err
+printf 'OFF\n4 4 0\n0 0 0\n0.02 0 0\n0 0.02 0\n0 0 0.02\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n' >metres.off
+expect 0 - sdmgen mesh --mesh metres.off --audit
 has '^units: the mesh measures 0\.0[0-9]* mm across: is it in m\? lengths are mm$'
 
 # The other commands say it in one line on stderr (and that the mesh overlaps itself).

@@ -176,8 +176,7 @@ static sdm_status measure_others(const bench_points *b, size_t repeat, bool near
         s = cli_peers_run(&t->peers, o->name, argument, 2, &answer, err);
         if (!s && answer.done) compare(b, t->peers.values_path, o);
         if (!s && !answer.done) memcpy(o->note, answer.note, sizeof o->note);
-        if (!s && answer.done && !*o->note)
-            o->us[near] = 1e3 * answer.ms_map / OTHERS;
+        if (!s && answer.done && !*o->note) o->us[near] = 1e3 * answer.ms_map / OTHERS;
         if (!s && near && answer.done && !*o->note) memcpy(o->note, answer.note, sizeof o->note);
         if (!s) s = cli_check_interrupt(err);
     }

@@ -13,11 +13,11 @@
  *
  *     x = W cos(v) (1 - waist cos(v)^2) (1 + egg sin(v))      y = H sin(v)
  *
- * where 2 W, 2 H and the tilt are parabolas of f through their values at the base, in the middle and
- * at the apex; flare exp(-theta / 0.35) is added to W and H; over the last half turn both shrink to
- * the share `tip`. The area is pi W H (1 - 3/4 waist); above a waist of 1/3 the outline has two
- * lobes. Half-ellipsoids over the end sections close the tube; they are as long as the geometric
- * mean of W and H, at the base times `cap`.
+ * where 2 W, 2 H and the tilt are parabolas of f through their values at the base, in the middle
+ * and at the apex; flare exp(-theta / 0.35) is added to W and H; over the last half turn both
+ * shrink to the share `tip`. The area is pi W H (1 - 3/4 waist); above a waist of 1/3 the outline
+ * has two lobes. Half-ellipsoids over the end sections close the tube; they are as long as the
+ * geometric mean of W and H, at the base times `cap`.
  *
  * Sections are cut off at the centre of curvature as those of the cochlea. */
 #include <math.h>
@@ -45,13 +45,13 @@
             "width of the section at the base, without the flare")                                 \
     UNKNOWN(DUCT_WIDTH_MIDDLE, "width_middle", "mm", 1.2, 2.6, 1.93,                               \
             "width of the section half-way along the angle")                                       \
-    UNKNOWN(DUCT_WIDTH_APEX, "width_apex", "mm", 0.8, 2.6, 1.64,                                   \
+    UNKNOWN(DUCT_WIDTH_APEX, "width_apex", "mm", 0.8, 3.0, 1.64,                                   \
             "width of the section at the apex, without the taper")                                 \
     UNKNOWN(DUCT_FLARE, "flare", "mm", -0.3, 0.5, 0.25,                                            \
             "growth of the half axes at the basal end, which decays by e in 0.35 rad")             \
-    UNKNOWN(DUCT_CAP, "cap", "", 0.3, 1.8, 1.0,                                                    \
+    UNKNOWN(DUCT_CAP, "cap", "", 0.3, 2.5, 1.0,                                                    \
             "length of the basal cap over the mean radius of its section")                         \
-    UNKNOWN(DUCT_TIP, "tip", "", 0.4, 1.2, 1.0,                                                    \
+    UNKNOWN(DUCT_TIP, "tip", "", 0.4, 1.4, 1.0,                                                    \
             "share of its size that the section keeps at the apical end; taper of half a turn")    \
     UNKNOWN(DUCT_HEIGHT_BASE, "height_base", "mm", 1.2, 3.0, 2.22,                                 \
             "height of the section at the base, without the flare")                                \
@@ -59,7 +59,7 @@
             "height of the section half-way along the angle")                                      \
     UNKNOWN(DUCT_HEIGHT_APEX, "height_apex", "mm", 0.6, 2.4, 1.64,                                 \
             "height of the section at the apex, without the taper")                                \
-    UNKNOWN(DUCT_TILT_BASE, "tilt_base", "rad", -0.6, 1.2, 0.0,                                    \
+    UNKNOWN(DUCT_TILT_BASE, "tilt_base", "rad", -0.8, 1.5, 0.0,                                    \
             "turn of the section's width from outward to upward at the base")                      \
     UNKNOWN(DUCT_TILT_MIDDLE, "tilt_middle", "rad", -0.8, 0.8, 0.0, "the same half-way")           \
     UNKNOWN(DUCT_TILT_APEX, "tilt_apex", "rad", -0.8, 0.8, 0.0, "the same at the apex")            \
@@ -72,12 +72,11 @@
 static const sdm_param PARAMS[DUCT_UNKNOWNS] = {
     PARAM(DUCT_A, "a", "mm", 2.0, 5.0, 4.4,
           "scale of the radial component: radius of the spiral at theta = 0")
-    PARAM(DUCT_ALPHA, "alpha", "mm", 0.0, 1.2, 0.5,
-          "amplitude of the longitudinal wave of the basal turn")
-    PARAM(DUCT_B, "b", "", 0.05, 0.25, 0.145, "decay of the spiral per radian")
-    PARAM(DUCT_PHI, "phi", "rad", -LATHE_PI / 4, LATHE_PI / 4, 0.4,
-          "phase of the longitudinal wave")
-    FIXABLE(PARAM)};
+        PARAM(DUCT_ALPHA, "alpha", "mm", 0.0, 1.2, 0.5,
+              "amplitude of the longitudinal wave of the basal turn")
+            PARAM(DUCT_B, "b", "", 0.05, 0.25, 0.145, "decay of the spiral per radian")
+                PARAM(DUCT_PHI, "phi", "rad", -LATHE_PI / 4, LATHE_PI / 4, 0.4,
+                      "phase of the longitudinal wave") FIXABLE(PARAM)};
 
 enum { EDGE, EAR, SECTION, FREE, CONSTANTS, N_OPTIONS = CONSTANTS + DUCT_UNKNOWNS - DUCT_C };
 enum { FREE_ALL, FREE_PAPER, FREE_CENTRELINE, FREE_SECTION };
@@ -88,9 +87,10 @@ static const sdm_option OPTIONS[N_OPTIONS] = {
     [EDGE] = {"edge", SDM_OPTION_REAL, "mm", 0.05, 1.0, 0.30, NULL,
               "mean edge length the mesh aims at, over the parameter ranges"},
     [EAR] = {"ear", SDM_OPTION_CHOICE, "", 0, 0, 0, "right|left", "left is the mirror image in y"},
-    [SECTION] = {"section", SDM_OPTION_CHOICE, "", 0, 0, 0, "ellipse|circle|lobes",
-                 "ellipse: widths, heights and tilts; circle: widths are diameters; lobes: ellipses with a "
-                 "waist and an egg"},
+    [SECTION] =
+        {"section", SDM_OPTION_CHOICE, "", 0, 0, 0, "ellipse|circle|lobes",
+         "ellipse: widths, heights and tilts; circle: widths are diameters; lobes: ellipses with a "
+         "waist and an egg"},
     [FREE] = {"free", SDM_OPTION_CHOICE, "", 0, 0, 0, "all|paper|centreline|section",
               "which parameters there are: all, the four published ones, or these and those of "
               "the centreline (c .. dip) or of the section (width_base ..); the others are "
@@ -135,13 +135,12 @@ static int rings_make(duct *d, double edge)
 {
     const cochlea_model m = {
         .radius = 1.11, .taper = 0.02, .flare = 0.25, .flare_angle = DUCT_FLARE_ANGLE};
-    const double *x = d->constant, usual[COCHLEA_UNKNOWNS] = {[COCHLEA_A] = x[DUCT_A],
-                                                              [COCHLEA_ALPHA] = x[DUCT_ALPHA],
-                                                              [COCHLEA_B] = x[DUCT_B],
-                                                              [COCHLEA_PHI] = x[DUCT_PHI],
-                                                              [COCHLEA_C] = x[DUCT_C],
-                                                              [COCHLEA_KAPPA] = DUCT_KAPPA,
-                                                              [COCHLEA_THETA] = x[DUCT_THETA]};
+    const double *x = d->constant,
+                 usual[COCHLEA_UNKNOWNS] = {
+                     [COCHLEA_A] = x[DUCT_A],        [COCHLEA_ALPHA] = x[DUCT_ALPHA],
+                     [COCHLEA_B] = x[DUCT_B],        [COCHLEA_PHI] = x[DUCT_PHI],
+                     [COCHLEA_C] = x[DUCT_C],        [COCHLEA_KAPPA] = DUCT_KAPPA,
+                     [COCHLEA_THETA] = x[DUCT_THETA]};
     return sdm_cochlea_rings_make(&m, usual, edge, &d->rings);
 }
 
@@ -196,8 +195,7 @@ static double *ring_write(const duct *d, const double *x, const cochlea_ring *r,
 {
     duct_section s;
     sdm_duct_section_at(d->form, x, r->fraction, &s);
-    const double ahead =
-        r->ahead * sdm_duct_mean_radius(&s) * (r->ahead < 0 ? x[DUCT_CAP] : 1);
+    const double ahead = r->ahead * sdm_duct_mean_radius(&s) * (r->ahead < 0 ? x[DUCT_CAP] : 1);
     for (size_t j = 0; j < n; j++, vert += 3) {
         double at[2];
         sdm_duct_outline_at(&s, direction[2 * j], direction[2 * j + 1], at);
@@ -220,8 +218,8 @@ static int duct_mesh(const void *self, const sdm_host *host, const sdm_option_va
                        apex = {.fraction = 1, .ahead = 1, .whole = true};
     const double none[2] = {0, 0};
     const size_t n = d->rings.n_sectors;
-    const int failed = host->reserve(host, out, sdm_lathe_n_vert(d->rings.n, n),
-                                     sdm_lathe_n_tri(d->rings.n, n));
+    const int failed =
+        host->reserve(host, out, sdm_lathe_n_vert(d->rings.n, n), sdm_lathe_n_tri(d->rings.n, n));
     if (failed) return failed;
     double x[DUCT_UNKNOWNS];
     unknowns_at(d, p, x);

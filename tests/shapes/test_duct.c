@@ -1,6 +1,6 @@
-/* The duct: at its defaults the cochlea of cochlea.c; sections and volumes against closed forms that
- * are written here; which parameters there are; its measures.
- * Tests: duct.c duct_curve.c cochlea_place.c */
+/* The duct: at its defaults the cochlea of cochlea.c; sections and volumes against closed forms
+ * that are written here; which parameters there are; its measures. Tests: duct.c duct_curve.c
+ * cochlea_place.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -117,9 +117,9 @@ static void test_volume(void **state)
     const double a = 5, b = 0.06, c = 0.3, end = 12.3, dome = 0.2, hook = 0.7, dip = -0.4;
     const double W[3] = {1.5, 1.2, 0.8}, H[3] = {1.7, 1.1, 0.9}, flare = 0.1, cap = 1.5, tip = 0.7,
                  waist = 0.4;
-    const double p[DUCT_UNKNOWNS] = {a,    0,    b,    0,    c,    end,  dome, hook,
-                                     dip,  W[0], W[1], W[2], flare, cap, tip,  H[0],
-                                     H[1], H[2], -0.6, 0.1,  0.3,  waist, 0};
+    const double p[DUCT_UNKNOWNS] = {a,    0,    b,    0,    c,     end,   dome, hook,
+                                     dip,  W[0], W[1], W[2], flare, cap,   tip,  H[0],
+                                     H[1], H[2], -0.6, 0.1,  0.3,   waist, 0};
     enum { STEPS = 20000 };
     double volume = 0, area[2] = {0}, mean[2] = {0};
     for (int i = 0; i <= STEPS; i++) {

@@ -132,10 +132,7 @@ typedef struct cochlea {
     uint32_t n_params;
     double constant[COCHLEA_UNKNOWNS]; /* values of the unknowns that are not parameters */
     bool left;
-    size_t n_rings, n_sectors;
-    /* [2][n_sectors][2] cosine and sine of the vertex angles of even and odd rings */
-    double *direction;
-    cochlea_ring rings[];
+    cochlea_rings rings;
 } cochlea;
 
 static cochlea_model model_of(const sdm_option_value *o)
@@ -166,65 +163,6 @@ static bool unknown_is_free(const sdm_option_value *o, int unknown)
     if (!OPTION_OF[unknown]) return true;
     const bool of_start = unknown == COCHLEA_THETA2 || unknown == COCHLEA_P0;
     return o[FREE].number > 0 && (o[START].number > 0 || !of_start);
-}
-
-/* Root mean square over a ring of abs(d(vertex) / d(theta)), mm/rad, at the default parameters. */
-static double ring_speed(const cochlea_model *m, const double *x, double theta)
-{
-    cochlea_section s;
-    sdm_cochlea_section_at(m, x, theta / x[COCHLEA_THETA], &s);
-    const double h = 1e-4;
-    double before[3], after[3], speed = 0;
-    sdm_cochlea_centre_at(m, x, theta - h, before);
-    sdm_cochlea_centre_at(m, x, theta + h, after);
-    for (int k = 0; k < 3; k++) speed += (after[k] - before[k]) * (after[k] - before[k]);
-    const double bend = sdm_cochlea_radius_at(m, theta) * hypot(s.bend[0].v, s.bend[1].v);
-    return sqrt(speed) / (2 * h) * sqrt(1 + 0.5 * bend * bend);
-}
-
-#define SAMPLES 1024
-
-/* Integrates ring_speed() by the trapezoidal rule: way[i] = length of the way of a ring from 0 to i
-   / SAMPLES of the apical angle, mm. Returns the mean circumference of the sections, mm. */
-static double way_measure(const cochlea_model *m, const double *x, double way[SAMPLES + 1])
-{
-    const double step = x[COCHLEA_THETA] / SAMPLES;
-    double last = ring_speed(m, x, 0), round = 0;
-    way[0] = 0;
-    for (int i = 1; i <= SAMPLES; i++) {
-        const double now = ring_speed(m, x, step * i);
-        way[i] = way[i - 1] + step * (last + now) / 2;
-        round += 2 * LATHE_PI * sdm_cochlea_radius_at(m, step * (i - 0.5)) * (way[i] - way[i - 1]);
-        last = now;
-    }
-    return round / way[SAMPLES];
-}
-
-/* Writes the n rings of a cap between pole and tube: from pole to tube at the base, from tube to
- * pole at the apex. Returns the address after the last one. */
-static cochlea_ring *cap_rings(size_t n, bool apex, cochlea_ring *r)
-{
-    for (size_t i = 1; i <= n; i++) {
-        const double up = LATHE_PI / 2 * (double)(apex ? i : n + 1 - i) / (double)(n + 1);
-        *r++ = (cochlea_ring){
-            .fraction = apex, .shrink = cos(up), .ahead = (apex ? 1 : -1) * sin(up), .whole = true};
-    }
-    return r;
-}
-
-static void rings_place(cochlea *c, size_t n_base, size_t n_tube, size_t n_apex,
-                        const double way[SAMPLES + 1])
-{
-    cochlea_ring *r = cap_rings(n_base, false, c->rings);
-    size_t at = 0;
-    for (size_t i = 0; i <= n_tube; i++) {
-        const double target = way[SAMPLES] * (double)i / (double)n_tube;
-        while (at + 1 < SAMPLES && way[at + 1] < target) at++;
-        const double part = (target - way[at]) / (way[at + 1] - way[at]);
-        const double fraction = i == n_tube ? 1 : ((double)at + part) / SAMPLES;
-        *r++ = (cochlea_ring){.fraction = fraction, .shrink = 1, .whole = i == 0 || i == n_tube};
-    }
-    cap_rings(n_apex, true, r);
 }
 
 static void params_choose(cochlea *c, const sdm_option_value *options)
@@ -266,42 +204,16 @@ static int cochlea_create(const sdm_host *host, const sdm_option_value *options,
         return host->fail(host, text);
     }
 
-    // The numbers of rings and sectors depend only on the options. The factors 1.1 and 1.2 make the
-    // mean edge over the parameter ranges about `edge`, with triangles a little longer along the
-    // tube, where the curvature is lower.
-    double way[SAMPLES + 1];
-    const double edge = options[EDGE].number, round = way_measure(&m, x, way),
-                 quarter = LATHE_PI / 2;
-    const size_t n_sectors = sdm_lathe_pieces(round, 1.1 * edge, 6),
-                 n_tube = sdm_lathe_pieces(way[SAMPLES], 1.2 * edge, 8);
-    const size_t n_base =
-        sdm_lathe_pieces(quarter * sdm_cochlea_radius_at(&m, 0), 1.2 * edge, 2) - 1;
-    const size_t n_apex =
-        sdm_lathe_pieces(quarter * sdm_cochlea_radius_at(&m, end), 1.2 * edge, 2) - 1;
-    const size_t n_rings = n_base + n_tube + 1 + n_apex;
-
     // the instance
-    cochlea *c = malloc(sizeof *c + n_rings * sizeof *c->rings);
-    double *direction = malloc(4 * n_sectors * sizeof *direction);
-    if (!c || !direction) {
+    cochlea *c = malloc(sizeof *c);
+    cochlea_rings rings;
+    if (!c || sdm_cochlea_rings_make(&m, x, options[EDGE].number, &rings)) {
         free(c);
-        free(direction);
         return host->fail(host, "out of memory");
     }
-    *c = (cochlea){.model = m,
-                   .left = options[EAR].number > 0,
-                   .n_rings = n_rings,
-                   .n_sectors = n_sectors,
-                   .direction = direction};
-    for (size_t odd = 0; odd < 2; odd++)
-        for (size_t j = 0; j < n_sectors; j++) {
-            const double angle = sdm_lathe_angle(odd, j, n_sectors);
-            *direction++ = cos(angle);
-            *direction++ = sin(angle);
-        }
+    *c = (cochlea){.model = m, .left = options[EAR].number > 0, .rings = rings};
     memcpy(c->constant, x, sizeof x);
     params_choose(c, options);
-    rings_place(c, n_base, n_tube, n_apex, way);
     *self = c;
     return 0;
 }
@@ -309,7 +221,7 @@ static int cochlea_create(const sdm_host *host, const sdm_option_value *options,
 static void cochlea_destroy(void *self)
 {
     cochlea *c = self;
-    free(c->direction);
+    sdm_cochlea_rings_free(&c->rings);
     free(c);
 }
 
@@ -320,15 +232,15 @@ static void vertices_visit(const cochlea *c, const double *p, cochlea_put *put, 
     const cochlea_ring base = {.fraction = 0, .ahead = -1, .whole = true},
                        apex = {.fraction = 1, .ahead = 1, .whole = true};
     const double none[2] = {0, 0};
+    const size_t n = c->rings.n_sectors;
     double x[COCHLEA_UNKNOWNS];
     unknowns_at(c, p, x);
     sdm_cochlea_ring_at(&c->model, x, &base, 1, none, c->left, 0, put, user);
-    for (size_t i = 0; i < c->n_rings; i++)
-        sdm_cochlea_ring_at(&c->model, x, &c->rings[i], c->n_sectors,
-                            c->direction + (i % 2 ? 2 * c->n_sectors : 0), c->left,
-                            1 + i * c->n_sectors, put, user);
-    sdm_cochlea_ring_at(&c->model, x, &apex, 1, none, c->left, 1 + c->n_rings * c->n_sectors, put,
-                        user);
+    for (size_t i = 0; i < c->rings.n; i++)
+        sdm_cochlea_ring_at(&c->model, x, &c->rings.at[i], n,
+                            c->rings.direction + (i % 2 ? 2 * n : 0), c->left, 1 + i * n, put,
+                            user);
+    sdm_cochlea_ring_at(&c->model, x, &apex, 1, none, c->left, 1 + c->rings.n * n, put, user);
 }
 
 static void position_write(void *user, size_t vertex, const dual at[3])
@@ -349,11 +261,11 @@ static int cochlea_mesh(const void *self, const sdm_host *host, const sdm_option
 {
     (void)options;
     const cochlea *c = self;
-    const int failed = host->reserve(host, out, sdm_lathe_n_vert(c->n_rings, c->n_sectors),
-                                     sdm_lathe_n_tri(c->n_rings, c->n_sectors));
+    const int failed = host->reserve(host, out, sdm_lathe_n_vert(c->rings.n, c->rings.n_sectors),
+                                     sdm_lathe_n_tri(c->rings.n, c->rings.n_sectors));
     if (failed) return failed;
     vertices_visit(c, p, position_write, out->vert);
-    sdm_lathe_triangles(c->n_rings, c->n_sectors, c->left, out->tri);
+    sdm_lathe_triangles(c->rings.n, c->rings.n_sectors, c->left, out->tri);
     return 0;
 }
 
@@ -376,7 +288,7 @@ static int cochlea_velocity(const void *self, const sdm_host *host, const sdm_op
 {
     (void)options;
     const cochlea *c = self;
-    if (n_vert != sdm_lathe_n_vert(c->n_rings, c->n_sectors))
+    if (n_vert != sdm_lathe_n_vert(c->rings.n, c->rings.n_sectors))
         return host->fail(host, "velocity: n_vert is not the number of vertices of the mesh");
     velocity_out out = {c, velocity_at, n_vert};
     vertices_visit(c, p, velocity_write, &out);

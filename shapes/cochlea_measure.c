@@ -39,17 +39,23 @@ const sdm_measure sdm_cochlea_measures[COCHLEA_MEASURES] = {
 // Half of the step of differences by theta, rad.
 #define STEP 1e-4
 
-/* A curve of the model: out[3] at theta = fraction * (apical angle), mm. */
-typedef void curve_at(const cochlea_model *m, const double *x, double fraction, double out[3]);
+/* A cochlea of circles or ellipses: the owner of its path. */
+typedef struct tube {
+    const cochlea_model *model;
+    const double *x;
+} tube;
 
-static void centre_at(const cochlea_model *m, const double *x, double fraction, double out[3])
+static void centre_at(const void *owner, double fraction, double out[3])
 {
-    sdm_cochlea_centre_at(m, x, fraction * x[COCHLEA_THETA], out);
+    const tube *t = owner;
+    sdm_cochlea_centre_at(t->model, t->x, fraction * t->x[COCHLEA_THETA], out);
 }
 
 /* The unit vector e1 of a section is horizontal and normal to the centreline. */
-static void wall_at(const cochlea_model *m, const double *x, double fraction, double out[3])
+static void wall_at(const void *owner, double fraction, double out[3])
 {
+    const cochlea_model *m = ((const tube *)owner)->model;
+    const double *x = ((const tube *)owner)->x;
     const double theta = fraction * x[COCHLEA_THETA], radius = sdm_cochlea_radius_at(m, theta);
     double before[3], after[3];
     sdm_cochlea_centre_at(m, x, theta, out);
@@ -61,16 +67,25 @@ static void wall_at(const cochlea_model *m, const double *x, double fraction, do
     out[1] -= radius * along[0] / level;
 }
 
+static double height_at(const void *owner, double fraction, double up, int end)
+{
+    const tube *t = owner;
+    cochlea_section s;
+    sdm_cochlea_section_at(t->model, t->x, fraction, &s);
+    const double across = s.high.v * s.e2[2].v, along = s.wide.v * s.tangent[2].v;
+    return up * s.centre[2].v + (up * end * along > 0 ? hypot(across, along) : fabs(across));
+}
+
 /* Length of the curve, mm. If `depth` is less, *fraction = where the curve has this length, else
  * NaN. */
-static double curve_length(const cochlea_model *m, const double *x, curve_at *curve, double depth,
+static double curve_length(const cochlea_path *p, cochlea_curve *curve, double depth,
                            double *fraction)
 {
     double last[3], now[3], length = 0;
     *fraction = NAN;
-    curve(m, x, 0, last);
+    curve(p->owner, 0, last);
     for (int i = 1; i <= CHORDS; i++) {
-        curve(m, x, (double)i / CHORDS, now);
+        curve(p->owner, (double)i / CHORDS, now);
         const double chord =
             sqrt((now[0] - last[0]) * (now[0] - last[0]) + (now[1] - last[1]) * (now[1] - last[1]) +
                  (now[2] - last[2]) * (now[2] - last[2]));
@@ -84,23 +99,23 @@ static double curve_length(const cochlea_model *m, const double *x, curve_at *cu
 
 /* Angle of the wall about the axis at theta = fraction * (apical angle), rad: continuous, 0 in the
  * direction of the centreline's basal end. *away = distance from the axis, mm. */
-static double wall_angle(const cochlea_model *m, const double *x, double fraction, double *away)
+static double wall_angle(const cochlea_path *p, double fraction, double *away)
 {
     double wall[3];
-    wall_at(m, x, fraction, wall);
-    const double theta = fraction * x[COCHLEA_THETA], c = cos(theta), s = sin(theta);
+    p->wall(p->owner, fraction, wall);
+    const double theta = fraction * p->end, c = cos(theta), s = sin(theta);
     *away = hypot(wall[0], wall[1]);
     return theta + atan2(c * wall[1] - s * wall[0], c * wall[0] + s * wall[1]);
 }
 
 /* Distance of the wall from the axis at an angle about it, mm; by bisection, since the angle of the
  * wall increases with theta. */
-static double wall_away(const cochlea_model *m, const double *x, double angle)
+static double wall_away(const cochlea_path *p, double angle)
 {
     double low = 0, high = 1, away = 0;
     while (high - low > 1e-12) {
         const double middle = 0.5 * (low + high);
-        if (wall_angle(m, x, middle, &away) < angle)
+        if (wall_angle(p, middle, &away) < angle)
             low = middle;
         else
             high = middle;
@@ -108,29 +123,19 @@ static double wall_away(const cochlea_model *m, const double *x, double angle)
     return away;
 }
 
-/* How far the tube reaches up from the centre of a section, mm, or down with `up` -1. end: -1 or 1:
- * the section has the cap of the basal or apical end; 0: none. */
-static double reach(const cochlea_section *s, double up, int end)
-{
-    const double across = s->high.v * s->e2[2].v, along = s->wide.v * s->tangent[2].v;
-    return up * end * along > 0 ? hypot(across, along) : fabs(across);
-}
-
 /* Highest point of the tube over the plane z = 0, mm, or of its image in this plane with `up` -1.
  * The highest of the samples is improved by a parabola through its neighbours. */
-static double top(const cochlea_model *m, const double *x, double up)
+static double top(const cochlea_path *p, double up)
 {
     double best = -INFINITY, before = NAN, last = NAN;
     for (int i = 0; i <= SECTIONS; i++) {
-        cochlea_section s;
-        sdm_cochlea_section_at(m, x, (double)i / SECTIONS, &s);
-        const double now = up * s.centre[2].v + reach(&s, up, 0);
+        const double fraction = (double)i / SECTIONS, now = p->height(p->owner, fraction, up, 0);
         if (last > before && last >= now) {
             const double slope = 0.5 * (now - before), bend = now - 2 * last + before;
             best = fmax(best, last - 0.5 * slope * slope / bend);
         }
         if (i == 0 || i == SECTIONS)
-            best = fmax(best, up * s.centre[2].v + reach(&s, up, i ? 1 : -1));
+            best = fmax(best, p->height(p->owner, fraction, up, i ? 1 : -1));
         before = last, last = now;
     }
     return best;
@@ -139,29 +144,36 @@ static double top(const cochlea_model *m, const double *x, double up)
 /* Frequency, Hz, at the proportion `part` of the length from the apex (Greenwood 1990, man). */
 static double greenwood(double part) { return 165.4 * (pow(10, 2.1 * part) - 0.88); }
 
-double sdm_cochlea_measure(const cochlea_model *m, const double *x, uint32_t index, double depth)
+double sdm_cochlea_path_measure(const cochlea_path *p, uint32_t index, double depth)
 {
     double fraction, away, centre[3];
     switch (index) {
     case COCHLEA_DIAMETER_A:
-        centre_at(m, x, 0, centre);
-        return hypot(centre[0], centre[1]) + wall_away(m, x, LATHE_PI);
+        p->centre(p->owner, 0, centre);
+        return hypot(centre[0], centre[1]) + wall_away(p, LATHE_PI);
     case COCHLEA_DIAMETER_B:
-        return wall_away(m, x, 0.5 * LATHE_PI) + wall_away(m, x, 1.5 * LATHE_PI);
+        return wall_away(p, 0.5 * LATHE_PI) + wall_away(p, 1.5 * LATHE_PI);
     case COCHLEA_HEIGHT:
-        return top(m, x, 1) + top(m, x, -1);
+        return top(p, 1) + top(p, -1);
     case COCHLEA_LENGTH_CENTRE:
-        return curve_length(m, x, centre_at, 0, &fraction);
+        return curve_length(p, p->centre, 0, &fraction);
     case COCHLEA_LENGTH_WALL:
-        return curve_length(m, x, wall_at, 0, &fraction);
+        return curve_length(p, p->wall, 0, &fraction);
     case COCHLEA_TURNS:
-        return x[COCHLEA_THETA] / (2 * LATHE_PI);
+        return p->end / (2 * LATHE_PI);
     case COCHLEA_INSERTION_ANGLE:
-        curve_length(m, x, wall_at, depth, &fraction);
-        return (wall_angle(m, x, fraction, &away) - wall_angle(m, x, 0, &away)) * 180 / LATHE_PI;
+        curve_length(p, p->wall, depth, &fraction);
+        return (wall_angle(p, fraction, &away) - wall_angle(p, 0, &away)) * 180 / LATHE_PI;
     default: { // COCHLEA_FREQUENCY
-        const double length = curve_length(m, x, wall_at, depth, &fraction);
+        const double length = curve_length(p, p->wall, depth, &fraction);
         return depth <= length ? greenwood(1 - depth / length) : NAN;
     }
     }
+}
+
+double sdm_cochlea_measure(const cochlea_model *m, const double *x, uint32_t index, double depth)
+{
+    const tube owner = {m, x};
+    const cochlea_path path = {&owner, x[COCHLEA_THETA], centre_at, wall_at, height_at};
+    return sdm_cochlea_path_measure(&path, index, depth);
 }

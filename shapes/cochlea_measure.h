@@ -20,6 +20,23 @@ enum {
 
 extern const sdm_measure sdm_cochlea_measures[COCHLEA_MEASURES];
 
+/* A curve along the centreline: out[3] = point at theta = fraction * (apical angle), mm. */
+typedef void cochlea_curve(const void *owner, double fraction, double out[3]);
+
+/* All that the measures need of a cochlea. `owner` is given to the functions. */
+typedef struct cochlea_path {
+    const void *owner;
+    double end; /* angle of the apical end, rad */
+    cochlea_curve *centre, *wall;
+    /* highest point of the section over the plane z = 0, mm, or of its image in this plane with
+     * `up` -1. end: -1 or 1: the section has the cap of the basal or apical end; 0: none */
+    double (*height)(const void *owner, double fraction, double up, int end);
+} cochlea_path;
+
+/* Measure number `index` of a path, end >= COCHLEA_MEASURES_FROM; otherwise as
+ * sdm_cochlea_measure(). */
+double sdm_cochlea_path_measure(const cochlea_path *path, uint32_t index, double depth);
+
 /* Smallest angle of the apical end, rad, at which the tube has all of these measures: diameter B
  * needs three quarters of a turn. */
 #define COCHLEA_MEASURES_FROM 4.8

@@ -1,20 +1,16 @@
 /* Rings of vertices of the cochlea, cut off where neighbouring sections would overlap. */
 #include "cochlea_ring.h"
 
-// The cut is smooth (C2): it starts at the fraction CUT_FROM of the distance to the centre of
-// curvature and takes the fraction CUT_WIDTH.
-#define CUT_FROM 0.90
+// The cut is smooth (C2) and takes this fraction of the distance to the centre of curvature.
 #define CUT_WIDTH 0.16
 
-/* Projects a vertex (x along e1, y along e2) that lies near or beyond the centre of curvature back
- * in front of it. */
-static void vertex_cut(const dual bend[2], dual *x, dual *y)
+void sdm_cochlea_cut(const dual bend[2], dual *x, dual *y)
 {
     // position along the curvature vector; 1: at the centre of curvature
     const dual u = sdm_dual_add(sdm_dual_mul(*x, bend[0]), sdm_dual_mul(*y, bend[1]));
-    const double w = (u.v - CUT_FROM) / CUT_WIDTH, end = CUT_FROM + CUT_WIDTH / 2;
+    const double w = (u.v - COCHLEA_CUT_FROM) / CUT_WIDTH, end = COCHLEA_CUT_FROM + CUT_WIDTH / 2;
     const dual kept =
-        w < 1 ? sdm_dual_apply(u, CUT_FROM + CUT_WIDTH * w * (1 + w * w * (0.5 * w - 1)),
+        w < 1 ? sdm_dual_apply(u, COCHLEA_CUT_FROM + CUT_WIDTH * w * (1 + w * w * (0.5 * w - 1)),
                                1 - w * w * (3 - 2 * w))
               : sdm_dual_of(end);
     const dual bend2 = sdm_dual_add(sdm_dual_mul(bend[0], bend[0]), sdm_dual_mul(bend[1], bend[1]));
@@ -26,7 +22,7 @@ static void vertex_cut(const dual bend[2], dual *x, dual *y)
 static void vertex_cut_at(const cochlea_section *s, const dual middle[3], dual x, dual y,
                           dual at[3])
 {
-    vertex_cut(s->bend, &x, &y);
+    sdm_cochlea_cut(s->bend, &x, &y);
     for (int k = 0; k < 3; k++)
         at[k] = sdm_dual_add(middle[k],
                              sdm_dual_add(sdm_dual_mul(x, s->e1[k]), sdm_dual_mul(y, s->e2[k])));
@@ -48,7 +44,8 @@ void sdm_cochlea_ring_at(const cochlea_model *m, const double *x, const cochlea_
     }
     for (size_t j = 0; j < n_sectors; j++) {
         const double co = direction[2 * j], si = direction[2 * j + 1];
-        if (!r->whole && co * s.wide.v * s.bend[0].v + si * s.high.v * s.bend[1].v > CUT_FROM)
+        if (!r->whole &&
+            co * s.wide.v * s.bend[0].v + si * s.high.v * s.bend[1].v > COCHLEA_CUT_FROM)
             vertex_cut_at(&s, middle, sdm_dual_scale(co, s.wide), sdm_dual_scale(si, s.high), at);
         else
             for (int k = 0; k < 3; k++)

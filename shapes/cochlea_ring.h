@@ -14,6 +14,27 @@ typedef struct cochlea_ring {
     bool whole;
 } cochlea_ring;
 
+/* All rings, from the base to the apex, of n_sectors vertices each. */
+typedef struct cochlea_rings {
+    size_t n, n_sectors;
+    cochlea_ring *at; /* [n] */
+    /* [2][n_sectors][2] cosine and sine of the vertex angles of even and odd rings */
+    double *direction;
+} cochlea_rings;
+
+/* Rings for a mesh of mean edge length `edge`, mm, placed for the unknowns x. Returns 0, or -1 when
+   memory ends. sdm_cochlea_rings_free() frees them. */
+int sdm_cochlea_rings_make(const cochlea_model *m, const double *x, double edge,
+                           cochlea_rings *rings);
+void sdm_cochlea_rings_free(cochlea_rings *rings);
+
+/* Share of the distance to the centre of curvature at which sections begin to be cut off. */
+#define COCHLEA_CUT_FROM 0.90
+
+/* Moves a vertex (x along e1, y along e2) that lies near or beyond the centre of curvature back in
+   front of it; bend: curvature vector of the centreline in (e1, e2). */
+void sdm_cochlea_cut(const dual bend[2], dual *x, dual *y);
+
 typedef void cochlea_put(void *user, size_t vertex, const dual at[3]);
 
 /* Calls put() for the n_sectors vertices of a ring, numbered from `first`. x: the unknowns;

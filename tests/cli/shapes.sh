@@ -4,7 +4,7 @@
 . "$(dirname "$0")/common.sh"
 
 expect 0 - sdmgen shapes
-for shape in cochlea ellipsoid torus linkage statistical; do has "^$shape "; done
+for shape in cochlea duct ellipsoid torus linkage statistical; do has "^$shape "; done
 expect 0 - sdmgen shapes --json
 has '"name": "cochlea".*"name": "alpha", "unit": "mm", "min": 0, "max": 1\.2'
 expect 0 - sdmgen shapes cochlea

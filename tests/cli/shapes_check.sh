@@ -13,7 +13,7 @@ present nine.png
 expect 0 - sdmgen shapes check --plugin "$plugin" --samples 16 --json
 has '"shape": "faulty", "verdict": "fine", "shapes": 21, "corners": 4, "samples": 16'
 has '"jumps": \[\]'
-for shape in ellipsoid torus capsule linkage; do
+for shape in duct ellipsoid torus capsule linkage; do
     expect 0 - sdmgen shapes check $shape --samples 8
     has '^fine'
 done

@@ -308,10 +308,10 @@ static void test_find_suggests_the_nearest_name(void **state)
 {
     (void)state;
     assert_int_equal(sdm_builtin_shapes_add(registry, &err), SDM_OK);
-    static const char *const NAMES[] = {"cochlea", "ellipsoid", "torus",
-                                        "capsule", "linkage",   "statistical"};
-    assert_int_equal(sdm_registry_count(registry), 6);
-    for (size_t i = 0; i < 6; i++) {
+    static const char *const NAMES[] = {"cochlea", "duct",    "ellipsoid",  "torus",
+                                        "capsule", "linkage", "statistical"};
+    assert_int_equal(sdm_registry_count(registry), 7);
+    for (size_t i = 0; i < 7; i++) {
         assert_string_equal(sdm_registry_at(registry, i)->name, NAMES[i]);
         assert_string_equal(sdm_registry_origin(registry, i), "built in");
         assert_ptr_equal(sdm_registry_find(registry, NAMES[i], NULL), sdm_registry_at(registry, i));

@@ -1,0 +1,210 @@
+/* The duct: at its defaults the cochlea of cochlea.c; sections and volumes against closed forms
+ * that are written here; which parameters there are; its measures. Tests: duct.c duct_curve.c
+ * cochlea_place.c */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "../../shapes/duct_curve.h"
+#include "shape_tools.h"
+
+#define PI 3.14159265358979323846
+
+static const char *const FORMS[] = {"circle", "ellipse", "lobes"};
+
+static void near_to(const char *what, double found, double want, double bound)
+{
+    if (!(fabs(found - want) <= bound)) fail_msg("%s is %.9g, not %.9g", what, found, want);
+}
+
+static double measure_of(const sdm_instance *s, const double *p, const char *name)
+{
+    sdm_error err = {0};
+    sdm_measures m;
+    if (sdm_shape_measure(s, p, NULL, 0, &m, &err)) fail_msg("%s", err.text);
+    for (size_t i = 0; i < m.n; i++)
+        if (!strcmp(m.at[i].name, name)) return m.at[i].value;
+    fail_msg("no measure '%s'", name);
+    return NAN;
+}
+
+static void defaults_of(const sdm_instance *s, double *p)
+{
+    size_t n;
+    const sdm_param *params = sdm_instance_params(s, &n);
+    for (size_t i = 0; i < n; i++) p[i] = params[i].def;
+}
+
+/* All forms at their defaults have the vertices and measures of the cochlea with the same published
+ * parameters, for both ears. */
+static void test_is_the_cochlea(void **state)
+{
+    (void)state;
+    static const char *const MEASURES[] = {"diameter_a",  "diameter_b", "height", "length_centre",
+                                           "length_wall", "turns",      "volume"};
+    for (int round = 0; round < 6; round++) {
+        char text[64];
+        const char *ear = round % 2 ? "left" : "right";
+        snprintf(text, sizeof text, "edge=0.4 ear=%s", ear);
+        sdm_instance *cochlea = shape_make("cochlea", text);
+        snprintf(text, sizeof text, "edge=0.4 ear=%s section=%s", ear, FORMS[round / 2]);
+        sdm_instance *duct = shape_make("duct", text);
+        double p[DUCT_UNKNOWNS], q[4];
+        defaults_of(duct, p);
+        random_params(cochlea, q);
+        memcpy(p, q, sizeof q);
+        sdm_mesh a = {0}, b = {0};
+        mesh_at(cochlea, q, &a);
+        mesh_at(duct, p, &b);
+        assert_int_equal(a.n_vert, b.n_vert);
+        assert_int_equal(a.n_tri, b.n_tri);
+        for (size_t i = 0; i < 3 * a.n_vert; i++) near_to("a vertex", b.vert[i], a.vert[i], 1e-12);
+        assert_memory_equal(a.tri, b.tri, 3 * a.n_tri * sizeof *a.tri);
+        for (size_t i = 0; i < sizeof MEASURES / sizeof *MEASURES; i++) {
+            const double want = measure_of(cochlea, q, MEASURES[i]);
+            near_to(MEASURES[i], measure_of(duct, p, MEASURES[i]), want, 1e-6 * want);
+        }
+        sdm_mesh_dispose(&a);
+        sdm_mesh_dispose(&b);
+        sdm_instance_free(cochlea);
+        sdm_instance_free(duct);
+    }
+}
+
+static void test_sections(void **state)
+{
+    (void)state;
+    for (int round = 0; round < 20; round++) {
+        const double w = random_in(0.5, 1.7), h = random_in(0.4, 1.5), tilt = random_in(-1, 1),
+                     waist = random_in(-0.2, 0.5), egg = round % 2 ? random_in(-0.4, 0.4) : 0;
+        const duct_section s = {
+            .wide = w, .high = h, .tilt = {cos(tilt), sin(tilt)}, .waist = waist, .egg = egg};
+        double last[2], now[2], area = 0, wide = 0, high = 0;
+        sdm_duct_outline_at(&s, 1, 0, last);
+        for (int i = 1; i <= 20000; i++) {
+            const double v = 2 * PI * i / 20000;
+            sdm_duct_outline_at(&s, cos(v), sin(v), now);
+            area += 0.5 * (last[0] * now[1] - last[1] * now[0]);
+            wide = fmax(wide, cos(tilt) * now[0] + sin(tilt) * now[1]);
+            high = fmax(high, cos(tilt) * now[1] - sin(tilt) * now[0]);
+            memcpy(last, now, sizeof last);
+        }
+        near_to("the area", area, PI * w * h * (1 - 0.75 * waist), 1e-6);
+        near_to("the height", high, h, 1e-6);
+        const double along[2] = {s.tilt[0], s.tilt[1]}, across[2] = {-s.tilt[1], s.tilt[0]};
+        near_to("the reach along the width", sdm_duct_reach(&s, along), wide, 1e-4);
+        near_to("the reach along the height", sdm_duct_reach(&s, across), h, 1e-4);
+        if (round % 2) continue;
+        // without an egg the width has a closed form: two lobes above a waist of 1/3
+        const double want = waist > 1. / 3 ? w * 2 / (3 * sqrt(3 * waist)) : w * (1 - waist);
+        near_to("the width", wide, want, 1e-6);
+    }
+}
+
+/* Two turns that do not touch, sections with their middle on the centreline: the volume is the
+ * integral of the area along the centreline (Pappus), here by Simpson's rule from the equations in
+ * duct.c, and two half-ellipsoids. */
+static void test_volume(void **state)
+{
+    (void)state;
+    sdm_instance *s = shape_make("duct", "edge=0.1 section=lobes");
+    const double a = 5, b = 0.06, c = 0.3, end = 12.3, dome = 0.2, hook = 0.7, dip = -0.4;
+    const double W[3] = {1.5, 1.2, 0.8}, H[3] = {1.7, 1.1, 0.9}, flare = 0.1, cap = 1.5, tip = 0.7,
+                 waist = 0.4;
+    const double p[DUCT_UNKNOWNS] = {a,    0,    b,    0,    c,     end,   dome, hook,
+                                     dip,  W[0], W[1], W[2], flare, cap,   tip,  H[0],
+                                     H[1], H[2], -0.6, 0.1,  0.3,   waist, 0};
+    enum { STEPS = 20000 };
+    double volume = 0, area[2] = {0}, mean[2] = {0};
+    for (int i = 0; i <= STEPS; i++) {
+        const double f = (double)i / STEPS, t = f * end, e = exp(-b * t),
+                     u = fmax(0, 1 - 2 * t / PI), r = a * e + hook * u * u * u,
+                     dr = -a * b * e - 3 * hook * u * u * 2 / PI,
+                     dz = c + 4 * dome * (1 - 2 * f) / end - 3 * dip * u * u * 2 / PI,
+                     speed = sqrt(dr * dr + r * r + dz * dz);
+        const double l0 = (1 - f) * (1 - 2 * f), l1 = 4 * f * (1 - f), l2 = f * (2 * f - 1),
+                     late = fmax(0, 1 - (end - t) / PI), taper = 1 - (1 - tip) * late * late,
+                     more = flare * exp(-t / 0.35);
+        const double w = taper * ((W[0] * l0 + W[1] * l1 + W[2] * l2) / 2 + more),
+                     h = taper * ((H[0] * l0 + H[1] * l1 + H[2] * l2) / 2 + more);
+        const double now = PI * w * h * (1 - 0.75 * waist);
+        volume += now * speed * (i == 0 || i == STEPS ? 1 : i % 2 ? 4 : 2) * end / STEPS / 3;
+        if (i == 0) area[0] = now, mean[0] = sqrt(w * h);
+        if (i == STEPS) area[1] = now, mean[1] = sqrt(w * h);
+    }
+    volume += 2. / 3 * (area[0] * mean[0] * cap + area[1] * mean[1]);
+    const double found = measure_of(s, p, "volume");
+    // the mesh is inscribed
+    if (!(found < volume * 1.001 && found > volume * 0.98))
+        fail_msg("the volume is %.6g, not %.6g", found, volume);
+    sdm_instance_free(s);
+}
+
+static void test_parameters(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *options, *last;
+        size_t n;
+    } CASES[] = {{"section=circle", "tip", 15},
+                 {"", "tilt_apex", 21},
+                 {"section=lobes", "egg", 23},
+                 {"section=lobes free=paper", "phi", 4},
+                 {"section=lobes free=centreline", "dip", 9},
+                 {"section=lobes free=section", "egg", 18},
+                 {"section=circle free=section", "tip", 10}};
+    for (size_t i = 0; i < sizeof CASES / sizeof *CASES; i++) {
+        sdm_instance *s = shape_make("duct", CASES[i].options);
+        size_t n;
+        const sdm_param *params = sdm_instance_params(s, &n);
+        assert_int_equal(n, CASES[i].n);
+        assert_string_equal(params[0].name, "a");
+        assert_string_equal(params[n - 1].name, CASES[i].last);
+        sdm_instance_free(s);
+    }
+    // an option is the constant, or the default of a parameter
+    sdm_instance *all = shape_make("duct", "edge=0.5 hook=0.6 height_base=1.6"),
+                 *fixed = shape_make("duct", "edge=0.5 hook=0.6 height_base=1.6 free=paper");
+    double p[DUCT_UNKNOWNS];
+    defaults_of(all, p);
+    near_to("the hook", p[DUCT_HOOK], 0.6, 0);
+    sdm_mesh a = {0}, b = {0};
+    mesh_at(all, p, &a);
+    mesh_at(fixed, p, &b);
+    assert_memory_equal(a.vert, b.vert, 3 * a.n_vert * sizeof *a.vert);
+    sdm_mesh_dispose(&a);
+    sdm_mesh_dispose(&b);
+    sdm_instance_free(all);
+    sdm_instance_free(fixed);
+}
+
+/* Inscribed meshes reach as high as the duct, and a little less, all over the ranges. */
+static void test_height(void **state)
+{
+    (void)state;
+    sdm_instance *s = shape_make("duct", "edge=0.1 section=lobes");
+    for (int i = 0; i < 3; i++) {
+        double p[DUCT_UNKNOWNS];
+        random_params(s, p);
+        const double height = measure_of(s, p, "height"), found = measure_of(s, p, "extent_z");
+        if (!(found <= height * (1 + 1e-6) && found > height * 0.99))
+            fail_msg("the mesh is %.6g mm high, the duct %.6g", found, height);
+    }
+    sdm_instance_free(s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_is_the_cochlea), cmocka_unit_test(test_sections),
+        cmocka_unit_test(test_volume),         cmocka_unit_test(test_parameters),
+        cmocka_unit_test(test_height),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -23,6 +23,7 @@
 #include "fit/trust/convergence.h"
 #include "fit/trust/evidence.h"
 #include "fit/trust/kept_pose.h"
+#include "fit/trust/pose_params.h"
 #include "fit/trust/posterior.h"
 #include "fit_check.h"
 #include "sdm/internal/clock.h"
@@ -440,7 +441,8 @@ static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
 // computes the covariance, the share of the shape in the image, and what the image says without it
 static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
-    sdm_status s = sdm_fit_posterior(p, out, err);
+    sdm_status s = sdm_fit_pose_params_find(p, err);
+    if (!s) s = sdm_fit_posterior(p, out, err);
     if (s && s != SDM_E_QUALITY) return s;
     out->inside_share = sdm_fit_inside_share(p);
     if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {

@@ -92,6 +92,10 @@ typedef struct fit_problem {
     size_t n_recent;
     /* number of iterations so far, including those of the search */
     size_t n_steps;
+    /* the second best of several starts of the search; its objective */
+    bool has_runner_up;
+    double runner_up_objective;
+    fit_state runner_up;
     /* where the search for the start is, for progress(); see sdm_fit_progress */
     size_t search_round, search_start, search_starts;
     const double *search_best;

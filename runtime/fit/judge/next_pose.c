@@ -112,8 +112,7 @@ static void cube_rotation(size_t i, double r[9])
 // others
 static void turned(const own_fit *own, size_t i, fit_state *to)
 {
-    const double *v = own->axes,
-                 back[9] = {v[0], v[3], v[6], v[1], v[4], v[7], v[2], v[5], v[8]};
+    const double *v = own->axes, back[9] = {v[0], v[3], v[6], v[1], v[4], v[7], v[2], v[5], v[8]};
     double cube[9], half[9], q[9], at[3], moved[3];
     if (i < N_CUBE) {
         cube_rotation(i, cube);
@@ -226,8 +225,8 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     p->use_tissue_field = false;
     sdm_status s = sdm_fit_samples_near(p, SAMPLES, err);
     if (!s) s = own_create(p, &own, err);
-    // of every `stride`-th voxel fewer count as one; where the shape does not explain the image, the
-    // likelihood is less certain (Wedderburn 1974)
+    // of every `stride`-th voxel fewer count as one; where the shape does not explain the image,
+    // the likelihood is less certain (Wedderburn 1974)
     own.factor = fmax(factor / pow((double)p->stride, 3), 1) * fmax(v->chi_square, 1);
     if (!s) s = least_gain(p, &own, &gain, err);
     sdm_free(own.distance);

@@ -182,6 +182,7 @@ static sdm_status challenge(fit_problem *p, const own_fit *own, const start *fro
     p->state = from->state;
     sdm_status s = climb(p, from->keep_params, STEPS, err);
     *other = !s && likeness(own, p->maps.distance, &p->state) <= ALIKE;
+    if (s == SDM_E_QUALITY) return SDM_OK; // a state that cannot be fitted is no rival
     return s ? s : sdm_fit_stand(p, own->factor, standing, err);
 }
 
@@ -232,11 +233,13 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     sdm_free(own.distance);
     p->opts = given;
     if (s || isnan(gain)) return s;
-    const bool passed = gain > SDM_FIT_PREFERRED;
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, passed, SDM_FIT_FAILED, gain, SDM_FIT_PREFERRED,
+    const bool passed = gain > SDM_FIT_PREFERRED, points = p->target->kind == SDM_FIT_POINTS;
+    const sdm_fit_grade grade = points ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED;
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, passed, grade, gain, SDM_FIT_PREFERRED,
                       "the shape in another pose explains the data %s (log-likelihood of the fit "
                       "less that of the other: %.2g): give a nearer start, or more turns",
                       gain < 0 ? "better" : "as well", gain);
-    return passed ? SDM_OK
-                  : sdm_fail(err, SDM_E_QUALITY, "%s", v->findings[v->n_findings - 1].text);
+    return passed || points
+               ? SDM_OK
+               : sdm_fail(err, SDM_E_QUALITY, "%s", v->findings[v->n_findings - 1].text);
 }

@@ -12,6 +12,7 @@
 #include "fit/data/soft_labels.h"
 #include "fit/data/source_params.h"
 #include "fit/judge/judgement.h"
+#include "fit/judge/next_pose.h"
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
@@ -23,6 +24,7 @@
 #include "fit/trust/convergence.h"
 #include "fit/trust/evidence.h"
 #include "fit/trust/kept_pose.h"
+#include "fit/trust/pose_params.h"
 #include "fit/trust/posterior.h"
 #include "fit_check.h"
 #include "sdm/internal/clock.h"
@@ -427,12 +429,14 @@ static void report_work(const fit_problem *p, double from, sdm_fit_result *out)
     out->seconds = sdm_clock() - from;
 }
 
-// the verdict; with a kept pose it leaves *p at the state of a free one
+// the verdict; leaves *p at a rival, with a kept pose at the state of a free one
 static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
 {
-    const sdm_status s = sdm_fit_judge(p, r, err);
+    double factor;
+    sdm_status s = sdm_fit_judge(p, r, &factor, err);
     if (s && s != SDM_E_QUALITY) return s;
     sdm_fit_name_restless(p, r, s ? err : NULL);
+    if (!s) s = sdm_fit_judge_next_pose(p, factor, &r->verdict, err);
     const sdm_status kept = p->opts->keep_pose ? sdm_fit_judge_kept_pose(p, r, err) : SDM_OK;
     return kept ? kept : s;
 }
@@ -440,7 +444,8 @@ static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
 // computes the covariance, the share of the shape in the image, and what the image says without it
 static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
-    sdm_status s = sdm_fit_posterior(p, out, err);
+    sdm_status s = sdm_fit_pose_params_find(p, err);
+    if (!s) s = sdm_fit_posterior(p, out, err);
     if (s && s != SDM_E_QUALITY) return s;
     out->inside_share = sdm_fit_inside_share(p);
     if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {

@@ -1,6 +1,6 @@
 /* The pose of a fit: motions that the data leave open, a pose that is kept but wrong, and one that
  * still moves.
- * Tests: convergence.c kept_pose.c open_motions.c source_params.c */
+ * Tests: convergence.c kept_pose.c open_motions.c pose_params.c source_params.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -33,17 +33,18 @@ static void test_eigenvectors(void **state)
     }
 }
 
-// A fit of `name` to 3000 points on its own surface in POSE; the start has its axis 0.1 rad off.
-static sdm_fit_result fit_surface(const char *name, const double *p)
+// A fit of `name` with these options to 3000 points on its own surface in POSE; the start has its
+// axis 0.1 rad off.
+static sdm_fit_result fit_with(const char *name, const sdm_named_text *options, size_t n_options,
+                               const double *p)
 {
     enum { N = 3000 };
-    sdm_named_text edge = {"edge", "0.1"};
     sdm_instance *shape = NULL;
     sdm_mesh m = {0};
     double x[3 * N];
-    assert_int_equal(
-        sdm_instance_create(sdm_registry_find(registry, name, NULL), &edge, 1, NULL, &shape, NULL),
-        SDM_OK);
+    assert_int_equal(sdm_instance_create(sdm_registry_find(registry, name, NULL), options,
+                                         n_options, NULL, &shape, NULL),
+                     SDM_OK);
     assert_int_equal(sdm_instance_mesh(shape, p, &m, NULL), SDM_OK);
     assert_int_equal(sdm_fit_surface_points(&m, N, 2, x, NULL), SDM_OK);
     for (size_t i = 0; i < N; i++) {
@@ -66,6 +67,11 @@ static sdm_fit_result fit_surface(const char *name, const double *p)
     sdm_mesh_dispose(&m);
     sdm_instance_free(shape);
     return r;
+}
+
+static sdm_fit_result fit_surface(const char *name, const double *p)
+{
+    return fit_with(name, &(sdm_named_text){"edge", "0.1"}, 1, p);
 }
 
 // sd of the rotation about the unit vector `axis` of the world.
@@ -122,6 +128,28 @@ static void test_determined_pose(void **state)
     sdm_fit_result f = fit_surface("ellipsoid", (const double[3]){2, 2.3, 3});
     assert_string_equal(f.open_motions, "");
     for (size_t k = 3; k < 6; k++) assert_true(f.sd[k] < 0.05);
+    sdm_fit_dispose(&f);
+}
+
+// The first joint of an arm on a round base turns it as the pose does: only the sum of both angles
+// is determined. The second joint is not concerned.
+static void test_joint_that_is_a_pose(void **state)
+{
+    (void)state;
+    const sdm_named_text options[] = {
+        {"links", "2"}, {"length", "1.5"}, {"base", "1.5"}, {"edge", "0.2"}};
+    double r[9];
+    sdm_pose_matrix(&POSE, r);
+    const double along[3] = {r[2], r[5], r[8]}, across[3] = {r[0], r[3], r[6]};
+    sdm_fit_result f = fit_with("linkage", options, 4, (const double[2]){0.2, 0.5});
+    assert_string_equal(f.open_motions, "");
+    assert_true(f.by_prior[0] && f.sd[0] > 1.1 && f.sd[0] < 1.4);
+    assert_true(!f.by_prior[1] && f.sd[1] < 0.1 && fabs(f.params[1] - 0.5) < 0.1);
+    assert_true(fabs(turn_sd(&f, along) - f.sd[0]) < 0.1 && turn_sd(&f, across) < 0.1);
+    // a change of the joint, and the turn of the pose that undoes it
+    double turn = 0;
+    for (size_t k = 0; k < 3; k++) turn += along[k] * f.correlation[2 + k];
+    assert_true(turn < -0.9);
     sdm_fit_dispose(&f);
 }
 
@@ -227,7 +255,7 @@ int main(void)
         cmocka_unit_test(test_eigenvectors),        cmocka_unit_test(test_axis_of_symmetry),
         cmocka_unit_test(test_sphere_has_any_axis), cmocka_unit_test(test_determined_pose),
         cmocka_unit_test(test_kept_pose),           cmocka_unit_test(test_kept_pose_not_converged),
-        cmocka_unit_test(test_restless_unknown),
+        cmocka_unit_test(test_restless_unknown),    cmocka_unit_test(test_joint_that_is_a_pose),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,6 +1,7 @@
 /* The verdict of a fit: robust noise, right fits that pass, wrong ones that are refused with a
  * reason, the mirror image.
- * Tests: blob.c finding.c judgement.c mirror.c misfit.c noise.c residuals.c suffice.c */
+ * Tests: blob.c finding.c judgement.c mirror.c misfit.c next_pose.c noise.c residuals.c rival.c
+ * suffice.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -131,6 +132,8 @@ static void test_right_fits_pass(void **state)
             sdm_error err;
             if (fit_of(shape, &t, 0, &r, &err)) fail_msg("%s: %s", names[k], err.text);
             assert_true(r.verdict.grade != SDM_FIT_FAILED);
+            assert_true(finding(&r, SDM_FIT_CHECK_NEXT_POSE)->figure > 20);
+            if (k == 0) assert_true(finding(&r, SDM_FIT_CHECK_BLOB)->figure > 20);
             if (!labels) {
                 const sdm_fit_finding *noise = finding(&r, SDM_FIT_CHECK_RESIDUALS);
                 assert_true(noise->figure > 0.5 && noise->figure < noise->limit);
@@ -339,6 +342,49 @@ static void test_few_points_are_refused(void **state)
     free(x);
 }
 
+// The image of two crossed capsules: one of them fits as well as the other, if as much of its
+// material may lie beside it.
+static void test_a_second_pose_is_refused(void **state)
+{
+    (void)state;
+    sdm_instance *capsule = shape_of("capsule");
+    const sdm_grid g = cube(5.5, 0.35);
+    const size_t n = sdm_grid_count(&g);
+    sdm_phantom_opts phantom = sdm_phantom_defaults();
+    sdm_fit_opts o = sdm_fit_defaults();
+    double one[9], quarter[9], two[9] = {0};
+    sdm_pose other = POSE;
+    float *v = image_of_shape(capsule, &g, 1, false, 3), *w = calloc(n, sizeof *w);
+    if (!w) abort();
+    sdm_pose_matrix(&POSE, one);
+    sdm_pose_matrix(&(sdm_pose){{1.5707963267948966, 0, 0}, {0, 0, 0}}, quarter);
+    for (size_t i = 0; i < 9; i++)
+        for (size_t k = 0; k < 3; k++) two[i] += one[i / 3 * 3 + k] * quarter[3 * k + i % 3];
+    sdm_rotation_vector(two, other.rotation);
+    phantom.seed = 3;
+    assert_int_equal(sdm_phantom_make(capsule, NULL, &other, &phantom, &g, w, NULL, NULL), SDM_OK);
+    for (size_t i = 0; i < n; i++) v[i] = w[i] < v[i] ? w[i] : v[i];
+    const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = v};
+    const sdm_fit_source source = {
+        .shape = capsule,
+        .grid = sdm_grid_centred((int64_t[3]){34, 34, 34}, 0.35, (double[3]){0, 0, 0})};
+    o.start_pose = POSE;
+    o.polish_eps = 1e-4;
+    o.appearance.n_outside = 1;
+    o.beside = 2;
+    sdm_fit_result r;
+    sdm_error err = {0};
+    const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);
+    const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_NEXT_POSE);
+    if (!f || s != SDM_E_QUALITY) fail_msg("%s, next pose %g", err.text, f ? f->figure : NAN);
+    assert_int_equal(f->grade, SDM_FIT_FAILED);
+    assert_true(fabs(f->figure) < SDM_FIT_PREFERRED);
+    assert_non_null(strstr(err.text, "in another pose"));
+    sdm_fit_dispose(&r);
+    free(v), free(w);
+    sdm_instance_free(capsule);
+}
+
 // Points in metres: all of them lie close together, and an ellipsoid passes through them.
 static void test_points_in_metres_are_refused(void **state)
 {
@@ -465,6 +511,7 @@ int main(void)
         cmocka_unit_test(test_strays_are_refused_if_many),
         cmocka_unit_test(test_few_points_are_refused),
         cmocka_unit_test(test_points_in_metres_are_refused),
+        cmocka_unit_test(test_a_second_pose_is_refused),
         cmocka_unit_test(test_labels_of_a_similar_shape_are_refused),
         cmocka_unit_test(test_coarse_maps_are_told),
         cmocka_unit_test(test_a_grid_that_cuts_is_refused),

@@ -1,14 +1,18 @@
-/* The ellipsoid of equal moments on the map of the shape, blurred in the same way, at the samples.
- */
+/* The ellipsoid of equal moments, at the samples: seen through the point spread of the fit, or its
+ * distance. */
 #include "blob.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "finding.h"
 #include "fit/data/blur.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/internal/threads.h"
+
+// A shape that has this Dice coefficient with its blob cannot be told from one: no comparison.
+#define BLOB_ALIKE 0.9
 
 /* Ellipsoid in the shape's frame: (x - centre)^T inverse (x - centre) = 1. */
 typedef struct ellipsoid {
@@ -63,36 +67,79 @@ static double ellipsoid_distance(const ellipsoid *e, const double x[3])
     return (square - 1) / fmax(2 * sqrt(slope), 1e-12);
 }
 
-sdm_status sdm_fit_against_blob(const fit_problem *p, double *gain, double *alike, sdm_error *err)
+// Dice coefficient of the shape and the ellipsoid on the map
+static double likeness(const fit_maps *m, const ellipsoid *e)
+{
+    double shape = 0, blob = 0, both = 0, x[3];
+    for (size_t v = 0; v < m->n_voxels; v++) {
+        voxel_centre(&m->grid, v, x);
+        const bool in = m->distance[v] < 0, in_blob = ellipsoid_distance(e, x) < 0;
+        shape += in, blob += in_blob, both += in && in_blob;
+    }
+    return 2 * both / fmax(shape + blob, 1);
+}
+
+// field[samples.n] = share of the ellipsoid at the samples, through the point spread of the fit
+static sdm_status shares_at(const fit_problem *p, const ellipsoid *e, double *field, sdm_error *err)
 {
     const fit_maps *m = &p->maps;
-    const ellipsoid e = ellipsoid_of(m);
-    double *share = NULL, *spare = NULL, shape = 0, blob = 0, both = 0;
+    double *share = NULL, *spare = NULL, x[3];
     sdm_status s = SDM_ALLOC(&share, m->n_voxels, "rival of the fit", err);
     if (!s) s = SDM_ALLOC(&spare, m->n_voxels, "rival of the fit", err);
     for (size_t v = 0; v < m->n_voxels && !s; v++) {
-        double x[3];
         voxel_centre(&m->grid, v, x);
-        const double d = ellipsoid_distance(&e, x);
-        share[v] = 0.5 * erfc(d / m->min_blur * 0.70710678118654752);
-        shape += m->distance[v] < 0, blob += d < 0, both += m->distance[v] < 0 && d < 0;
+        share[v] = 0.5 * erfc(ellipsoid_distance(e, x) / m->min_blur * 0.70710678118654752);
     }
     if (!s) {
         const double rest = p->state.blur * p->state.blur - m->min_blur * m->min_blur;
         sdm_fit_blur(&m->grid, 1, fmax(rest, 0), true, sdm_threads(p->opts->n_threads), &share,
                      &spare);
         const fit_field f = {.grid = &m->grid, .packed = share, .n_fields = 1};
-        *gain = p->information.log_likelihood;
-        for (size_t i = 0; i < p->samples.n; i++) {
-            fit_likelihood l;
-            sdm_fit_likelihood(
-                &p->observation, (double)p->samples.value[i], fit_sample_weights(&p->samples, i),
-                sdm_fit_field_at(&f, &p->state, p->samples.world + 3 * i), false, &l);
-            *gain -= l.log_likelihood;
-        }
-        *alike = 2 * both / fmax(shape + blob, 1);
+        for (size_t i = 0; i < p->samples.n; i++)
+            field[i] = sdm_fit_field_at(&f, &p->state, p->samples.world + 3 * i);
     }
     sdm_free(share);
     sdm_free(spare);
     return s;
+}
+
+// log-likelihood of the samples at these fields, with the tissues of the fit
+static double log_likelihood_at(const fit_problem *p, const double *field)
+{
+    double sum = 0;
+    fit_likelihood l;
+    for (size_t i = 0; i < p->samples.n; i++) {
+        sdm_fit_likelihood(&p->observation, (double)p->samples.value[i],
+                           fit_sample_weights(&p->samples, i), field[i], false, &l);
+        sum += l.log_likelihood;
+    }
+    return sum;
+}
+
+sdm_status sdm_fit_check_blob(const fit_problem *p, double factor, sdm_fit_verdict *v,
+                              sdm_error *err)
+{
+    const ellipsoid e = ellipsoid_of(&p->maps);
+    if (likeness(&p->maps, &e) > BLOB_ALIKE) return SDM_OK;
+    fit_problem blob = *p;
+    fit_standing own, rival;
+    double x[3];
+    blob.samples.field = NULL;
+    sdm_status s = SDM_ALLOC(&blob.samples.field, p->samples.n, "rival of the fit", err);
+    if (!s && p->maps.share) s = shares_at(p, &e, blob.samples.field, err);
+    for (size_t i = 0; i < p->samples.n && !s && !p->maps.share; i++) {
+        sdm_fit_to_shape(&p->state, p->samples.world + 3 * i, x);
+        blob.samples.field[i] = ellipsoid_distance(&e, x);
+    }
+    if (!s) blob.information.log_likelihood = log_likelihood_at(p, blob.samples.field);
+    if (!s) s = sdm_fit_stand(p, factor, &own, err);
+    if (!s) s = sdm_fit_stand(&blob, factor, &rival, err);
+    sdm_free(blob.samples.field);
+    if (s) return s;
+    const double gain = sdm_fit_gain(&own, &rival);
+    if (isnan(gain)) return SDM_OK;
+    sdm_fit_judge_add(
+        v, SDM_FIT_CHECK_BLOB, gain > SDM_FIT_PREFERRED, SDM_FIT_FAILED, gain, SDM_FIT_PREFERRED,
+        "a blob of the same size in its place explains the data as well as the shape does");
+    return SDM_OK;
 }

@@ -1,11 +1,12 @@
 /* Compares the fitted shape with a blob, the ellipsoid that has its volume, centre of mass and
-   second moments. If the blob explains the image as well as the shape, the image does not show the
-   shape's form. */
+   second moments. If the blob explains the data as well as the shape, they do not show the shape's
+   form. */
 #pragma once
 
-#include "fit/solver/problem.h"
+#include "rival.h"
 
-/* *gain: log-likelihood of the samples with the fitted shape less that with the blob, of the same
-   tissues and point spread. *alike: Dice coefficient of the two on the map; near 1 the shape is a
-   blob itself, and the gain says nothing. Partial volume only. */
-sdm_status sdm_fit_against_blob(const fit_problem *p, double *gain, double *alike, sdm_error *err);
+/* Adds the finding "blob": the gain of the fit over the blob of the same tissues and point spread.
+   None where the shape is nearly a blob itself, or where points lie too far apart to tell. factor:
+   as fit_standing. SDM_E_NOMEM. */
+sdm_status sdm_fit_check_blob(const fit_problem *p, double factor, sdm_fit_verdict *v,
+                              sdm_error *err);

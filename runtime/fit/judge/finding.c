@@ -26,7 +26,8 @@ const char *sdm_fit_check_name(sdm_fit_check_kind kind)
                                                         [SDM_FIT_CHECK_NETWORK] = "network",
                                                         [SDM_FIT_CHECK_DATA] = "data",
                                                         [SDM_FIT_CHECK_SIZE] = "size",
-                                                        [SDM_FIT_CHECK_VOXELS] = "map voxels"};
+                                                        [SDM_FIT_CHECK_VOXELS] = "map voxels",
+                                                        [SDM_FIT_CHECK_NEXT_POSE] = "next pose"};
     return kind >= 0 && kind < SDM_FIT_N_CHECKS ? names[kind] : NULL;
 }
 

@@ -8,7 +8,7 @@
 
 #include "blob.h"
 #include "finding.h"
-#include "misfit.h"
+#include "rival.h"
 #include "sdm/internal/shared.h"
 #include "suffice.h"
 
@@ -34,8 +34,6 @@
 #define BORDER_MAX 0.1
 // largest fraction of the shapes of its family that a good network's grid cuts
 #define CUT_MAX 0.05
-// A shape that has this Dice coefficient with its blob cannot be told from one: no comparison.
-#define BLOB_ALIKE 0.9
 
 // the tissue with the largest weight
 static const sdm_fit_law *main_law(const sdm_fit_law *law, size_t n)
@@ -44,11 +42,6 @@ static const sdm_fit_law *main_law(const sdm_fit_law *law, size_t n)
     for (size_t i = 1; i < n; i++)
         if (law[i].weight > law[most].weight) most = i;
     return &law[most];
-}
-
-static bool is_image(const fit_problem *p)
-{
-    return p->target->kind == SDM_FIT_IMAGE && !p->given_labels;
 }
 
 // Gain in log-likelihood by the shape, as of independent voxels, less the cost of its unknowns
@@ -75,7 +68,7 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
         v, SDM_FIT_CHECK_CONVERGED, r->converged, SDM_FIT_FAILED, (double)r->n_iterations, NAN,
         "not converged after %zu iterations (%.120s); allow more of them, or give a nearer start",
         r->n_iterations, r->reason);
-    if (is_image(p)) {
+    if (sdm_fit_is_image(p)) {
         sdm_fit_judge_add(
             v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > SDM_FIT_PREFERRED, SDM_FIT_FAILED, r->evidence,
             SDM_FIT_PREFERRED,
@@ -116,7 +109,7 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, fit_coars
                             sdm_fit_verdict *v)
 {
     const double voxel = fit_longest_edge(&p->maps.grid), beyond = m->chi_square[1] / m->limit[1];
-    const bool image = is_image(p), points = p->target->kind == SDM_FIT_POINTS,
+    const bool image = sdm_fit_is_image(p), points = p->target->kind == SDM_FIT_POINTS,
                serious = m->empty + m->missing > SERIOUS_MIN,
                thin = voxel > COARSE * sdm_fit_inradius(&p->maps),
                refused = image ? p->maps.share && (serious || thin)
@@ -157,10 +150,10 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
                           sdm_fit_verdict *v)
 {
     const bool points = p->target->kind == SDM_FIT_POINTS;
-    const char *what = points ? "points" : is_image(p) ? "image" : "labels";
-    const bool biased = is_image(p) && !p->maps.share;
+    const char *what = points ? "points" : sdm_fit_is_image(p) ? "image" : "labels";
+    const bool biased = sdm_fit_is_image(p) && !p->maps.share;
     const double most = fmax(p->opts->tolerance, biased ? VOLUME_MIN_BIASED : VOLUME_MIN),
-                 beside = is_image(p) ? fmax(p->opts->beside, most) : most;
+                 beside = sdm_fit_is_image(p) ? fmax(p->opts->beside, most) : most;
     sdm_fit_judge_add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
                       "%.0f %% of the volume of the shape is empty in the %s, allowed %.0f %% "
                       "(sdm_fit_opts.tolerance)",
@@ -176,8 +169,8 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
             v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED, m->missing, beside,
             "beside the shape the %s hold%s as much of its material as %.0f %% of its volume, "
             "allowed %.0f %% (%s)",
-            what, is_image(p) ? "s" : "", 100 * m->missing, 100 * beside,
-            is_image(p) ? "sdm_fit_opts.beside" : "sdm_fit_opts.tolerance");
+            what, sdm_fit_is_image(p) ? "s" : "", 100 * m->missing, 100 * beside,
+            sdm_fit_is_image(p) ? "sdm_fit_opts.beside" : "sdm_fit_opts.tolerance");
 }
 
 // the tissues against the robust statistics, and against the values at the start
@@ -204,21 +197,6 @@ static void check_tissues(const fit_problem *p, const fit_residuals *s, const sd
         "the inside has the mean %.4g, the start %.4g: other values than those of this kind of "
         "image were given",
         law[1]->mean, given->mean);
-}
-
-// the blob must be worse by more than the cost of the unknowns that the shape has beyond its nine
-static sdm_status check_blob(const fit_problem *p, double factor, sdm_fit_verdict *v,
-                             sdm_error *err)
-{
-    double gain, alike;
-    if (!p->maps.share) return SDM_OK;
-    const sdm_status s = sdm_fit_against_blob(p, &gain, &alike, err);
-    if (s || alike > BLOB_ALIKE) return s;
-    gain /= factor;
-    sdm_fit_judge_add(
-        v, SDM_FIT_CHECK_BLOB, gain > SDM_FIT_PREFERRED, SDM_FIT_FAILED, gain, SDM_FIT_PREFERRED,
-        "a blob of the same size in its place explains the image as well as the shape does");
-    return s;
 }
 
 // how deep inside the shape the border of its map is, mm; 0: the border is outside
@@ -273,15 +251,15 @@ static const sdm_fit_finding *reason(const sdm_fit_verdict *v)
     return why;
 }
 
-sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err)
+sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor, sdm_error *err)
 {
     sdm_fit_verdict *v = &r->verdict;
     fit_residuals residuals;
     fit_misfit misfit;
     sdm_status s = sdm_fit_residuals_create(p, &residuals, err);
-    const double robust = s ? 0 : sdm_fit_residual_correlation(&residuals),
-                 factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
-    if (is_image(p)) r->evidence = evidence_of(p, r, factor);
+    const double robust = s ? 0 : sdm_fit_residual_correlation(&residuals);
+    *factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
+    if (sdm_fit_is_image(p)) r->evidence = evidence_of(p, r, *factor);
     const fit_coarseness coarse = sdm_fit_coarseness(p);
     check_basics(p, r, v);
     check_maps(p, v);
@@ -293,11 +271,11 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, sdm_error *err
         v->chi_square = misfit.noise_chi_square;
     }
     if (!s && p->target->kind == SDM_FIT_POINTS) s = sdm_fit_check_points(p, &residuals, v, err);
-    if (!s && is_image(p)) check_tissues(p, &residuals, r, v);
-    if (!s) sdm_fit_check_voxels(p, coarse, is_image(p) ? r->blur : 0, v);
+    if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
+    if (!s) sdm_fit_check_voxels(p, coarse, sdm_fit_is_image(p) ? r->blur : 0, v);
     if (!s) sdm_fit_check_determined(p, r, v);
     sdm_fit_residuals_dispose(&residuals);
-    if (!s && is_image(p)) s = check_blob(p, factor, v, err);
+    if (!s) s = sdm_fit_check_blob(p, *factor, v, err);
     const sdm_fit_finding *why = s ? NULL : reason(v);
     return s || !why ? s : sdm_fail(err, SDM_E_QUALITY, "%s", why->text);
 }
@@ -310,6 +288,5 @@ double sdm_fit_compare(const sdm_fit_result *fit, const sdm_fit_result *rival)
     if (!isnan(fit->evidence) && !isnan(rival->evidence))
         return (fit->evidence - rival->evidence) / overdispersion;
     const double n = 0.5 * (double)(fit->verdict.n_units + rival->verdict.n_units);
-    return 0.5 * n *
-           log(fmax(rival->verdict.chi_square, 1e-3) / fmax(fit->verdict.chi_square, 1e-3));
+    return sdm_fit_units_gain(n, fit->verdict.chi_square, rival->verdict.chi_square);
 }

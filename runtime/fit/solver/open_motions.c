@@ -10,9 +10,6 @@
 #include "sdm/internal/vec3.h"
 
 #define PI 3.14159265358979324
-// a motion is open if the surface moves by less than this along its normal, in voxels of the map:
-// about the error of the interpolated map
-#define MOTION_MIN 0.05
 // angles (rad) of the finite motions; a shape with teeth looks the same after some angles, but not
 // after all of these
 #define N_ANGLES 3
@@ -59,9 +56,7 @@ void sdm_fit_eigen(size_t n, double *a, double *value, double *vector)
 // a rotation is measured in rad, a translation in units of the reach of the shape
 static double unit(const fit_problem *p, size_t i) { return i < 3 ? 1 : p->extent.reach; }
 
-// *to = *from moved along the screw motion m[6] (rotation vector, translation at the origin of the
-// shape), for the time `angle`
-static void move_along(const fit_state *from, const double m[6], double angle, fit_state *to)
+void sdm_fit_move_along(const fit_state *from, const double m[6], double angle, fit_state *to)
 {
     sdm_pose turn = {.rotation = {angle * m[0], angle * m[1], angle * m[2]}};
     double r[9], j[9], shift[3];
@@ -105,8 +100,8 @@ static bool is_open(const fit_problem *p, const double m[6])
     for (int a = 0; a < N_ANGLES; a++)
         for (int sign = -1; sign <= 1; sign += 2) {
             fit_state to;
-            move_along(&p->state, m, sign * ANGLES[a], &to);
-            if (!(sdm_fit_surface_motion(p, &to) < MOTION_MIN * voxel)) return false;
+            sdm_fit_move_along(&p->state, m, sign * ANGLES[a], &to);
+            if (!(sdm_fit_surface_motion(p, &to) < FIT_MOTION_MIN * voxel)) return false;
         }
     return true;
 }

@@ -5,6 +5,14 @@
 
 #include "problem.h"
 
+/* A motion is open if the surface moves by less than this along its normal, in voxels of the map:
+ * about the error of the interpolated map. */
+#define FIT_MOTION_MIN 0.05
+
+/* *to = *from moved along the screw motion m[6] (rotation vector, translation at the origin of the
+ * shape), for the time `angle`. */
+void sdm_fit_move_along(const fit_state *from, const double m[6], double angle, fit_state *to);
+
 /* Fills problem->motion[problem->n_motions] for the evaluated state: motions that leave the field
    at the samples as it is (Gelfand and Guibas 2004: slippable motions), to a small part of a voxel
    of the map, over angles up to 0.7 rad; and those that the information determines less than the

@@ -23,6 +23,16 @@
 
 /* number of the last iterations that are remembered */
 enum { FIT_RECENT = 8 };
+/* independent rigid motions of a body */
+enum { FIT_MOTIONS_MAX = 6 };
+
+/* A parameter that moves the shape as a change of its pose does, see trust/pose_params.h. */
+typedef struct fit_pose_param {
+    size_t param;
+    /* motion that undoes a change of the parameter by 1: rotation vector (rad), then translation at
+     * the origin of the shape (mm) */
+    double motion[FIT_MOTIONS_MAX];
+} fit_pose_param;
 
 typedef struct fit_problem {
     /* inputs, owned by the caller of sdm_fit() or by its stack frame */
@@ -49,7 +59,10 @@ typedef struct fit_problem {
      * origin of the shape (mm); and the largest eigenvalue of the information of the pose, with
      * translations in units of the reach, see open_motions.h */
     size_t n_motions;
-    double motion[6][6], pose_information;
+    double motion[FIT_MOTIONS_MAX][6], pose_information;
+    /* parameters that the data determine only together with the pose */
+    size_t n_pose_params;
+    fit_pose_param pose_param[FIT_MOTIONS_MAX];
 
     /* maps of the shape and their derivatives */
     fit_maps maps;
@@ -79,6 +92,10 @@ typedef struct fit_problem {
     size_t n_recent;
     /* number of iterations so far, including those of the search */
     size_t n_steps;
+    /* the second best of several starts of the search; its objective */
+    bool has_runner_up;
+    double runner_up_objective;
+    fit_state runner_up;
     /* where the search for the start is, for progress(); see sdm_fit_progress */
     size_t search_round, search_start, search_starts;
     const double *search_best;

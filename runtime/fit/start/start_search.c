@@ -31,9 +31,7 @@
 
 #define PI 3.14159265358979324
 
-// rotation matrix Q of turn i of n: about z, or evenly over all rotations by super-Fibonacci
-// spirals (Alexa 2022)
-static void turn_rotation(sdm_fit_turns turns, size_t i, size_t n, double rotation[9])
+void sdm_fit_turn_rotation(sdm_fit_turns turns, size_t i, size_t n, double rotation[9])
 {
     sdm_pose pose = {{0, 0, 0}, {0, 0, 0}};
     if (turns == SDM_FIT_TURNS_AXIS) pose.rotation[2] = 2 * PI * (double)i / (double)n;
@@ -53,7 +51,7 @@ static void turn_start(const fit_problem *p, size_t i, const fit_state *start, f
 {
     const sdm_fit_opts *o = p->opts;
     double q[9], at[3], moved[3];
-    turn_rotation(o->turns, i, o->n_turns, q);
+    sdm_fit_turn_rotation(o->turns, i, o->n_turns, q);
     *out = *start;
     m3_product(start->rotation, q, out->rotation);
     sdm_fit_to_world(start, o->pivot, at);
@@ -66,9 +64,7 @@ static double widened(double given, double reach)
     return fmax(given, fmin(WIDER * given, WIDEST_SHARE * reach));
 }
 
-// chooses samples from a ball that holds every turn of the shape, with a stride that leaves about
-// `wanted` of them
-static sdm_status samples_near_choose(fit_problem *p, double wanted, sdm_error *err)
+sdm_status sdm_fit_samples_near(fit_problem *p, double wanted, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
     const bool turns = o->turns != SDM_FIT_TURNS_NONE;
@@ -165,6 +161,16 @@ static void search_at(fit_problem *p, size_t round, size_t i, size_t n)
     if (i == 0) p->search_best = NULL;
 }
 
+// remembers a turn that was not chosen, if it is better than the present runner-up
+static void runner_up_set(fit_problem *p, double objective, const fit_state *state)
+{
+    if (!(objective > -INFINITY) || (p->has_runner_up && objective <= p->runner_up_objective))
+        return;
+    p->has_runner_up = true;
+    p->runner_up_objective = objective;
+    p->runner_up = *state;
+}
+
 sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
@@ -173,7 +179,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
     // samples near the start
     *turn = 0;
     const size_t n = o->turns == SDM_FIT_TURNS_NONE || o->keep_pose ? 1 : o->n_turns;
-    sdm_status s = samples_near_choose(p, n > 1 ? SAMPLES_OF_TURNS : SAMPLES_OF_KEPT, err);
+    sdm_status s = sdm_fit_samples_near(p, n > 1 ? SAMPLES_OF_TURNS : SAMPLES_OF_KEPT, err);
     if (s) return s;
     if (!p->samples.n) return no_samples(p, err);
     // one start, or every turn, with a wide point spread
@@ -205,7 +211,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
     // with the given point spread
     if (n > 1 && !s) {
         p->state = start;
-        s = samples_near_choose(p, SAMPLES_OF_KEPT, err);
+        s = sdm_fit_samples_near(p, SAMPLES_OF_KEPT, err);
     }
     // the turns that continue, or the one start
     double best = -INFINITY;
@@ -223,7 +229,12 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         newton.max_iterations = SHARP_STEPS;
         if (!s && n > 1) s = sdm_fit_newton(p, &newton, &end, err);
         const double objective = s ? best : sdm_fit_objective(p);
-        if (objective > best) best = objective, chosen = p->state, *turn = found.turn[i];
+        if (objective > best) {
+            if (best > -INFINITY) runner_up_set(p, best, &chosen);
+            best = objective, chosen = p->state, *turn = found.turn[i];
+        } else {
+            runner_up_set(p, objective, &p->state);
+        }
         if (best > -INFINITY) p->search_best = chosen.params;
     }
     search_at(p, 0, 0, 0);

@@ -11,5 +11,14 @@
    Parameters and pose move unless the options keep them; point spread, l_ref, point_sd and
    appearance end at their start values. *turn: number of the chosen turn, 0 without turns.
    problem->prior becomes the start pose with this turn. Samples come from a ball that holds every
-   turn of the shape. SDM_E_ARG: no sample in it. */
+   turn of the shape. SDM_E_ARG: no sample in it. The next best of several turns becomes
+   problem->runner_up. */
 sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err);
+
+/* rotation = turn i of n: about z, or evenly over all rotations by super-Fibonacci spirals (Alexa
+ * 2022). */
+void sdm_fit_turn_rotation(sdm_fit_turns turns, size_t i, size_t n, double rotation[9]);
+
+/* Chooses samples from a ball that holds the shape at problem->state in every turn, with a stride
+   that leaves about `wanted` of them. */
+sdm_status sdm_fit_samples_near(fit_problem *p, double wanted, sdm_error *err);

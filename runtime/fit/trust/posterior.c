@@ -10,6 +10,7 @@
 #include "fit/solver/prior.h"
 #include "fit/solver/solve.h"
 #include "map_bias.h"
+#include "pose_params.h"
 #include "score_covariance.h"
 #include "sdm/memory.h"
 
@@ -149,6 +150,7 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
             out->covariance[i * size + j] = out->covariance[j * size + i] = c;
         }
     sdm_fit_open_motions_spread(p, out->covariance);
+    sdm_fit_pose_params_spread(p, out->covariance);
     for (size_t i = 0; i < size; i++) {
         const double variance = out->covariance[i * (size + 1)];
         // NaN, since 0 would mean that the unknown is known exactly

@@ -281,9 +281,10 @@ typedef enum sdm_fit_check_kind {
     SDM_FIT_CHECK_GIVEN,
     /* number of parameters at an end of their range */
     SDM_FIT_CHECK_BOUNDS,
-    /* image: gain in log-likelihood, as of independent voxels, over the ellipsoid of the same
-       moments in the same place, per unknown of the shape; not for shapes that are ellipsoids
-       nearly */
+    /* Gain over a blob, the ellipsoid of the same volume and moments in the same place. Images:
+       gain in log-likelihood, as of independent voxels; labels and points: as sdm_fit_compare().
+       Left out where the shape is nearly an ellipsoid (Dice coefficient above 0.9), and where
+       points lie too far apart to be tested */
     SDM_FIT_CHECK_BLOB,
     /* with keep_pose: gain of a free pose in log-likelihood, as of independent samples */
     SDM_FIT_CHECK_KEPT_POSE,
@@ -308,6 +309,13 @@ typedef enum sdm_fit_check_kind {
        distance bends within a voxel on at most a tenth of the surface), the voxels of the labels or
        the point spread of the image */
     SDM_FIT_CHECK_VOXELS,
+    /* Gain over the shape in its next best pose: the better one of the runner-up of the search for
+       the start and the best of 96 rotations of the fitted shape, each improved to the nearest
+       maximum. In units of log-likelihood of independent samples, as sdm_fit_compare(). Poses in
+       which the surface is nearly the same (Dice coefficient above 0.9) do not count. Left out
+       where every such rotation leads back to the fit, where the pose is kept, where a check
+       failed, and where points lie too far apart to be tested */
+    SDM_FIT_CHECK_NEXT_POSE,
     SDM_FIT_N_CHECKS
 } sdm_fit_check_kind;
 

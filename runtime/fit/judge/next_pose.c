@@ -1,0 +1,245 @@
+/* Other poses of the fitted shape: a list of rotations, the likelihood of each on a part of the
+ * samples, and the maximum next to the best ones. */
+#include "next_pose.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "finding.h"
+#include "fit/solver/newton.h"
+#include "fit/solver/objective.h"
+#include "fit/solver/open_motions.h"
+#include "fit/start/start_search.h"
+#include "rival.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/mat3.h"
+#include "sdm/internal/vec3.h"
+
+// a surface that has this Dice coefficient with that of the fit is no rival
+#define ALIKE 0.9
+// voxels of the shape by which surfaces are compared
+#define VOXELS_ALIKE 1000
+// samples on which fit and rivals are compared, and on which all rotations are
+#define SAMPLES 10000
+#define SAMPLES_RANKED 2000
+// iterations from a start of a rival, and from the fit
+#define STEPS 10
+#define STEPS_OF_FIT 2
+// rotations from which the fit may return to its own pose before the search is given up
+#define TRIES_MAX 3
+// turns that are tried: the rotations of a cube, and those evenly over all rotations
+#define N_CUBE 24
+#define N_EVEN 72
+
+/* A start of a rival. */
+typedef struct start {
+    fit_state state;
+    double log_likelihood;
+    bool keep_params;
+} start;
+
+/* The fit, with which its rivals are compared. */
+typedef struct own_fit {
+    const fit_problem *p;
+    fit_state state;
+    double *distance; /* [n_voxels] map of the shape, mm */
+    double centre[3]; /* of its inside, in its frame, mm */
+    double axes[9];   /* rows: its principal axes */
+    double factor;    /* as fit_standing, for the present samples */
+} own_fit;
+
+static void place_of(const sdm_grid *g, size_t v, double x[3])
+{
+    const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
+    sdm_grid_world(
+        g, (const double[3]){(double)(v % nx), (double)(v / nx % ny), (double)(v / nx / ny)}, x);
+}
+
+static sdm_status own_create(const fit_problem *p, own_fit *own, sdm_error *err)
+{
+    const fit_maps *m = &p->maps;
+    double covariance[9] = {0}, value[3], x[3];
+    fit_extent e;
+    *own = (own_fit){.p = p, .state = p->state};
+    sdm_status s = sdm_fit_extent(m, &e, err);
+    if (!s) s = SDM_ALLOC(&own->distance, m->n_voxels, "rival of the fit", err);
+    if (s) return s;
+    memcpy(own->centre, e.centre, sizeof own->centre);
+    memcpy(own->distance, m->distance, m->n_voxels * sizeof *m->distance);
+    for (size_t v = 0; v < m->n_voxels; v++) {
+        if (!(m->distance[v] < 0)) continue;
+        place_of(&m->grid, v, x);
+        for (int i = 0; i < 9; i++)
+            covariance[i] += (x[i / 3] - e.centre[i / 3]) * (x[i % 3] - e.centre[i % 3]);
+    }
+    sdm_fit_eigen(3, covariance, value, own->axes);
+    return SDM_OK;
+}
+
+// Dice coefficient of the fit and of the shape with the map distance[n_voxels] in the state `other`
+static double likeness(const own_fit *own, const double *distance, const fit_state *other)
+{
+    const fit_maps *m = &own->p->maps;
+    const fit_field f = {.grid = &m->grid, .packed = distance, .n_fields = 1, .distance = true};
+    size_t inside = 0, inside_other = 0, step, seen = 0;
+    for (size_t v = 0; v < m->n_voxels; v++)
+        inside += own->distance[v] < 0, inside_other += distance[v] < 0;
+    step = inside / VOXELS_ALIKE + 1;
+    double x[3], world[3], both = 0, tried = 0;
+    for (size_t v = 0; v < m->n_voxels; v++) {
+        if (!(own->distance[v] < 0) || seen++ % step) continue;
+        place_of(&m->grid, v, x);
+        sdm_fit_to_world(&own->state, x, world);
+        tried++;
+        both += sdm_fit_field_at(&f, other, world) < 0;
+    }
+    return 2 * (both / tried) * (double)inside / (double)(inside + inside_other);
+}
+
+// rotation i of the cube's: a permutation of the axes with signs, and no reflection; 0: identity
+static void cube_rotation(size_t i, double r[9])
+{
+    static const int order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1},
+                                    {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
+    const size_t which = i / 4;
+    const double a = i & 1 ? -1 : 1, b = i & 2 ? -1 : 1, c = (which < 3 ? 1 : -1) * a * b,
+                 sign[3] = {a, b, c};
+    memset(r, 0, 9 * sizeof *r);
+    for (int row = 0; row < 3; row++) r[3 * row + order[which][row]] = sign[row];
+}
+
+// *to = the fit turned about its centre: by rotation i of the cube of its axes, or by one of the
+// others
+static void turned(const own_fit *own, size_t i, fit_state *to)
+{
+    const double *v = own->axes, back[9] = {v[0], v[3], v[6], v[1], v[4], v[7], v[2], v[5], v[8]};
+    double cube[9], half[9], q[9], at[3], moved[3];
+    if (i < N_CUBE) {
+        cube_rotation(i, cube);
+        m3_product(back, cube, half);
+        m3_product(half, v, q);
+    } else {
+        sdm_fit_turn_rotation(SDM_FIT_TURNS_SPHERE, i - N_CUBE, N_EVEN, q);
+    }
+    *to = own->state;
+    m3_product(own->state.rotation, q, to->rotation);
+    sdm_fit_to_world(&own->state, own->centre, at);
+    sdm_fit_to_world(to, own->centre, moved);
+    for (int k = 0; k < 3; k++) to->translation[k] += at[k] - moved[k];
+}
+
+// log-likelihood of a part of the samples with the map of the fit at another pose
+static double rank(const fit_problem *p, const fit_state *state)
+{
+    const fit_field f = sdm_fit_maps_field(&p->maps);
+    const size_t step = p->samples.n / SAMPLES_RANKED + 1;
+    double sum = 0;
+    fit_likelihood l;
+    for (size_t i = 0; i < p->samples.n; i += step) {
+        sdm_fit_likelihood(&p->observation, (double)p->samples.value[i],
+                           fit_sample_weights(&p->samples, i),
+                           sdm_fit_field_at(&f, state, p->samples.world + 3 * i), false, &l);
+        sum += l.log_likelihood;
+    }
+    return sum;
+}
+
+// list[N_CUBE + N_EVEN] = the turns that are no symmetries, the best first; returns their number
+static size_t turns_rank(const own_fit *own, start *list)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < N_CUBE + N_EVEN; i++) {
+        start one = {.keep_params = true};
+        turned(own, i, &one.state);
+        if (likeness(own, own->distance, &one.state) > ALIKE) continue;
+        one.log_likelihood = rank(own->p, &one.state);
+        size_t at = n++;
+        for (; at > 0 && list[at - 1].log_likelihood < one.log_likelihood; at--)
+            list[at] = list[at - 1];
+        list[at] = one;
+    }
+    return n;
+}
+
+// from the state of *p to the nearest maximum, for some iterations
+static sdm_status climb(fit_problem *p, bool keep_params, size_t steps, sdm_error *err)
+{
+    const fit_newton_opts newton = {.phase = SDM_FIT_SEARCH,
+                                    .keep_params = keep_params || p->opts->keep_params,
+                                    .keep_blur = true,
+                                    .keep_appearance = p->opts->keep_appearance,
+                                    .max_iterations = steps,
+                                    .eps = 0.02};
+    fit_newton_end end;
+    return sdm_fit_newton(p, &newton, &end, err);
+}
+
+// how well the state of *p explains the samples after some iterations; the surface is another one
+// than that of the fit, or *other is false
+static sdm_status challenge(fit_problem *p, const own_fit *own, const start *from, bool *other,
+                            fit_standing *standing, sdm_error *err)
+{
+    p->state = from->state;
+    sdm_status s = climb(p, from->keep_params, STEPS, err);
+    *other = !s && likeness(own, p->maps.distance, &p->state) <= ALIKE;
+    if (s == SDM_E_QUALITY) return SDM_OK; // a state that cannot be fitted is no rival
+    return s ? s : sdm_fit_stand(p, own->factor, standing, err);
+}
+
+// the least gain over the runner-up of the search and over the best turn; NaN: there is no rival
+static sdm_status least_gain(fit_problem *p, own_fit *own, double *least, sdm_error *err)
+{
+    start *list = NULL;
+    fit_standing fit, rival;
+    bool other;
+    sdm_status s = SDM_ALLOC(&list, N_CUBE + N_EVEN, "rival of the fit", err);
+    const size_t n = s ? 0 : turns_rank(own, list);
+    const bool any = n || p->has_runner_up;
+    // the tissues of the fit on these samples, as those of its rivals
+    if (!s && any) s = climb(p, true, STEPS_OF_FIT, err);
+    if (!s && any) s = sdm_fit_stand(p, own->factor, &fit, err);
+    *least = NAN;
+    if (!s && p->has_runner_up) {
+        const start from = {.state = p->runner_up};
+        s = challenge(p, own, &from, &other, &rival, err);
+        if (!s && other) *least = sdm_fit_gain(&fit, &rival);
+    }
+    other = false;
+    for (size_t i = 0; i < n && i < TRIES_MAX && !s && !other; i++) {
+        s = challenge(p, own, &list[i], &other, &rival, err);
+        if (!s && other) *least = fmin(*least, sdm_fit_gain(&fit, &rival));
+    }
+    sdm_free(list);
+    return s;
+}
+
+sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdict *v,
+                                   sdm_error *err)
+{
+    const sdm_fit_opts *given = p->opts;
+    sdm_fit_opts quiet = *given;
+    own_fit own = {0};
+    double gain = NAN;
+    if (given->keep_pose || v->grade == SDM_FIT_FAILED) return SDM_OK;
+    quiet.progress = NULL;
+    p->opts = &quiet;
+    p->use_tissue_field = false;
+    sdm_status s = sdm_fit_samples_near(p, SAMPLES, err);
+    if (!s) s = own_create(p, &own, err);
+    // of every `stride`-th voxel fewer count as one; where the shape does not explain the image,
+    // the likelihood is less certain (Wedderburn 1974)
+    own.factor = fmax(factor / pow((double)p->stride, 3), 1) * fmax(v->chi_square, 1);
+    if (!s) s = least_gain(p, &own, &gain, err);
+    sdm_free(own.distance);
+    p->opts = given;
+    if (s || isnan(gain)) return s;
+    const bool passed = gain > SDM_FIT_PREFERRED, points = p->target->kind == SDM_FIT_POINTS;
+    const sdm_fit_grade grade = points ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED;
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, passed, grade, gain, SDM_FIT_PREFERRED,
+                      "the shape in another pose explains the data %s (log-likelihood of the fit "
+                      "less that of the other: %.2g): give a nearer start, or more turns",
+                      gain < 0 ? "better" : "as well", gain);
+    return passed || points
+               ? SDM_OK
+               : sdm_fail(err, SDM_E_QUALITY, "%s", v->findings[v->n_findings - 1].text);
+}

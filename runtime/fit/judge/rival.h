@@ -1,0 +1,29 @@
+/* Rivals of a fit: other explanations of the same samples. How much better the fitted shape is than
+ * one of them, in units of log-likelihood of independent samples. */
+#pragma once
+
+#include "misfit.h"
+
+/* How well a shape explains the samples. */
+typedef struct fit_standing {
+    /* images: log-likelihood, and the number of correlated samples that count as one independent
+     * one; labels and points: 0 */
+    double log_likelihood, factor;
+    /* labels and points: number of neighbourhoods, and their mean (mean residual)^2 / variance of
+     * the noise; images: 0 */
+    size_t n_units;
+    double chi_square;
+} fit_standing;
+
+/* Whether the target is an image: its voxels have tissues. */
+bool sdm_fit_is_image(const fit_problem *p);
+
+/* Fills *out from p->samples and p->information. factor: as fit_standing. SDM_E_NOMEM. */
+sdm_status sdm_fit_stand(const fit_problem *p, double factor, fit_standing *out, sdm_error *err);
+
+/* Gain of the fit over a rival that was measured on the same samples. NaN: points lie too far apart
+ * to tell. */
+double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival);
+
+/* Log-likelihood ratio of mean residuals of n neighbourhoods whose common variance is estimated. */
+double sdm_fit_units_gain(double n, double chi_square, double rival_chi_square);

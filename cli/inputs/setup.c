@@ -111,8 +111,8 @@ sdm_status cli_create_shape(const sdm_registry *r, const char *name, const cli_l
     return s;
 }
 
-/* Makes the mesh twice and compares the bits: a plug-in that keeps something from call to call would
- * give a wrong map without a word. Values outside the ranges are left to the command. */
+/* Makes the mesh twice and compares the bits: a plug-in that keeps something from call to call
+ * would give a wrong map without a word. Values outside the ranges are left to the command. */
 static sdm_status check_repeats(const cli_shape *shape, sdm_error *err)
 {
     sdm_mesh one = {0}, two = {0};

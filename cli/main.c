@@ -13,6 +13,7 @@
 
 #include "args/help.h"
 #include "commands.h"
+#include "inputs/cpp_end.h"
 #include "report/crash_guard.h"
 #include "report/terminal.h"
 #include "sdm/internal/isolation.h"
@@ -105,6 +106,9 @@ int main(int argc, char **argv)
     if (argc > 1 && !strcmp(argv[1], SDM_ISOLATION_COMMAND))
         return sdm_isolation_worker(argc - 1, argv + 1);
     open_standard_files();
+#ifdef SDM_HAVE_VDB
+    cli_end_by_message();
+#endif
     keep_memory();
     if (argc == 2 && !strcmp(argv[1], "--version")) {
         puts("sdmgen " SDM_VERSION_TEXT);

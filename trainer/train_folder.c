@@ -50,18 +50,32 @@ static void path_in(const char *folder, const char *name, char path[SDM_PATH_TEX
     snprintf(path, SDM_PATH_TEXT_MAX + 300, "%s/%s", folder, name);
 }
 
+/* Whether a file of this name is the temporary file of a run, also of a copy of a data file of the
+   shape (shape.OPTION.ENDING). */
+static bool is_leftover(const char *name)
+{
+    char of[256];
+    bool is = false;
+    for (size_t i = 0; i < sizeof run_files / sizeof *run_files; i++)
+        is = is || sdm_outfile_is_temp(name, run_files[i]);
+    const size_t copy = strlen("shape.");
+    for (size_t n = copy; !is && !strncmp(name, "shape.", copy) && name[n]; n++)
+        is = snprintf(of, sizeof of, "%.*s", (int)n, name) < (int)sizeof of &&
+             sdm_outfile_is_temp(name, of);
+    return is;
+}
+
 /* Removes the temporary files of runs that were killed. What cannot be removed harms nobody. */
 static void remove_leftovers(const char *folder)
 {
     DIR *list = opendir(folder);
     if (!list) return;
-    for (const struct dirent *one; (one = readdir(list));)
-        for (size_t i = 0; i < sizeof run_files / sizeof *run_files; i++) {
-            char path[SDM_PATH_TEXT_MAX + 300];
-            if (!sdm_outfile_is_temp(one->d_name, run_files[i])) continue;
-            path_in(folder, one->d_name, path);
-            unlink(path);
-        }
+    for (const struct dirent *one; (one = readdir(list));) {
+        char path[SDM_PATH_TEXT_MAX + 300];
+        if (!is_leftover(one->d_name)) continue;
+        path_in(folder, one->d_name, path);
+        unlink(path);
+    }
     closedir(list);
 }
 

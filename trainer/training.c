@@ -12,6 +12,7 @@
 #include "sdm/memory.h"
 #include "set_up.h"
 #include "state/checkpoint.h"
+#include "state/data_files.h"
 #include "state/export_model.h"
 #include "state/new_samples.h"
 #include "state/progress.h"
@@ -102,13 +103,14 @@ static sdm_status train_begin(trainer *t, bool resume, bool *found, sdm_error *e
 }
 
 /* Trains the weights. config: the open temporary file of config.yaml. It is committed, and the
-   files of an older run are removed, only now, after all checks of the configuration. The second
+   files of an older run are replaced, only now, after all checks of the configuration. The second
    training of a run leaves the files of the first alone. found: as train_begin() tells. */
 static sdm_status train_run(trainer *t, bool resume, bool found, sdm_outfile **config,
                             sdm_error *err)
 {
     sdm_status s = SDM_OK;
     if (!resume && !is_second(t)) s = trainer_checkpoint_clear_folder(t, err);
+    if (!s && !is_second(t)) s = trainer_data_files_copy(t, err);
     if (!s && !is_second(t)) s = sdm_outfile_commit(config, err);
     if (s) return s;
     if (!found) trainer_enter(t, SDM_PHASE_MODE_FIT);

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include "cohort.h"
-#include "json_words.h"
 #include "report/json_values.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/json_read.h"
@@ -59,7 +58,7 @@ static sdm_status take_ids(const char *path, const sdm_json_document *d, cli_ids
     for (size_t k = list + 1; k < d->values[list].next; k = d->values[k].next) n++;
     sdm_status s = SDM_ALLOC(&ids->id, n, "ids", err);
     for (size_t k = list + 1; k < d->values[list].next && !s; k = d->values[k].next) {
-        if (!cli_json_word(d, k, ids->id[ids->n], sizeof ids->id[0]))
+        if (!sdm_json_word(d, k, ids->id[ids->n], sizeof ids->id[0]))
             s = sdm_fail(err, SDM_E_FORMAT, "%s: id number %zu is not one", path, ids->n + 1);
         else if ((s = cli_check_id(ids->id[ids->n], err)))
             s = sdm_fail_in(err, s, "%s", path);

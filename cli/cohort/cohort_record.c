@@ -8,7 +8,6 @@
 #include <unistd.h>
 
 #include "cohort.h"
-#include "json_words.h"
 #include "report/json_values.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/file.h"
@@ -100,7 +99,7 @@ static bool is_whole(const record *r, size_t k, const char *out, const char *id)
     uint64_t crc = 0;
     const size_t file = sdm_json_member(&r->json, k, "file"),
                  sum = sdm_json_member(&r->json, k, "crc64");
-    if (!file || !sum || !cli_json_word(&r->json, file, name, sizeof name)) return false;
+    if (!file || !sum || !sdm_json_word(&r->json, file, name, sizeof name)) return false;
     cli_case_path(out, id, name, path);
     if (sdm_file_checksum(path, &crc, NULL)) return false;
     format_crc(crc, text);
@@ -134,8 +133,8 @@ void cli_record_read(const char *out, const char *id, bool check, cli_case_end *
                  reason = sdm_json_member(&r.json, 0, "reason"),
                  exit_code = sdm_json_member(&r.json, 0, "exit_code");
     const bool read = key && reason && exit_code &&
-                      cli_json_word(&r.json, key, end->key, sizeof end->key) &&
-                      cli_json_word(&r.json, reason, end->reason, sizeof end->reason) &&
+                      sdm_json_word(&r.json, key, end->key, sizeof end->key) &&
+                      sdm_json_word(&r.json, reason, end->reason, sizeof end->reason) &&
                       sdm_json_number(&r.json, exit_code, &code);
     end->exit_code = (int)code;
     if (read && (!check || has_whole_files(&r, out, id))) end->state = read_state(&r);
@@ -185,7 +184,7 @@ void cli_record_remove(const char *out, const char *id, const cli_list *outputs)
     for (size_t k = files + 1; files && k < r.json.values[files].next; k = r.json.values[k].next) {
         char name[CLI_CASE_PATH_MAX];
         const size_t file = sdm_json_member(&r.json, k, "file");
-        if (file && cli_json_word(&r.json, file, name, sizeof name) && !strchr(name, '/'))
+        if (file && sdm_json_word(&r.json, file, name, sizeof name) && !strchr(name, '/'))
             remove_file(out, id, name);
     }
     if (there) close_record(&r);

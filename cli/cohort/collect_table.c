@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "collect.h"
-#include "json_words.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/json_read.h"
@@ -77,7 +76,7 @@ static void add_params(reader *r)
     if (!params || d->values[params].kind != '{') return;
     for (size_t k = params + 1; k < d->values[params].next; k = d->values[k + 1].next) {
         char name[100];
-        if (!cli_json_word(d, k, name, sizeof name)) continue;
+        if (!sdm_json_word(d, k, name, sizeof name)) continue;
         add(r, CLI_GROUP_PARAM, name, false, k + 1);
         add(r, CLI_GROUP_PARAM, name, true, sds ? sdm_json_member(d, sds, name) : 0);
     }
@@ -107,8 +106,8 @@ static void add_measures(reader *r)
     for (size_t k = list + 1; k < d->values[list].next; k = d->values[k].next) {
         char name[100], unit[32] = "";
         const size_t at = sdm_json_member(d, k, "name"), of_unit = sdm_json_member(d, k, "unit");
-        if (!at || !cli_json_word(d, at, name, sizeof name - sizeof unit)) continue;
-        if (of_unit && !cli_json_word(d, of_unit, unit, sizeof unit)) *unit = '\0';
+        if (!at || !sdm_json_word(d, at, name, sizeof name - sizeof unit)) continue;
+        if (of_unit && !sdm_json_word(d, of_unit, unit, sizeof unit)) *unit = '\0';
         size_t n = strlen(name);
         if (*unit) name[n++] = '_';
         for (const char *c = unit; *c; c++)
@@ -159,7 +158,7 @@ static void read_fit(reader *r, const char *out)
         r->json = &d;
         const size_t verdict = sdm_json_member(&d, 0, "verdict"),
                      grade = verdict ? sdm_json_member(&d, verdict, "grade") : 0;
-        if (!grade || !cli_json_word(&d, grade, row->verdict, sizeof row->verdict))
+        if (!grade || !sdm_json_word(&d, grade, row->verdict, sizeof row->verdict))
             *row->verdict = '\0';
         add_numbers(r);
     }

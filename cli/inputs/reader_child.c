@@ -20,6 +20,7 @@
 
 #include "report/terminal.h"
 #include "sdm/internal/clock.h"
+#include "sdm/internal/heap.h"
 #include "sdm/internal/sanitized.h"
 #include "sdm/memory.h"
 
@@ -48,16 +49,6 @@ static limits limits_of(uint64_t file_bytes)
     return (limits){512 * MEGABYTE + 32 * file_bytes, 2 + file_bytes / 1000000};
 }
 
-/* Size of the address space of this process, bytes. */
-static uint64_t bytes_now(void)
-{
-    unsigned long long pages = 0;
-    FILE *f = fopen("/proc/self/statm", "r");
-    if (f && fscanf(f, "%llu", &pages) != 1) pages = 0;
-    if (f) fclose(f);
-    return pages * (uint64_t)sysconf(_SC_PAGESIZE);
-}
-
 static void set_limit(int resource, uint64_t value)
 {
     // a second more to the hard limit: the signal at the soft one tells time from other reasons
@@ -73,7 +64,7 @@ static void limit_child(limits most)
     (void)mallopt(M_ARENA_MAX, 1);
 #endif
     const uint64_t stacks = (uint64_t)sysconf(_SC_NPROCESSORS_ONLN) * 16 * MEGABYTE;
-    if (!SDM_SANITIZED) set_limit(RLIMIT_AS, bytes_now() + most.bytes + stacks);
+    if (!SDM_SANITIZED) set_limit(RLIMIT_AS, sdm_address_space() + most.bytes + stacks);
     set_limit(RLIMIT_CPU, most.seconds);
     set_limit(RLIMIT_CORE, 0);
 }

@@ -111,6 +111,26 @@ sdm_status cli_create_shape(const sdm_registry *r, const char *name, const cli_l
     return s;
 }
 
+/* Makes the mesh twice and compares the bits: a plug-in that keeps something from call to call
+ * would give a wrong map without a word. Values outside the ranges are left to the command. */
+static sdm_status check_repeats(const cli_shape *shape, sdm_error *err)
+{
+    sdm_mesh one = {0}, two = {0};
+    if (sdm_instance_check(shape->instance, shape->values, NULL)) return SDM_OK;
+    sdm_status s = sdm_instance_mesh(shape->instance, shape->values, &one, err);
+    if (!s) s = sdm_instance_mesh(shape->instance, shape->values, &two, err);
+    if (!s && (one.n_vert != two.n_vert || one.n_tri != two.n_tri ||
+               memcmp(one.vert, two.vert, 3 * one.n_vert * sizeof *one.vert) != 0 ||
+               memcmp(one.tri, two.tri, 3 * one.n_tri * sizeof *one.tri) != 0))
+        s = sdm_fail(err, SDM_E_PLUGIN,
+                     "shape '%s': mesh() gives another mesh when it is called again with the same "
+                     "parameters (`sdmgen shapes test` tells more)",
+                     sdm_instance_shape(shape->instance)->name);
+    sdm_mesh_dispose(&two);
+    sdm_mesh_dispose(&one);
+    return s;
+}
+
 sdm_status cli_shape_open(const cli_args *args, const char *name, const cli_list *options,
                           cli_shape *out, sdm_error *err)
 {
@@ -119,7 +139,8 @@ sdm_status cli_shape_open(const cli_args *args, const char *name, const cli_list
     if (s) return s;
     out->params = sdm_instance_params(out->instance, &out->n_params);
     s = SDM_ALLOC(&out->values, out->n_params, "parameters", err);
-    return s ? s : cli_read_params(out->params, out->n_params, &args->params, out->values, err);
+    if (!s) s = cli_read_params(out->params, out->n_params, &args->params, out->values, err);
+    return s || !args->isolate ? s : check_repeats(out, err);
 }
 
 void cli_shape_dispose(cli_shape *shape)

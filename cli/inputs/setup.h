@@ -30,8 +30,8 @@ typedef struct cli_shape {
     double *values; /* [n_params] values of -p, else the defaults; not checked for range yet */
 } cli_shape;
 
-/* Opens the registry, creates the shape `name` with the options and reads the values of -p.
- * SDM_E_ARG, SDM_E_PLUGIN. */
+/* Opens the registry, creates the shape `name` with the options and reads the values of -p. With
+ * --isolate, the mesh at these values must have the same bits twice. SDM_E_ARG, SDM_E_PLUGIN. */
 sdm_status cli_shape_open(const cli_args *args, const char *name, const cli_list *options,
                           cli_shape *out, sdm_error *err);
 void cli_shape_dispose(cli_shape *shape);

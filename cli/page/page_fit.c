@@ -30,38 +30,36 @@ void cli_page_fit_dispose(cli_page_fit *f)
 
 /* ---- the file ---- */
 
-/* path[] = the file that the member `key` names, from the working folder or beside the result; ""
- * if it is in neither. *given: the member, without its quotes. */
-static void find_file(const cli_page_fit *f, const char *key, char path[SDM_PATH_TEXT_MAX],
-                      sdm_json_value *given)
+/* name = the text of the member `key`, "" if it is none; path = the file of this name, from the
+ * working folder or beside the result; "" if it is in neither. */
+static void find_file(const cli_page_fit *f, const char *key, char name[SDM_PATH_TEXT_MAX],
+                      char path[SDM_PATH_TEXT_MAX])
 {
-    *given = f->json.values[sdm_json_member(&f->json, 0, key)];
-    const char *last = NULL, *slash = strrchr(f->name, '/');
-    for (size_t i = 0; i < given->size; i++)
-        if (given->at[i] == '/') last = given->at + i + 1;
-    const int n = (int)given->size, folder = slash ? (int)(slash - f->name) + 1 : 0;
-    snprintf(path, SDM_PATH_TEXT_MAX, "%.*s", n, given->at);
-    if (access(path, R_OK) && *given->at != '/')
-        snprintf(path, SDM_PATH_TEXT_MAX, "%.*s%.*s", folder, f->name, n, given->at);
+    if (!sdm_json_word(&f->json, sdm_json_member(&f->json, 0, key), name, SDM_PATH_TEXT_MAX))
+        *name = '\0';
+    const char *last = strrchr(name, '/'), *slash = strrchr(f->name, '/');
+    const int folder = slash ? (int)(slash - f->name) + 1 : 0;
+    snprintf(path, SDM_PATH_TEXT_MAX, "%s", name);
+    if (access(path, R_OK) && *name != '/')
+        snprintf(path, SDM_PATH_TEXT_MAX, "%.*s%s", folder, f->name, name);
     if (access(path, R_OK) && last)
-        snprintf(path, SDM_PATH_TEXT_MAX, "%.*s%.*s", folder, f->name, n - (int)(last - given->at),
-                 last);
+        snprintf(path, SDM_PATH_TEXT_MAX, "%.*s%s", folder, f->name, last + 1);
     if (access(path, R_OK)) *path = '\0';
 }
 
 /* A notice if the file has another checksum than the fit states. */
-static void compare_checksum(const cli_page_fit *f, const sdm_json_value *given, const char *path)
+static void compare_checksum(const cli_page_fit *f, const char *name, const char *path)
 {
     const sdm_json_document *d = &f->json;
     const size_t inputs = sdm_json_member(d, 0, "inputs");
     uint64_t crc = 0;
-    char now[20];
+    char now[20], file[SDM_PATH_TEXT_MAX];
     if (!inputs || !*path || sdm_file_checksum(path, &crc, NULL)) return;
     snprintf(now, sizeof now, "%016" PRIx64, crc);
     for (size_t i = inputs + 1; i < d->values[inputs].next; i = d->values[i].next) {
-        const size_t file = sdm_json_member(d, i, "file"), sum = sdm_json_member(d, i, "crc64");
-        if (!file || !sum || d->values[file].size != given->size) continue;
-        if (memcmp(d->values[file].at, given->at, given->size)) continue;
+        const size_t given = sdm_json_member(d, i, "file"), sum = sdm_json_member(d, i, "crc64");
+        if (!given || !sum || !sdm_json_word(d, given, file, sizeof file)) continue;
+        if (strcmp(file, name)) continue;
         if (!sdm_json_is(d, sum, now)) cli_notice("%s has changed since the fit", path);
         return;
     }
@@ -72,7 +70,7 @@ sdm_status cli_page_fit_take(const char *name, char *text, size_t size, cli_page
 {
     f->name = name;
     f->text = text;
-    sdm_json_value model, image;
+    char model[SDM_PATH_TEXT_MAX], image[SDM_PATH_TEXT_MAX];
     while (size && text[size - 1] == '\n') text[--size] = '\0';
     const sdm_status s = sdm_json_parse(name, text, size, &f->json, err);
     if (s) return s;
@@ -86,19 +84,19 @@ sdm_status cli_page_fit_take(const char *name, char *text, size_t size, cli_page
     if (!sdm_json_member(&f->json, 0, "model"))
         return sdm_fail(err, SDM_E_UNSUPPORTED,
                         "%s: a fit without a model (--shape) has no page: fit a MODEL", name);
-    find_file(f, "model", f->model_path, &model);
-    find_file(f, "image", f->image_path, &image);
+    find_file(f, "model", model, f->model_path);
+    find_file(f, "image", image, f->image_path);
     if (!*f->model_path)
         return sdm_fail(err, SDM_E_IO,
-                        "%s: its model '%.*s' is gone: put it there, or into the folder of this "
+                        "%s: its model '%s' is gone: put it there, or into the folder of this "
                         "file",
-                        name, (int)model.size, model.at);
+                        name, model);
     if (!*f->image_path)
-        cli_notice("%s: its image '%.*s' is gone: the page shows none (put it there, or into the "
+        cli_notice("%s: its image '%s' is gone: the page shows none (put it there, or into the "
                    "folder of this file)",
-                   name, (int)image.size, image.at);
-    compare_checksum(f, &model, f->model_path);
-    compare_checksum(f, &image, f->image_path);
+                   name, image);
+    compare_checksum(f, model, f->model_path);
+    compare_checksum(f, image, f->image_path);
     return SDM_OK;
 }
 

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "sdm/internal/callback.h"
+#include "sdm/internal/file.h"
 #include "terminal.h"
 
 /* Prints "sdmgen: error: shape 'mug', mesh() at r=2 h=3: REASON" and ends the program. snprintf()
@@ -31,6 +32,7 @@ static void end_program(const sdm_callback *c, const char *reason)
     n += (size_t)snprintf(line + n, sizeof line - n, ": %s%s\n", reason, json ? "\"}" : "");
     const ssize_t put = write(STDERR_FILENO, line, n < sizeof line ? n : sizeof line - 1);
     (void)put;
+    sdm_outfile_remove_temps();
     _exit(CLI_EXIT_INPUT);
 }
 

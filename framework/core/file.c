@@ -110,6 +110,28 @@ static char *path_with_suffix(const char *path, const char *suffix)
     return out;
 }
 
+#define TEMPS_MAX 64
+
+/* Names of the temporary files that are there, as far as there is room. */
+static _Atomic(const char *) temps[TEMPS_MAX];
+
+/* Puts `now` into the place of `was`. */
+static void note_temp(const char *was, const char *now)
+{
+    for (size_t i = 0; i < TEMPS_MAX; i++) {
+        const char *expected = was;
+        if (atomic_compare_exchange_strong(&temps[i], &expected, now)) return;
+    }
+}
+
+void sdm_outfile_remove_temps(void)
+{
+    for (size_t i = 0; i < TEMPS_MAX; i++) {
+        const char *name = atomic_load(&temps[i]);
+        if (name) unlink(name);
+    }
+}
+
 /* Creates a temporary file with a unique name (`path`, process id and a counter). Returns its file
  * descriptor, or -1 with errno set. *temp = the name of the file, to be freed; NULL on error. */
 static int temp_open(const char *path, char **temp)
@@ -184,6 +206,7 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
         sdm_outfile_discard(&f);
         return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", path, strerror(code));
     }
+    note_temp(NULL, f->temp);
     if (replaces && !keep_permissions(f->fd, st.st_mode)) {
         const int code = errno;
         sdm_outfile_discard(&f);
@@ -276,6 +299,7 @@ sdm_status sdm_outfile_commit(sdm_outfile **pf, sdm_error *err)
         sdm_outfile_discard(pf);
         return s;
     }
+    note_temp(f->temp, NULL);
     folder_sync(f->path);
     free(f->path);
     free(f->temp);
@@ -290,6 +314,7 @@ void sdm_outfile_discard(sdm_outfile **pf)
     if (!f) return;
     if (f->fd >= 0) close(f->fd);
     if (f->temp) unlink(f->temp);
+    if (f->temp) note_temp(f->temp, NULL);
     free(f->path);
     free(f->temp);
     sdm_free(f);

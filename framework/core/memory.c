@@ -9,7 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 #ifdef __linux__
+#include <fcntl.h>
 #include <sys/mman.h>
+#include <unistd.h>
 #endif
 
 #define ALIGNMENT 64u
@@ -90,3 +92,19 @@ sdm_status sdm_grow(void **block, size_t old_count, size_t new_count, size_t siz
 }
 
 void sdm_free(void *block) { free(block); }
+
+uint64_t sdm_address_space(void)
+{
+    uint64_t pages = 0;
+#ifdef __linux__
+    char text[64] = "";
+    const int f = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+    if (f < 0) return 0;
+    const ssize_t n = read(f, text, sizeof text - 1);
+    close(f);
+    for (ssize_t i = 0; i < n && text[i] >= '0' && text[i] <= '9'; i++)
+        pages = 10 * pages + (uint64_t)(text[i] - '0');
+    pages *= (uint64_t)sysconf(_SC_PAGESIZE);
+#endif
+    return pages;
+}

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "isolated_protocol.h"
+#include "sdm/internal/heap.h"
 #include "sdm/internal/sanitized.h"
 #include "sdm/memory.h"
 
@@ -36,24 +37,10 @@ static struct {
     uint64_t bytes; // address space at the start
 } crash;
 
-/* Address space of the process, bytes; for signal handlers, too. */
-static uint64_t bytes_now(void)
-{
-    char text[64] = "";
-    const int f = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
-    if (f < 0) return 0;
-    const ssize_t n = read(f, text, sizeof text - 1);
-    close(f);
-    uint64_t pages = 0;
-    for (ssize_t i = 0; i < n && text[i] >= '0' && text[i] <= '9'; i++)
-        pages = 10 * pages + (uint64_t)(text[i] - '0');
-    return pages * (uint64_t)sysconf(_SC_PAGESIZE);
-}
-
 /* Notes how much memory there was: a plug-in that gets none crashes. */
 static void on_crash(int signal_number)
 {
-    const uint64_t now = bytes_now();
+    const uint64_t now = sdm_address_space();
     crash.state->memory = now > crash.bytes ? now - crash.bytes : 0;
     signal(signal_number, SIG_DFL);
     raise(signal_number);
@@ -66,7 +53,7 @@ static void watch_crashes(worker *w)
     struct sigaction action;
     static const int signals[] = {SIGSEGV, SIGBUS, SIGABRT};
     crash.state = w->state;
-    crash.bytes = bytes_now();
+    crash.bytes = sdm_address_space();
     sigaltstack(&own, NULL);
     memset(&action, 0, sizeof action);
     action.sa_handler = on_crash;
@@ -83,7 +70,7 @@ static void limit_memory(uint64_t bytes)
     const struct rlimit none = {0, 0};
     setrlimit(RLIMIT_CORE, &none);
     if (SDM_SANITIZED || getrlimit(RLIMIT_AS, &limit)) return;
-    const rlim_t most = (rlim_t)(bytes_now() + bytes);
+    const rlim_t most = (rlim_t)(sdm_address_space() + bytes);
     if (limit.rlim_max != RLIM_INFINITY && limit.rlim_max < most) return;
     limit.rlim_cur = limit.rlim_max = most;
     setrlimit(RLIMIT_AS, &limit);

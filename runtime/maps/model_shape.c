@@ -1,11 +1,16 @@
 /* Recreates the shape that a model was trained on: its options, its data files, and a check that
    its parameters agree. */
+#define _POSIX_C_SOURCE 200809L // for lstat()
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "sdm/internal/checksum.h"
 #include "sdm/memory.h"
 #include "sdm/runtime.h"
+
+#define PATH_SIZE 4096
 
 /* SDM_E_PLUGIN unless number, names and units of the parameters agree. */
 static sdm_status check_agreement(const sdm_model_info *info, const sdm_instance *shape,
@@ -42,7 +47,6 @@ static sdm_status check_file(const char *path, const char *option, const char *w
     if (s) return s;
     snprintf(found, sizeof found, "%016llx", (unsigned long long)crc);
     if (!strcmp(found, wanted)) return SDM_OK;
-    // a model may name any file: its checksum is nobody's business
     return sdm_fail(err, SDM_E_FORMAT,
                     "%s: not the file '%s' of the training: its CRC-64 is not %.16s", path, option,
                     wanted);
@@ -52,42 +56,73 @@ static sdm_status check_file(const char *path, const char *option, const char *w
 typedef struct model_options {
     sdm_named_text *given;
     size_t n;
-    char (*beside)[4096]; // [n] paths of the data files in the folder of the model
+    char (*paths)[PATH_SIZE]; // [options of the model] of the data files
 } model_options;
 
-/* Finds the data file of the last option: in the folder of the model, or at the path it had in
-   training. */
-static sdm_status find_file(const sdm_model_info *info, model_options *o, const char *wanted,
-                            sdm_error *err)
+/* The checksum of the data file of an option, which follows the option; NULL: there is none. */
+static const char *wanted_sum(const sdm_model_info *info, size_t option)
 {
-    sdm_named_text *file = &o->given[o->n - 1];
-    char *beside = o->beside[o->n - 1];
-    const char *slash = strrchr(file->value, '/');
-    if (info->folder)
-        snprintf(beside, sizeof *o->beside, "%s%s", info->folder, slash ? slash + 1 : file->value);
-    if (info->folder && !check_file(beside, file->name, wanted, NULL)) {
-        file->value = beside;
-        return SDM_OK;
-    }
-    const sdm_status s = check_file(file->value, file->name, wanted, err);
-    if (!s) return s;
-    return sdm_fail_in(err, s, "data file '%s' of the exact shape, here or beside the model",
-                       file->name);
+    const char *name = info->option_names[option];
+    const size_t n = strlen(name);
+    if (option + 1 >= info->n_options) return NULL;
+    const char *next = info->option_names[option + 1];
+    return !strncmp(next, name, n) && !strcmp(next + n, ".crc64") ? info->option_values[option + 1]
+                                                                  : NULL;
 }
 
-/* Collects the options of the shape from those of the model. The option of a data file may be
-   followed by an entry NAME.crc64 with the checksum of that file. */
-static sdm_status read_options(const sdm_model_info *info, model_options *o, sdm_error *err)
+/* Finds a data file in the folder of the model, and nowhere else: whoever wrote the model chose its
+   name. A symbolic link would lead out of the folder. */
+static sdm_status find_file(const sdm_model_info *info, size_t option, char path[PATH_SIZE],
+                            sdm_error *err)
+{
+    const char *name = info->option_names[option], *recorded = info->option_values[option];
+    const char *slash = strrchr(recorded, '/'), *wanted = wanted_sum(info, option);
+    if (!info->folder)
+        return sdm_fail(err, SDM_E_IO,
+                        "it lies beside the file of the model, which was opened from memory");
+    const char *base = slash ? slash + 1 : recorded;
+    struct stat st;
+    if (snprintf(path, PATH_SIZE, "%s%s", info->folder, base) >= PATH_SIZE)
+        return sdm_fail(err, SDM_E_IO, "%.100s...: the name is too long", path);
+    if (lstat(path, &st))
+        return sdm_fail(err, SDM_E_IO, "%s: %s%s%s%s", path, strerror(errno),
+                        slash ? "; models name no files elsewhere: copy " : "",
+                        slash ? recorded : "", slash ? " there if you trust the model" : "");
+    if (S_ISLNK(st.st_mode))
+        return sdm_fail(err, SDM_E_UNSUPPORTED,
+                        "%s: a symbolic link, which is not followed: put the file itself there",
+                        path);
+    return wanted ? check_file(path, name, wanted, err) : SDM_OK;
+}
+
+static bool is_file_option(const sdm_shape *shape, const char *name)
+{
+    for (uint32_t i = 0; i < shape->n_options; i++)
+        if (!strcmp(shape->options[i].name, name)) return shape->options[i].type == SDM_OPTION_FILE;
+    return false;
+}
+
+static bool is_sum(const char *name)
+{
+    const char *dot = strchr(name, '.');
+    return dot && !strcmp(dot, ".crc64");
+}
+
+/* Collects the options of the shape from those of the model. */
+static sdm_status read_options(const sdm_model_info *info, const sdm_shape *shape, model_options *o,
+                               sdm_error *err)
 {
     sdm_status s = SDM_ALLOC(&o->given, info->n_options, "options", err);
-    if (!s) s = SDM_ALLOC(&o->beside, info->n_options, "paths of data files", err);
+    if (!s) s = SDM_ALLOC(&o->paths, info->n_options, "paths of data files", err);
     for (size_t i = 0; i < info->n_options && !s; i++) {
-        const sdm_named_text one = {.name = info->option_names[i], .value = info->option_values[i]};
-        const char *dot = strchr(one.name, '.');
-        if (dot && !strcmp(dot, ".crc64") && o->n > 0)
-            s = find_file(info, o, one.value, err);
-        else
-            o->given[o->n++] = one;
+        sdm_named_text one = {.name = info->option_names[i], .value = info->option_values[i]};
+        if (is_sum(one.name)) continue;
+        if (*one.value && is_file_option(shape, one.name)) {
+            s = find_file(info, i, o->paths[i], err);
+            if (s) return sdm_fail_in(err, s, "data file '%s' of the exact shape", one.name);
+            one.value = o->paths[i];
+        }
+        o->given[o->n++] = one;
     }
     return s;
 }
@@ -107,10 +142,10 @@ sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r, sdm_i
             info->shape);
     model_options options = {0};
     sdm_instance *made = NULL;
-    sdm_status s = read_options(info, &options, err);
+    sdm_status s = read_options(info, shape, &options, err);
     if (!s) s = sdm_instance_create(shape, options.given, options.n, NULL, &made, err);
     if (!s) s = check_agreement(info, made, err);
-    sdm_free(options.beside);
+    sdm_free(options.paths);
     sdm_free(options.given);
     if (s)
         sdm_instance_free(made);

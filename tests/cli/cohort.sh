@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # sdmgen fit --cases and sdmgen collect: the table does not depend on parts; what is missing or changed is done again; bad tables.
 # Tests: cmd_collect.c cohort_check.c cohort_child.c cohort_list.c cohort_record.c cohort_run.c cohort_table.c cohort_words.c collect_outliers.c
-# collect_page.c collect_table.c collect_write.c csv_cells.c json_words.c
+# collect_page.c collect_table.c collect_write.c csv_cells.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 

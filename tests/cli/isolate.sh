@@ -19,6 +19,10 @@ fault flood '.*/faulty\.so: mesh\(\): the plug-in needs more than 0\.2 GB of mem
 fault heap '.*/faulty\.so: mesh\(\): the plug-in called abort\(\), or damaged memory'
 absent ended.nrrd
 
+# a mesh that differs from call to call, which a map of one mesh does not show
+expect 3 "shape 'faulty': mesh\\(\\) gives another mesh when it is called again" sdmgen exact --shape faulty -O fault=unlike "${isolated[@]}" -o ended.nrrd
+absent ended.nrrd
+
 # what it prints is a notice, and no part of the result
 expect 0 "plug-in .*faulty\.so prints: a line for the user" sdmgen mesh --shape faulty -O fault=print "${isolated[@]}" --audit --json
 [ "$(wc -l <out)" -eq 1 ] || bad "more than the result: $(cat out)"

@@ -169,7 +169,8 @@ present "$stopped/model.sdm"
 absent "$stopped/checkpoint.sdmc"
 expect 0 - sdmgen info "$stopped/model.sdm"
 
-# Data files are found from every working folder, are never replaced by others, and are found after the project has moved.
+# The run keeps copies of the data files of the shape: they are found from every working folder, after the project has moved and without
+# the files themselves. A model leads to no file elsewhere.
 mkdir -p project/conf elsewhere
 cp -r "$source_folder"/configs/statistical* project/conf
 small=(grid.size=[16,12,12] grid.spacing=0.8 data.static=2 data.start=96 data.online=32 data.holdout=8
@@ -194,28 +195,66 @@ expect 0 - sdmgen config ../moved/data/config.yaml
 expect 0 - sdmgen verify ../moved/data/model.sdm --samples 2
 has 'on 2 random shapes'
 expect 0 - sdmgen info ../moved/data/model.sdm
-has '/moved/conf/statistical/mean\.ply$'
-printf 1 >>../$deviations
-expect 3 "/moved/conf/statistical/deviations\.npy: not the file 'deviations' of the training: its CRC-64 is not [0-9a-f]{16}\$" \
+has 'mean +shape\.mean\.ply$'
+mv ../moved/conf away
+expect 0 - sdmgen verify ../moved/data/model.sdm --samples 2
+mv away ../moved/conf
+copy=../moved/data/shape.deviations.npy
+cmp $copy ../$deviations || bad 'the run has no copy of a data file'
+printf 1 >>$copy
+expect 3 "/moved/data/shape\.deviations\.npy: not the file 'deviations' of the training: its CRC-64 is not [0-9a-f]{16}\$" \
     sdmgen verify ../moved/data/model.sdm
 expect 3 'not the file' sdmgen generate ../moved/data/model.sdm --max-error 1 -o x.npy
-rm ../$deviations
-expect 1 "data file 'deviations' of the exact shape, here or beside the model: /.*/moved/conf/statistical/deviations\.npy: cannot open" \
+rm $copy
+expect 1 "data file 'deviations' of the exact shape: \.\./moved/data/shape\.deviations\.npy: No such file or directory\$" \
     sdmgen eval ../moved/data/model.sdm
 expect 0 - sdmgen generate ../moved/data/model.sdm -p m1=1 -o x.npy
 expect 0 - sdmgen bench network ../moved/data/model.sdm
 has '^  map and Jacobian +[0-9.]+ ms'
-has "^  exact engine +not measured: data file 'deviations' .*: cannot open"
+has "^  exact engine +not measured: data file 'deviations' .*: No such file"
 expect 0 - sdmgen bench network ../moved/data/model.sdm --json
 [ "$(json ms_exact)" = null ] || bad "bench: a time without the exact shape: $(json ms_exact)"
-has '"no_exact": "data file .deviations. .*cannot open'
-# The file is next to the model, but not in the working folder.
-cp ../kept.npy deviations.npy
-expect 1 'cannot open' sdmgen verify ../moved/data/model.sdm
-cp ../kept.npy ../moved/data/deviations.npy
+has '"no_exact": "data file .deviations. .*No such file'
+# The file is in the working folder, but not next to the model; a link there is not followed.
+cp ../kept.npy shape.deviations.npy
+expect 1 'No such file' sdmgen verify ../moved/data/model.sdm
+ln -s "$PWD/shape.deviations.npy" $copy
+expect 1 'shape\.deviations\.npy: a symbolic link, which is not followed: put the file itself there$' sdmgen verify ../moved/data/model.sdm
+rm $copy
+cp ../kept.npy $copy
 expect 0 - sdmgen verify ../moved/data/model.sdm --samples 2
+cp ../moved/data/shape.* .
 cp ../moved/data/model.sdm .
 expect 0 - sdmgen verify model.sdm --samples 2
+# A model that names a file elsewhere, with its checksum or without one, as those of earlier versions do: the file is not opened there.
+python=
+for p in python3 /usr/bin/python3; do $p -c 'import numpy' 2>/dev/null && python=$p && break; done
+if [ "$python" ]; then
+    mkdir secret
+    mv shape.mean.ply secret/mean.ply
+    for sum in with without; do
+        PYTHONPATH=$source_folder/tests/oracle PYTHONDONTWRITEBYTECODE=1 $python - "$PWD/secret/mean.ply" $sum <<'END' || bad 'no model forged'
+import sys
+import sdm_file
+data = open("model.sdm", "rb").read()
+parts = sdm_file.sections(data)
+lines = dict(parts)["meta"].decode().splitlines()
+at = lines.index("option.name=mean") + 1
+lines[at] = "option.value=" + sys.argv[1]
+if sys.argv[2] == "without":
+    del lines[at + 1:at + 3]
+    count = next(i for i, line in enumerate(lines) if line.startswith("options="))
+    lines[count] = f"options={int(lines[count][8:]) - 1}"
+meta = ("\n".join(lines) + "\n").encode()
+open("forged.sdm", "wb").write(sdm_file.build([(name, meta if name == "meta" else content) for name, content in parts]))
+END
+        expect 1 "'mean' of the exact shape: \./mean\.ply: No such file or directory; models name no files elsewhere: copy /.*/secret/mean\.ply there if you trust the model\$" \
+            sdmgen verify forged.sdm --samples 2
+        cp secret/mean.ply .
+        expect 0 - sdmgen verify forged.sdm --samples 2
+        rm mean.ply
+    done
+fi
 cd ..
 
 # A grid that misses the shape gives no network.

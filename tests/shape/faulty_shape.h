@@ -52,7 +52,7 @@ static inline void faulty_process(const char *fault)
     if (!strcmp(fault, "heap")) {
         char *volatile block = (char *)malloc(24);
         volatile char *byte = block;
-        for (int i = -8; i < 0; i++) byte[i] = -1; // where malloc() keeps the size
+        for (int i = -8; i < 0; i++) byte[i] = (char)-1; // where malloc() keeps the size
         free(block);
     }
 }

@@ -1,6 +1,6 @@
 /* The folder of a run: its lock, what killed runs leave, files that cannot be written for a while,
  * forged checkpoints.
- * Tests: checkpoint.c file.c progress.c refine.c train_folder.c train.c */
+ * Tests: checkpoint.c data_files.c file.c history.c progress.c refine.c train_folder.c train.c */
 #include <errno.h>
 #include <setjmp.h>
 #include <signal.h>
@@ -64,9 +64,10 @@ static void killed_run_gives_way(void **state)
 {
     (void)state;
     static const char *const gone[] = {"model.sdm.123.0.tmp", "checkpoint.sdmc.99.12.tmp",
-                                       "slices.png.1.1.tmp"};
-    static const char *const kept[] = {"model.sdm.123.tmp", "map.vdb.1.1.tmp", "model.sdm.1.x.tmp",
-                                       "model.sdm.1.1.tmp2", "model.sdm1.1.tmp"};
+                                       "slices.png.1.1.tmp", "shape.mean.ply.5.0.tmp"};
+    static const char *const kept[] = {
+        "model.sdm.123.tmp", "map.vdb.1.1.tmp",    "model.sdm.1.x.tmp", "model.sdm.1.1.tmp2",
+        "model.sdm1.1.tmp",  "shape.mean.ply.tmp", "shapes.1.1.tmp"};
     sdm_error e = {0};
     int lock, ready[2];
     assert_int_equal(pipe(ready), 0);
@@ -86,12 +87,13 @@ static void killed_run_gives_way(void **state)
     kill(child, SIGKILL);
     assert_int_equal(waitpid(child, NULL, 0), child);
     assert_true(exists("run.lock"));
-    for (size_t i = 0; i < 3; i++) touch(gone[i]);
-    for (size_t i = 0; i < 5; i++) touch(kept[i]);
+    for (size_t i = 0; i < sizeof gone / sizeof *gone; i++) touch(gone[i]);
+    for (size_t i = 0; i < sizeof kept / sizeof *kept; i++) touch(kept[i]);
     assert_int_equal(trainer_folder_take(folder, &lock, &e), SDM_OK);
     trainer_folder_leave(folder, lock);
-    for (size_t i = 0; i < 3; i++) assert_false(exists(gone[i]));
-    for (size_t i = 0; i < 5; i++) assert_int_equal(remove(in_folder(kept[i])), 0);
+    for (size_t i = 0; i < sizeof gone / sizeof *gone; i++) assert_false(exists(gone[i]));
+    for (size_t i = 0; i < sizeof kept / sizeof *kept; i++)
+        assert_int_equal(remove(in_folder(kept[i])), 0);
     close(ready[0]);
     close(ready[1]);
 }
@@ -239,6 +241,31 @@ static void forged_counters_are_refused(void **state)
     sdm_free(o.bytes);
 }
 
+/* Metrics that are no whole lines of text. */
+static void forged_metrics_are_refused(void **state)
+{
+    (void)state;
+    static const char line[] = "{\"phase\": \"fit\", \"step\": 3}\n";
+    static char many[100 * sizeof line];
+    sdm_config c;
+    sdm_error e = {0};
+    checkpoint o = {0};
+    read_config(&c, NULL);
+    make_checkpoint(&c, &o);
+    size_t n = 0;
+    for (int i = 0; i < 100; i++) n += (size_t)snprintf(many + n, sizeof many - n, "%s", line);
+    const struct {
+        const char *text;
+        size_t size;
+    } forged[] = {{many, n - 1}, {line, sizeof line}, {line, sizeof line - 2}};
+    for (size_t i = 0; i < sizeof forged / sizeof *forged; i++) {
+        write_with(&o, "metrics", forged[i].text, forged[i].size);
+        assert_int_equal(sdm_train(&c, capsule, folder, true, NULL, NULL, &e), SDM_E_FORMAT);
+        assert_non_null(strstr(e.text, "its metrics are damaged"));
+    }
+    sdm_free(o.bytes);
+}
+
 /* A result of the first training that claims other lengths, numbers or texts. */
 static void forged_turns_are_refused(void **state)
 {
@@ -280,6 +307,7 @@ int main(void)
         cmocka_unit_test(planted_lock_is_refused),
         cmocka_unit_test(files_that_cannot_be_written_do_not_end_a_training),
         cmocka_unit_test(forged_counters_are_refused),
+        cmocka_unit_test(forged_metrics_are_refused),
         cmocka_unit_test(forged_turns_are_refused)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -4,6 +4,7 @@
 #include "checkpoint.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -349,6 +350,18 @@ sdm_status trainer_checkpoint_turns(const trainer *t, training_turns *out, bool 
     return s;
 }
 
+/* Takes the metrics of the interrupted run, which are whole lines of text. */
+static sdm_status metrics_read(const trainer *t, const sdm_section *metrics, sdm_error *err)
+{
+    const char *text = metrics->data;
+    const size_t n = metrics->size;
+    if (n && (n > INT_MAX || text[n - 1] != '\n' || memchr(text, '\0', n)))
+        return sdm_fail(err, SDM_E_FORMAT, "%s/checkpoint.sdmc: its metrics are damaged",
+                        t->folder);
+    if (n) sdm_text_add(t->metrics, "%.*s", (int)n, text);
+    return t->metrics->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the metrics") : SDM_OK;
+}
+
 sdm_status trainer_checkpoint_read(trainer *t, bool *found, sdm_error *err)
 {
     checkpoint_file o = {0};
@@ -387,9 +400,7 @@ sdm_status trainer_checkpoint_read(trainer *t, bool *found, sdm_error *err)
         }
         if (!s) s = plan_read(t, &o, &t->data.plan, err);
         // restore the metrics
-        const sdm_section *metrics = section_find(&o, "metrics");
-        if (!s && metrics->size)
-            sdm_text_add(t->metrics, "%.*s", (int)metrics->size, (const char *)metrics->data);
+        if (!s) s = metrics_read(t, section_find(&o, "metrics"), err);
         history h = {0};
         if (!s) s = trainer_history_read(t, &h, err);
         t->evaluated_step = trainer_history_last_step(&h);

@@ -7,11 +7,11 @@
 #include <string.h>
 
 #include "data/workbench.h"
+#include "data_files.h"
 #include "history.h"
 #include "judge.h"
 #include "kind.h"
 #include "progress.h"
-#include "sdm/internal/checksum.h"
 #include "sdm/internal/container.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/model_threads.h"
@@ -144,30 +144,18 @@ static sdm_status check_texts(const trainer *t, sdm_error *err)
     return SDM_OK;
 }
 
-/* Computes checksums of the shape's data files. The model stores them, so that the exact engine
- * cannot be used with other files later. */
-static void checksum_files(trainer *t)
-{
-    const sdm_shape *shape = sdm_instance_shape(t->shape);
-    const sdm_option_value *values = sdm_instance_options(t->shape);
-    for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++)
-        if (shape->options[i].type == SDM_OPTION_FILE && values[i].text[0] &&
-            sdm_file_checksum(values[i].text, &t->file_sums[i], NULL))
-            // a file that cannot be read is no error here: a plug-in may accept a folder, for
-            // example
-            t->file_sums[i] = 0;
-}
-
 sdm_status trainer_export_prepare(trainer *t, sdm_error *err)
 {
-    checksum_files(t);
+    trainer_data_files_sum(t);
     return check_texts(t, err);
 }
 
 /* Every option of the shape as text, so that the model file can be used without the configuration.
-   A file option is followed by an entry NAME.crc64 with its checksum. */
+   The value of a file option is the name of the copy beside the model, followed by an entry
+   NAME.crc64 with its checksum. */
 typedef struct option_texts {
     const char *names[2 * SDM_MAX_OPTIONS], *values[2 * SDM_MAX_OPTIONS];
+    char files[SDM_MAX_OPTIONS][TRAINER_DATA_FILE_MAX];
     char texts[SDM_MAX_OPTIONS][32];              // texts of numbers and of checksums
     char sums[SDM_MAX_OPTIONS][SDM_NAME_MAX + 8]; // names of the checksum entries
     size_t n;
@@ -179,11 +167,16 @@ static void collect_options(const trainer *t, option_texts *o)
     const sdm_option_value *v = sdm_instance_options(t->shape);
     for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++) {
         const sdm_option *option = &shape->options[i];
-        const bool text = option->type == SDM_OPTION_CHOICE || option->type == SDM_OPTION_FILE;
         o->names[o->n] = option->name;
-        o->values[o->n] =
-            text ? (v[i].text ? v[i].text : "") : sdm_format_real(v[i].number, o->texts[i]);
-        o->n++;
+        const char **value = &o->values[o->n++];
+        if (option->type == SDM_OPTION_FILE) {
+            if (v[i].text[0]) trainer_data_file_name(t, i, o->files[i]);
+            *value = o->files[i];
+        } else if (option->type == SDM_OPTION_CHOICE) {
+            *value = v[i].text;
+        } else {
+            *value = sdm_format_real(v[i].number, o->texts[i]);
+        }
         if (!t->file_sums[i]) continue;
         snprintf(o->sums[i], sizeof o->sums[i], "%s.crc64", option->name);
         snprintf(o->texts[i], sizeof o->texts[i], "%016llx", (unsigned long long)t->file_sums[i]);

@@ -43,8 +43,9 @@ sdm_status trainer_history_read(const trainer *t, history *out, sdm_error *err)
     for (const char *p = t->metrics->data; p && *p; p++) lines += *p == '\n';
     const sdm_status s = SDM_ALLOC(&out->point, lines, "history of the run", err);
     if (s) return s;
-    for (const char *p = t->metrics->data; p && *p; p += strcspn(p, "\n") + 1) {
-        const size_t length = strcspn(p, "\n");
+    const char *end = NULL;
+    for (const char *p = t->metrics->data; p && (end = strchr(p, '\n')); p = end + 1) {
+        const size_t length = (size_t)(end - p);
         const history_point point = {.phase = phase_of(p),
                                      .step = number_after(p, length, "\"step\": "),
                                      .loss = number_after(p, length, "\"loss_mm2\": "),

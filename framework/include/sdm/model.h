@@ -54,8 +54,9 @@ typedef struct sdm_model_info {
     char version[16]; /* version of the program that trained the network */
     size_t n_params;
     const sdm_model_param *params; /* [n_params] */
-    /* Options of the shape as text; the exact distance needs them. An option NAME whose value is a
-       file is followed by NAME.crc64: the CRC-64 of the file's content at the time of training. */
+    /* Options of the shape as text; the exact distance needs them. The value of an option NAME that
+       is a file is the name of a copy in the folder of the model, followed by NAME.crc64: the
+       CRC-64 of the file's content at the time of training. */
     size_t n_options;
     const char *const *option_names, *const *option_values; /* [n_options] */
     sdm_grid grid;                                          /* grid of every map of the model */

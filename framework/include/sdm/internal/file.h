@@ -60,6 +60,10 @@ SDM_INTERNAL_API sdm_status sdm_outfile_commit(sdm_outfile **f, sdm_error *err);
 /* Removes the temporary file and frees *f; *f may be NULL. */
 SDM_INTERNAL_API void sdm_outfile_discard(sdm_outfile **f);
 
+/* Removes the temporary files of this process (up to 64), for its end after a fault: the output
+ * files must not be used any more. May be called in handlers of signals. */
+SDM_INTERNAL_API void sdm_outfile_remove_temps(void);
+
 /* Creates the folder `path` and its missing parents (mode 0777 with the umask). It is no error if
  * the folder exists. SDM_E_ARG, SDM_E_IO, SDM_E_NOMEM. */
 sdm_status sdm_make_folder(const char *path, sdm_error *err);

@@ -23,6 +23,10 @@ SDM_INTERNAL_API sdm_status sdm_alloc_unset(void **out, size_t count, size_t siz
 SDM_INTERNAL_API sdm_status sdm_grow(void **block, size_t old_count, size_t new_count, size_t size,
                                      const char *what, sdm_error *err);
 
+/* Size of the address space of this process, bytes, to which limits of memory are added; 0: not
+ * known. May be called in handlers of signals. [any thread] */
+uint64_t sdm_address_space(void);
+
 /* For tests: makes the n-th allocation from now fail (1: the next one; 0: none). The allocations of
  * all threads are counted. */
 void sdm_alloc_fail_after(unsigned long n);

@@ -39,6 +39,10 @@ size_t sdm_json_member(const sdm_json_document *d, size_t i, const char *key);
 /* True when the value is a string with this text. */
 bool sdm_json_is(const sdm_json_document *d, size_t i, const char *text);
 
+/* buf[size] = the string at index i with its escapes replaced; characters beyond ASCII that are
+ * escaped become '?'. false: it is no string, or too long. */
+bool sdm_json_word(const sdm_json_document *d, size_t i, char *buf, size_t size);
+
 /* The value as a finite number; false when it is none. */
 bool sdm_json_number(const sdm_json_document *d, size_t i, double *out);
 

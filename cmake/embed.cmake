@@ -8,6 +8,7 @@ function(sdm_embed output folder)
       set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/${file})
     endif()
     file(READ ${folder}/${file} bytes HEX)
+    string(REGEX REPLACE "^(1f8b08..)........" "\\100000000" bytes "${bytes}") # the time in the header of gzip
     file(SIZE ${folder}/${file} size)
     string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
     string(APPEND table "{\"${file}\", (const char *)(const unsigned char[]){${bytes}0}, ${size}},\n")

@@ -5,7 +5,9 @@
 #include <stdlib.h>
 
 #include "sdm/builtin_shapes.h"
+#include "sdm/internal/mesh_measures.h"
 #include "sdm/isosurface.h"
+#include "sdm/map.h"
 #include "sdm/memory.h"
 #include "sdm/runtime.h"
 
@@ -26,6 +28,7 @@ static float *vertices; // [n_vert][6] position in mm, normal
 static sdm_mesh mesh;
 static bool cut;
 static double measures[8]; // volume, area, smallest and largest coordinates
+static double own_measures[SDM_MEASURES_MAX], mesh_measures[SDM_MESH_MEASURES];
 
 const char *page_message(void) { return failure.text; }
 
@@ -136,19 +139,18 @@ static void normal_at(const double x[3], float normal[3])
     for (int a = 0; a < 3; a++) normal[a] = (float)(length > 0 ? sum[a] / length : 0);
 }
 
-/* Volume by the divergence theorem and area of the mesh. */
-static void measure(void)
+/* Measures the map and its surface. */
+static sdm_status measure(void)
 {
-    double volume = 0, area = 0;
+    double area = 0;
     for (int a = 0; a < 3; a++) measures[2 + a] = INFINITY, measures[5 + a] = -INFINITY;
     for (size_t t = 0; t < mesh.n_tri; t++) {
         const double *p = mesh.vert + 3 * mesh.tri[3 * t], *q = mesh.vert + 3 * mesh.tri[3 * t + 1],
-                     *r = mesh.vert + 3 * mesh.tri[3 * t + 2], *o = mesh.vert;
-        double u[3], v[3], w[3];
-        for (int a = 0; a < 3; a++) u[a] = q[a] - p[a], v[a] = r[a] - p[a], w[a] = p[a] - o[a];
+                     *r = mesh.vert + 3 * mesh.tri[3 * t + 2];
+        double u[3], v[3];
+        for (int a = 0; a < 3; a++) u[a] = q[a] - p[a], v[a] = r[a] - p[a];
         const double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
                              u[0] * v[1] - u[1] * v[0]};
-        volume += (n[0] * w[0] + n[1] * w[1] + n[2] * w[2]) / 6;
         area += sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) / 2;
     }
     for (size_t i = 0; i < mesh.n_vert; i++)
@@ -157,8 +159,8 @@ static void measure(void)
             measures[2 + a] = fmin(measures[2 + a], x);
             measures[5 + a] = fmax(measures[5 + a], x);
         }
-    measures[0] = volume;
     measures[1] = area;
+    return sdm_map_volume(&info->grid, values, 1, &measures[0], &failure);
 }
 
 int page_surface(void)
@@ -173,8 +175,7 @@ int page_surface(void)
         for (size_t a = 0; a < 3; a++) vertices[6 * i + a] = (float)mesh.vert[3 * i + a];
         normal_at(mesh.vert + 3 * i, vertices + 6 * i + 3);
     }
-    measure();
-    return 0;
+    return measure() ? 1 : 0;
 }
 
 const float *page_vertices(void) { return vertices; }
@@ -184,3 +185,29 @@ size_t page_n_triangles(void) { return mesh.n_tri; }
 
 const double *page_measures(void) { return measures; }
 int page_is_cut(void) { return cut; }
+
+size_t page_n_own_measures(void) { return shape ? sdm_instance_shape(shape)->n_measures : 0; }
+
+const double *page_own_measures(double depth)
+{
+    const sdm_measure *table = sdm_instance_shape(shape)->measures;
+    const size_t n = page_n_own_measures();
+    size_t n_depths = 0;
+    for (size_t i = 0; i < n; i++)
+        if (table[i].of_depth) n_depths = 1;
+    sdm_measures got;
+    sdm_error refused = {0};
+    const sdm_status s = sdm_shape_measure_own(shape, params, &depth, n_depths, &got, &refused);
+    for (size_t i = 0; i < n; i++) own_measures[i] = s ? NAN : got.at[i].value;
+    return own_measures;
+}
+
+const double *page_mesh_measures(void)
+{
+    sdm_measures got;
+    sdm_error refused = {0};
+    const sdm_status s = sdm_shape_measure(shape, params, NULL, 0, &got, &refused);
+    for (size_t i = 0; i < SDM_MESH_MEASURES; i++)
+        mesh_measures[i] = s ? NAN : got.at[got.n - SDM_MESH_MEASURES + i].value;
+    return mesh_measures;
+}

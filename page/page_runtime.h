@@ -51,7 +51,17 @@ PAGE_EXPORT(page_n_vertices) size_t page_n_vertices(void);
 PAGE_EXPORT(page_triangles) const uint32_t *page_triangles(void);
 PAGE_EXPORT(page_n_triangles) size_t page_n_triangles(void);
 
-/* measures[8]: volume (mm^3) and area (mm^2) of the surface, least and largest x, y, z (mm). */
+/* measures[8]: volume of the map (mm^3; sdm_map_volume()), area of its surface (mm^2), least and
+ * largest x, y, z (mm). */
 PAGE_EXPORT(page_measures) const double *page_measures(void);
+/* The shape's own measures at the parameters, in the order of its table; those of a depth at
+ * `depth` (mm). NaN: there is none here. page_n_own_measures() is 0 unless page_knows_shape(). */
+PAGE_EXPORT(page_own_measures) const double *page_own_measures(double depth);
+PAGE_EXPORT(page_n_own_measures) size_t page_n_own_measures(void);
+/* Volume, area and extents of the shape's mesh at the parameters, as sdm_shape_measure() has them:
+ * mm^3, mm^2, mm; it takes as long as several maps. NaN: there is none. Only if page_knows_shape().
+ */
+PAGE_EXPORT(page_mesh_measures) const double *page_mesh_measures(void);
+
 /* The surface leaves the grid: its volume is not that of the shape. */
 PAGE_EXPORT(page_is_cut) int page_is_cut(void);

@@ -5,11 +5,12 @@
 #include "args/options.h"
 #include "page_fit.h"
 #include "sdm/internal/text.h"
+#include "sdm/registry.h"
 
 /* A shape as it stands without the runtime: its surface and three slices. Zero-initialise;
  * cli_still_dispose() frees, also after an error. */
 typedef struct cli_still {
-    double volume, area;   /* of the surface, mm^3 and mm^2 */
+    double volume, area;   /* of the map (sdm_map_volume()), mm^3; of its surface, mm^2 */
     double min[3], max[3]; /* corners of its box, mm */
     bool cut;              /* the surface leaves the grid: the volume is not that of the shape */
     size_t n_vert, n_tri;  /* 0: no surface in the grid */
@@ -26,16 +27,32 @@ sdm_status cli_still_make(const sdm_grid *grid, const float *values, cli_still *
                           sdm_error *err);
 void cli_still_dispose(cli_still *s);
 
+enum { CLI_PAGE_BINS = 40, CLI_PAGE_BINS_PER_DECADE = 8 };
+
+/* How large the errors of a network are on shapes that its training did not use. */
+typedef struct cli_page_errors {
+    size_t shapes;     /* 0: not measured */
+    double near_mm;    /* sdm_grid_near() */
+    double first_edge; /* between the first bin and the second, mm; the last bin has no upper end */
+    /* voxels of the maps with an error in the bin: all; those within near_mm of the surface */
+    uint64_t voxels[CLI_PAGE_BINS], near[CLI_PAGE_BINS];
+} cli_page_errors;
+
+/* Compares maps of the first shapes of `sdmgen eval` with exact ones. Errors of the shape;
+ * SDM_E_NOMEM. */
+sdm_status cli_page_errors_make(const sdm_model *m, const sdm_instance *shape, cli_page_errors *out,
+                                sdm_error *err);
+
 /* The content of a page. */
 typedef struct cli_page {
     const sdm_model_info *info;
-    /* the parameters of the shape, with their help; NULL: the shape is not known */
-    const sdm_param *of_shape; /* [info->n_params] */
-    const char *summary;       /* of the shape; NULL: not known */
-    const char *metrics;       /* text of metrics.jsonl; NULL: no training to show */
-    const cli_page_fit *fit;   /* NULL: a page of a model */
-    const cli_still *still;    /* at the default or at the fitted parameters */
-    const uint8_t *model;      /* [info->file_bytes] the model's file; NULL: pictures alone */
+    const sdm_instance *shape;    /* NULL: the shape of the model is not known */
+    const char *metrics;          /* text of metrics.jsonl; NULL: no training to show */
+    const cli_page_fit *fit;      /* NULL: a page of a model */
+    const cli_still *still;       /* at the default or at the fitted parameters */
+    const sdm_measures *measures; /* at the same parameters, the shape's own first; n 0: none */
+    const cli_page_errors *errors;
+    const uint8_t *model; /* [info->file_bytes] the model's file; NULL: pictures alone */
 } cli_page;
 
 /* Adds the figures of the page as an object. */

@@ -24,6 +24,8 @@ typedef struct source {
     bool of_fit;
     cli_page_fit fit;
     cli_still still;
+    sdm_measures measures;
+    cli_page_errors errors;
 } source;
 
 static void source_dispose(source *s)
@@ -97,7 +99,15 @@ static sdm_status open_shape(const cli_args *args, source *s, sdm_error *err)
     return status;
 }
 
-/* Makes the pictures at the default parameters. */
+/* Measures the shape at p; without a result where the shape refuses. */
+static void measure(source *s, const double *p)
+{
+    sdm_error refused = {0};
+    if (s->shape && sdm_shape_measure(s->shape, p, NULL, 0, &s->measures, &refused))
+        s->measures.n = 0;
+}
+
+/* Makes the pictures at the default parameters, and the errors of the network. */
 static sdm_status make_still(source *s, sdm_error *err)
 {
     const sdm_model_info *m = sdm_model_get_info(s->model);
@@ -108,6 +118,8 @@ static sdm_status make_still(source *s, sdm_error *err)
     for (size_t i = 0; i < m->n_params && !status; i++) params[i] = m->params[i].def;
     if (!status) status = sdm_generate(s->model, params, NULL, values, NULL, err);
     if (!status) status = cli_still_make(&m->grid, values, &s->still, err);
+    if (!status) measure(s, params);
+    if (!status && s->shape) status = cli_page_errors_make(s->model, s->shape, &s->errors, err);
     sdm_free(values);
     sdm_free(params);
     return status;
@@ -118,18 +130,19 @@ static sdm_status make_fit(source *s, sdm_error *err)
 {
     const sdm_status status = cli_page_fit_sample(s->model, s->shape, &s->fit, err);
     if (status) return status;
+    measure(s, s->fit.params);
     return cli_still_make(&sdm_model_get_info(s->model)->grid, s->fit.map, &s->still, err);
 }
 
 static sdm_status write_page(const source *s, bool live, const char *path, sdm_error *err)
 {
-    size_t n;
     const cli_page page = {.info = sdm_model_get_info(s->model),
-                           .of_shape = s->shape ? sdm_instance_params(s->shape, &n) : NULL,
-                           .summary = s->shape ? sdm_instance_shape(s->shape)->summary : NULL,
+                           .shape = s->shape,
                            .metrics = (const char *)s->metrics,
                            .fit = s->of_fit ? &s->fit : NULL,
                            .still = &s->still,
+                           .measures = &s->measures,
+                           .errors = &s->errors,
                            .model = live ? s->bytes : NULL};
     return cli_page_write(&page, path, err);
 }

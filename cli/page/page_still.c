@@ -4,6 +4,7 @@
 
 #include "page.h"
 #include "sdm/isosurface.h"
+#include "sdm/map.h"
 #include "sdm/memory.h"
 
 static void put16(uint8_t **at, uint16_t v)
@@ -45,7 +46,6 @@ static sdm_status measure(const sdm_mesh *m, cli_still *s, sdm_error *err)
     if (!m->n_tri) return SDM_OK;
     const sdm_status status = sdm_mesh_audit(m, &audit, err);
     if (status) return status;
-    s->volume = audit.volume;
     s->area = audit.area;
     memcpy(s->min, audit.min, sizeof s->min);
     memcpy(s->max, audit.max, sizeof s->max);
@@ -90,6 +90,7 @@ sdm_status cli_still_make(const sdm_grid *grid, const float *values, cli_still *
 {
     sdm_mesh mesh = {0};
     sdm_status s = sdm_isosurface(grid, values, 0, &mesh, &out->cut, err);
+    if (!s) s = sdm_map_volume(grid, values, 0, &out->volume, err);
     if (!s) s = measure(&mesh, out, err);
     if (!s) {
         choose_slices(grid, out);

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "page.h"
+#include "report/files.h"
 #include "sdm/internal/file.h"
 
 typedef struct page_file {
@@ -11,6 +12,7 @@ typedef struct page_file {
 
 static const page_file files[] = {
 #include <page_files.inc> // made by page/CMakeLists.txt
+#include <page_scripts.inc>
 };
 enum { N_FILES = sizeof files / sizeof *files };
 
@@ -84,6 +86,8 @@ static sdm_status put_figures(sdm_outfile *out, const cli_page *page, sdm_error 
 static sdm_status put_part(sdm_outfile *out, const cli_page *page, const char *name, sdm_error *err)
 {
     const page_file *file = find_file(name);
+    if (file && cli_ends_with(name, ".gz"))
+        return put_base64(out, (const uint8_t *)file->content, file->size, err);
     if (file) return sdm_outfile_write(out, file->content, file->size, err);
     if (!strcmp(name, "title")) return put_escaped(out, page->info->shape, false, err);
     if (!strcmp(name, "figures")) return put_figures(out, page, err);

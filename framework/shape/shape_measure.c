@@ -95,8 +95,8 @@ static sdm_status check_depths(const sdm_instance *s, const double *depths, size
     return SDM_OK;
 }
 
-sdm_status sdm_shape_measure(const sdm_instance *s, const double *p, const double *depths,
-                             size_t n_depths, sdm_measures *out, sdm_error *err)
+sdm_status sdm_shape_measure_own(const sdm_instance *s, const double *p, const double *depths,
+                                 size_t n_depths, sdm_measures *out, sdm_error *err)
 {
     if (!out) return sdm_fail(err, SDM_E_ARG, "a place for the measures is needed");
     out->n = 0;
@@ -105,7 +105,16 @@ sdm_status sdm_shape_measure(const sdm_instance *s, const double *p, const doubl
     sdm_status status = p ? sdm_instance_check(s, p, err) : SDM_OK;
     if (!status) status = check_depths(s, depths, n_depths, err);
     if (!status) status = add_own(s, p, depths, n_depths, out, err);
-    if (!status) status = add_those_of_mesh(s, p, out, err);
+    if (status) out->n = 0;
+    return status;
+}
+
+sdm_status sdm_shape_measure(const sdm_instance *s, const double *p, const double *depths,
+                             size_t n_depths, sdm_measures *out, sdm_error *err)
+{
+    sdm_status status = sdm_shape_measure_own(s, p, depths, n_depths, out, err);
+    if (status) return status;
+    status = add_those_of_mesh(s, p, out, err);
     if (status) out->n = 0;
     return status;
 }

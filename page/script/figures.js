@@ -1,5 +1,5 @@
 // The figures of the page, numbers as text, and small helpers for elements.
-const $ = id => document.getElementById(id);
+'use strict';
 const figures = JSON.parse($('figures').textContent);
 
 // A number with three significant digits, or as many as `digits`; thousands are set apart.
@@ -28,9 +28,9 @@ function fillTable(table, rows) {
   for (const [name, value] of rows) table.append(element('tr', {}, element('th', { scope: 'row' }, name), element('td', {}, value)));
 }
 
-// The bytes of an element with a base64 text.
-function bytesOf(id) {
-  return Uint8Array.from(atob($(id).textContent.trim()), c => c.charCodeAt(0));
+// Sets the text of an element; one that has it already is not laid out and painted again.
+function setText(of, text) {
+  if (of.textContent !== text) of.textContent = text;
 }
 
 const calm = matchMedia('(prefers-reduced-motion: reduce)');

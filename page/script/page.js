@@ -22,8 +22,8 @@ const state = {
   values: [...home],
   position: [...box.slices],
   ranges: parameters.map(p => [p.min, p.max]),
-  map: null, compared: null, watched: null, framed: false,
-  busy: true, wanted: false, drawn: 0, waiting: []
+  depth: 10, map: null, compared: null, ofMesh: null, watched: null, framed: false,
+  knowsShape: false, busy: true, wanted: false, drawn: 0, waiting: []
 };
 
 function notice(text) {
@@ -106,23 +106,21 @@ function readStill() {
 
 const readings = {};
 for (const [key, title] of [['volume', 'Volume'], ['area', 'Surface area'], ['size', 'Extent'], ['time', 'Map computed in'], ['error', 'Error of the network']]) {
-  readings[key] = element('dd');
-  $('readings').append(element('div', {}, element('dt', {}, title), readings[key]));
+  readings[key] = createReading(title);
+  $('readings').append(readings[key].tile);
 }
 
-function setReading(key, value, unit, note = '') {
-  readings[key].replaceChildren(value, element('small', {}, unit ? ' ' + unit : ''), element('span', {}, note));
-}
+const setReading = (key, ...texts) => readings[key].set(...texts);
 
 function showReadings({ volume, area, box: corners, cut, mapTime, exact }) {
-  const text = n => numberText(n, 4);
-  setReading('volume', corners[0] <= corners[3] ? text(volume) : 'none', 'mm³', cut ? 'cut off by the grid' : '');
-  setReading('area', text(area), 'mm²');
-  setReading('size', corners[0] <= corners[3] ? [0, 1, 2].map(a => numberText(corners[3 + a] - corners[a])).join(' × ') : 'none', 'mm');
+  const text = n => numberText(n, 4), here = found => (found && found.parameters.every((v, i) => v === state.values[i]) ? found : null);
+  const mesh = here(state.ofMesh)?.values, ofMesh = texts => (mesh ? `of the mesh ${texts.join(' × ')}` : '');
+  setReading('volume', corners[0] <= corners[3] ? text(volume) : 'none', 'mm³', cut ? 'cut off by the grid' : ofMesh([mesh && text(mesh[0])]));
+  setReading('area', text(area), 'mm²', ofMesh([mesh && text(mesh[1])]));
+  setReading('size', corners[0] <= corners[3] ? [0, 1, 2].map(a => numberText(corners[3 + a] - corners[a])).join(' × ') : 'none', 'mm', ofMesh(mesh ? [...mesh.slice(2)].map(v => numberText(v)) : []));
   if (mapTime === undefined) setReading('time', '–', '', 'this page has no model');
   else setReading('time', numberText(mapTime, 2), 'ms', exact ? 'by the exact engine' : 'by the network');
-  const compared = state.compared && state.compared.parameters.every((v, i) => v === state.values[i]) ? state.compared : null;
-  const grey = figures.accuracy;
+  const compared = here(state.compared), grey = figures.accuracy;
   if (exact) setReading('error', 'none', '', 'the map is exact');
   else if (compared) setReading('error', numberText(compared.rmse, 2), 'mm', `here, root mean square; exact engine: ${numberText(compared.time, 2)} ms`);
   else setReading('error', numberText(grey.rmse_mm, 2), 'mm', `root mean square, ${numberText(grey.shapes)} held-out shapes`);
@@ -166,7 +164,7 @@ function showSliders() {
     row.style.setProperty('--value', share(state.values[i]));
     row.style.setProperty('--default', (p.default - low) / (high - low));
     row.classList.toggle('beyond', state.values[i] < p.min || state.values[i] > p.max);
-    note.textContent = (fit ? fittedText(p) + '; ' : '') + `trained ${numberText(p.min)} … ${withUnit(p.max, p.unit)}, default ${numberText(p.default)}`;
+    setText(note, (fit ? fittedText(p) + '; ' : '') + `trained ${numberText(p.min)} … ${withUnit(p.max, p.unit)}, default ${numberText(p.default)}`);
   });
 }
 
@@ -218,7 +216,7 @@ function request() {
 function send() {
   state.busy = true;
   state.wanted = false;
-  worker.postMessage({ map: [...state.values] });
+  worker.postMessage({ map: [...state.values], depth: state.depth });
 }
 
 function showMap(map) {
@@ -227,27 +225,29 @@ function showMap(map) {
   if (surfaceView) surfaceView.show(map.vertices, map.triangles);
   drawSlices();
   showReadings(map);
+  showMeasures(map.own, state.depth);
   const extra = map.exact ? 'exact engine: beyond the trained range' : 'network';
-  if (surfaceView) $('source').textContent = `${extra} · map ${numberText(map.mapTime, 2)} ms · surface ${numberText(map.surfaceTime, 2)} ms`;
+  if (surfaceView) setText($('source'), `${extra} · map ${numberText(map.mapTime, 2)} ms · surface ${numberText(map.surfaceTime, 2)} ms`);
   state.drawn++;
   state.busy = false;
   if (state.wanted || state.drawn < WARM) send();
   else {
-    startSweeps();
+    startRest();
     for (const done of state.waiting.splice(0)) done();
   }
 }
 
-// Sweeps are computed when the sliders have come to rest, one parameter after the other, so that a slider that moves again does not wait.
+// When the sliders have come to rest, the mesh is measured, and sweeps are computed one parameter after the other, so that a slider that
+// moves again does not wait.
 const SWEEP_REST = 400, SWEEP_PARAMETERS_MAX = 12;
-let sweepTimer = 0, sweeps = [];
+let restTimer = 0, sweeps = [];
 
-function startSweeps() {
-  clearTimeout(sweepTimer);
-  if (parameters.length > SWEEP_PARAMETERS_MAX) return;
-  sweepTimer = setTimeout(() => {
+function startRest() {
+  clearTimeout(restTimer);
+  restTimer = setTimeout(() => {
     sweeps = [];
-    sendSweep();
+    if (state.knowsShape) worker.postMessage({ measure: [...state.values] });
+    if (parameters.length <= SWEEP_PARAMETERS_MAX) sendSweep();
   }, SWEEP_REST);
 }
 
@@ -267,6 +267,7 @@ function takeSweep({ parameters: at, index, measures }) {
 
 function onReady({ ranges, knowsShape }) {
   state.ranges = parameters.map((_, i) => [ranges[2 * i], ranges[2 * i + 1]]);
+  state.knowsShape = knowsShape;
   $('compare').hidden = !knowsShape;
   $('legend').hidden = !parameters.some((p, i) => state.ranges[i][0] < p.min || state.ranges[i][1] > p.max);
   document.body.classList.add('ready');
@@ -280,8 +281,9 @@ function startWorker() {
     if (data.ready) onReady(data.ready);
     if (data.map) showMap(data.map);
     if (data.sweep) takeSweep(data.sweep);
-    if (data.compare) {
-      state.compared = data.compare;
+    if (data.compare || data.measure) {
+      if (data.compare) state.compared = data.compare;
+      else state.ofMesh = data.measure;
       showReadings(state.map);
     }
     if (data.error) {
@@ -316,6 +318,7 @@ function showTexts() {
   ]);
   if (fit) showFit();
   if (figures.history) showHistory(figures.history);
+  if (figures.errors) showErrors(figures.errors);
 }
 
 // For scripts: set() takes values by name; drawn() is a promise of the picture of the latest values; map() is the last map, a Float32Array
@@ -332,6 +335,10 @@ window.sdmgen = {
 };
 
 showTexts();
+startMeasures(state.depth, depth => {
+  state.depth = depth;
+  request();
+});
 if (figures.live) {
   showSliders();
   startWorker();

@@ -72,3 +72,24 @@ function showHistory(history) {
   $('training').hidden = false;
   plot($('history'), { curves, xTitle: across === 'step' ? 'optimiser steps' : 'seconds', yTitle: 'Root mean square error, mm' });
 }
+
+// The histogram of the errors on held-out shapes: the share of the voxels in each bin of a logarithmic axis.
+function showErrors({ shapes, near_mm: nearMm, first_edge_mm: firstEdge, bins_per_decade: perDecade, voxels, near }) {
+  const width = 460, height = 170, left = 8, right = 8, top = 18, bottom = 40;
+  const edges = Array.from({ length: voxels.length + 1 }, (_, i) => firstEdge * 10 ** ((i - 1) / perDecade));
+  const first = voxels.findIndex(n => n > 0), last = voxels.findLastIndex(n => n > 0) + 1;
+  const shares = counts => counts.map(n => n / Math.max(counts.reduce((sum, v) => sum + v, 0), 1)).slice(first, last);
+  const curves = [['loss', 'all voxels', shares(voxels)], ['heldout', `within ${withUnit(nearMm, 'mm')} of the surface`, shares(near)]];
+  const most = Math.max(...curves.flatMap(curve => curve[2]));
+  const x = v => left + Math.log(v / edges[first]) / Math.log(edges[last] / edges[first]) * (width - left - right);
+  const y = v => height - bottom - v / most * (height - top - bottom);
+  const picture = svg('svg', { viewBox: `0 0 ${width} ${height}`, width, height, role: 'img', 'aria-label': 'Histogram of the errors on held-out shapes' });
+  for (const [style, , values] of curves) {
+    const corners = values.flatMap((v, i) => [[edges[first + i], v], [edges[first + i + 1], v]]);
+    picture.append(svg('polygon', { class: style, points: [[edges[first], 0], ...corners, [edges[last], 0]].map(([a, b]) => `${x(a).toFixed(1)},${y(b).toFixed(1)}`).join(' ') }));
+  }
+  for (const tick of logTicks(edges[first], edges[last])) picture.append(svg('text', { x: x(tick), y: height - bottom + 18, 'text-anchor': 'middle' }, numberText(tick)));
+  picture.append(svg('line', { class: 'axis', x1: left, x2: width - right, y1: y(0), y2: y(0) }),
+    svg('text', { x: width - right, y: height - 6, 'text-anchor': 'end' }, `error, mm, of ${shapes} shapes`), svg('text', { x: left, y: 12 }, `${numberText(100 * most, 2)} % of the voxels`));
+  $('histogram').append(picture, element('p', { class: 'legend' }, ...curves.map(([style, title]) => element('span', { class: 'key ' + style }, title))));
+}

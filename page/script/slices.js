@@ -109,6 +109,9 @@ function createPainter(columns, rows, width, height, flipped, reach, pixel) {
 }
 
 const PIXELS_OF_VOXEL = 8; // at most; larger pictures are stretched
+const UNSEEN_REST = 250; // ms
+// The processor makes the pixels and draws the contours: on canvases of the graphics card the same takes longer, most of all without a card.
+const SOFTWARE = { willReadFrequently: true };
 
 // The view of the slice across `axis`. moved(axis, index) is called when another slice is asked for, pointed(position) for a point: indices of
 // the other two axes, null for this one; watched(axis) when the reader turns to this slice, watched(null) when not any more.
@@ -122,8 +125,8 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
   const figure = element('figure', {}, canvas, element('figcaption', {}, label, range));
   figure.style.setProperty('--shape', `${grid.size[right] * grid.spacing[right]} / ${grid.size[up] * grid.spacing[up]}`);
   figure.style.flexGrow = grid.size[right] * grid.spacing[right] / (grid.size[up] * grid.spacing[up]);
-  const buffer = document.createElement('canvas'), context = canvas.getContext('2d'), columns = grid.size[right], rows = grid.size[up];
-  let last = null, painter = null, prepared = 0, x = [], y = [];
+  const context = canvas.getContext('2d', SOFTWARE), buffer = document.createElement('canvas'), columns = grid.size[right], rows = grid.size[up];
+  let last = null, painter = null, prepared = 0, x = [], y = [], seen = false, later = 0;
 
   const toRow = row => (flipped ? rows - 1 - row : row);
 
@@ -155,7 +158,15 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
     context.stroke();
   }
 
+  // Draws at once while the reader sees the slice, otherwise when the sliders rest.
+  function drawSoon() {
+    clearTimeout(later);
+    if (seen) draw();
+    else later = setTimeout(draw, UNSEEN_REST);
+  }
+
   function draw() {
+    clearTimeout(later);
     if (!last) return;
     const { slice, position, reach, fitted } = last, ratio = sized();
     if (!painter || prepared !== canvas.width) prepare(reach);
@@ -163,7 +174,7 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
     if (buffer.width === canvas.width) {
       context.putImageData(picture, 0, 0);
     } else {
-      buffer.getContext('2d').putImageData(picture, 0, 0);
+      buffer.getContext('2d', SOFTWARE).putImageData(picture, 0, 0);
       context.drawImage(buffer, 0, 0, canvas.width, canvas.height);
     }
     if (fitted) contour(fitted, cssColour(colour('--fitted')), 1.5 * ratio);
@@ -182,6 +193,10 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
     painter = null;
     draw();
   });
+  new IntersectionObserver(entries => {
+    seen = entries.at(-1).isIntersecting;
+    if (seen) draw();
+  }, { rootMargin: '100px' }).observe(canvas);
 
   // Shows a slice; position[3]: indices of the three slices; reach: distance (mm) of the last colour; fitted: the same slice of the fit, null: none.
   function show(slice, position, reach, fitted = null) {
@@ -190,7 +205,7 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
     label.value = grid.straight ? `${AXES[axis]} = ${numberText(Math.round(mm * 100) / 100, 4)} mm` : `slice ${position[axis] + 1} of ${grid.size[axis]}`;
     canvas.setAttribute('aria-label', `Slice across ${AXES[axis]} of the map, ${label.value}`);
     range.value = position[axis];
-    draw();
+    drawSoon();
   }
 
   function point(event) {

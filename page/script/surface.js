@@ -76,7 +76,7 @@ function withNormals(positions, triangles) {
 
 // Without a graphics card the browser draws by software: there pictures have fewer pixels while they change, and when they have come to rest
 // so many that edges are smooth, since the smoothing of WebGL itself takes most of the time.
-const MOVING_SHARE = 0.7, RESTING_SHARE = 2, REST = 250;
+const MOVING_SHARE = 0.5, RESTING_SHARE = 2, REST = 250;
 
 function hasGraphicsCard() {
   const gl = document.createElement('canvas').getContext('webgl2', { failIfMajorPerformanceCaveat: true });
@@ -90,11 +90,11 @@ function hasGraphicsCard() {
 
 // The view of the surface on a canvas; null without WebGL2. centre (mm) stands in the middle, a ball of `radius` is seen.
 function createSurfaceView(canvas, centre, radius) {
-  const fast = hasGraphicsCard(), gl = canvas.getContext('webgl2', { antialias: fast, premultipliedAlpha: true, preserveDrawingBuffer: true });
+  const fast = hasGraphicsCard(), gl = canvas.getContext('webgl2', { antialias: fast, alpha: false, preserveDrawingBuffer: true });
   if (!gl) return null;
   const home = { yaw: 0.55, pitch: 0.62, zoom: 1 };
   const at = { ...home };
-  const paints = colours('surface', 'surface-back', 'surface-rim', 'accent');
+  const paints = colours('card', 'surface', 'surface-back', 'surface-rim', 'accent');
   let n = 0, program, place, lines = 0, buffers, frame = 0;
   let share = 1, resting = 0;
 
@@ -122,11 +122,9 @@ function createSurfaceView(canvas, centre, radius) {
     sized(share);
     const { camera, turn } = cameraMatrices(at.yaw, at.pitch, at.zoom, centre, radius, canvas.width / canvas.height), paint = paints();
     gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.clearColor(0, 0, 0, 0);
+    gl.clearColor(...paint.card, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.useProgram(program);
     gl.uniformMatrix4fv(place.camera, false, camera);
     gl.uniformMatrix3fv(place.turn, false, turn);

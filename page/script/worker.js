@@ -1,7 +1,8 @@
 // The worker of a page: runs the runtime (page_runtime.c as WebAssembly) in a thread of its own.
-// Messages to it: {open: {runtime, model}} once, base64 texts; {map: parameters}; {compare: parameters};
+// Messages to it: {open: {runtime, model}} once, base64 texts; {map: parameters, depth}: depth (mm) of the measures of a depth; {compare: parameters};
+// {measure: parameters}: measures of the mesh;
 // {sweep: {parameters, index, values}}: volume and area while one parameter takes these values.
-// Its answers: {ready}, {map}, {compare}, {sweep}, each with its results; {error: text}.
+// Its answers: {ready}, {map}, {compare}, {measure}, {sweep}, each with its results; {error: text}.
 'use strict';
 let runtime;
 
@@ -53,16 +54,16 @@ function setParameters(parameters) {
   new Float64Array(runtime.memory.buffer, runtime.page_params(), parameters.length).set(parameters);
 }
 
-function map(parameters) {
+function map(parameters, depth) {
   setParameters(parameters);
   const start = performance.now();
   check(runtime.page_map());
   const between = performance.now();
   check(runtime.page_surface());
   const end = performance.now();
-  const [volume, area, ...box] = doubles(runtime.page_measures(), 8);
+  const [volume, area, ...box] = doubles(runtime.page_measures(), 8), nOwn = runtime.page_n_own_measures();
   const result = {
-    parameters, volume, area, box, cut: !!runtime.page_is_cut(), exact: !!runtime.page_was_exact(),
+    parameters, volume, area, box, own: nOwn ? doubles(runtime.page_own_measures(depth), nOwn) : null, cut: !!runtime.page_is_cut(), exact: !!runtime.page_was_exact(),
     mapTime: between - start, surfaceTime: end - between,
     values: floats(runtime.page_values(), runtime.page_n_values()),
     vertices: floats(runtime.page_vertices(), 6 * runtime.page_n_vertices()),
@@ -89,6 +90,11 @@ function compare(parameters) {
   postMessage({ compare: { parameters, time, rmse: Math.sqrt(sum / exact.length), largest } });
 }
 
+function measure(parameters) {
+  setParameters(parameters);
+  postMessage({ measure: { parameters, values: doubles(runtime.page_mesh_measures(), 5) } });
+}
+
 function sweep({ parameters, index, values }) {
   const measures = values.map(value => {
     setParameters(parameters.map((v, i) => (i === index ? value : v)));
@@ -102,8 +108,9 @@ function sweep({ parameters, index, values }) {
 onmessage = async ({ data }) => {
   try {
     if (data.open) await open(data.open);
-    if (data.map) map(data.map);
+    if (data.map) map(data.map, data.depth);
     if (data.compare) compare(data.compare);
+    if (data.measure) measure(data.measure);
     if (data.sweep) sweep(data.sweep);
   } catch (error) {
     postMessage({ error: error.message });

@@ -8,7 +8,7 @@ import { pathToFileURL } from 'node:url';
 const OPTIONS = ['--headless=new', '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--remote-debugging-pipe',
   '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-extensions', '--disable-dev-shm-usage', '--hide-scrollbars'];
 
-// Starts the browser; `more`: further options. Returns {open, close}.
+// Starts the browser; `more`: further options. Returns {open, busy, close}.
 export function startBrowser(program, more = []) {
   const folder = mkdtempSync(join(tmpdir(), 'page-test-'));
   const child = spawn(program, [...OPTIONS, '--user-data-dir=' + folder, ...more, 'about:blank'], { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
@@ -65,7 +65,15 @@ export function startBrowser(program, more = []) {
       const { data } = await command('Page.captureScreenshot', { format: 'png', captureBeyondViewport: whole });
       return Buffer.from(data, 'base64');
     }
-    return { command, evaluate, picture, complaints, requests };
+    const close = () => send('Target.closeTarget', { targetId });
+    return { command, evaluate, picture, close, complaints, requests };
+  }
+
+  // The processor time (s) of the browser's processes so far: {browser, renderer, GPU, ...}.
+  async function busy() {
+    const sums = {};
+    for (const { type, cpuTime } of (await send('SystemInfo.getProcessInfo')).processInfo) sums[type] = (sums[type] ?? 0) + cpuTime;
+    return sums;
   }
 
   async function close() {
@@ -74,5 +82,5 @@ export function startBrowser(program, more = []) {
     await ended;
     rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
   }
-  return { open, close };
+  return { open, busy, close };
 }

@@ -62,11 +62,13 @@ const wait = i => {
     numbers[k].value = values[p.name];
     numbers[k].dispatchEvent(new Event('change'));
   });
-  sdmgen.drawn().then(() => done({
+  document.getElementById('slices').scrollIntoView();
+  // slices out of sight are drawn later
+  sdmgen.drawn().then(() => setTimeout(() => done({
     map: Array.from(sdmgen.map()), requests: performance.getEntriesByType('resource').map(entry => entry.name),
     notice: document.getElementById('notice').hidden ? '' : document.getElementById('notice').textContent,
     slices: [...document.querySelectorAll('#slices canvas')].map(c => c.getContext('2d').getImageData(c.width >> 1, c.height >> 1, 1, 1).data[3])
-  }));
+  }), 500));
 };
 wait(0);`;
 

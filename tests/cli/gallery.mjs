@@ -13,7 +13,7 @@ function check(fine, text) {
 const browser = startBrowser(argv[2]);
 for (const [name, values] of [['linkage', { q1: 0.5 }], ['statistical', { m1: 0.5 }], ['cochlea', { a: 3.5 }]]) {
   const page = await browser.open(`pages/${name}.html`, { features: [{ name: 'prefers-reduced-motion', value: 'reduce' }] });
-  const { bits, filled } = await page.evaluate(`(async () => {
+  const { bits, filled, own } = await page.evaluate(`(async () => {
     for (let i = 0; i < 1200 && !(window.sdmgen?.map() && document.body.classList.contains('ready')); i++) await new Promise(done => setTimeout(done, 50));
     await sdmgen.set(${JSON.stringify(values)});
     const bytes = new Uint8Array(sdmgen.map().slice().buffer), canvas = document.getElementById('surface');
@@ -21,12 +21,18 @@ for (const [name, values] of [['linkage', { q1: 0.5 }], ['statistical', { m1: 0.
     copy.drawImage(canvas, 0, 0);
     const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
     let filled = 0;
-    for (let i = 3; i < data.length; i += 4) filled += data[i] > 0;
-    return { bits: btoa(Array.from(bytes, b => String.fromCharCode(b)).join('')), filled };
+    for (let i = 0; i < data.length; i += 4) filled += data[i] !== data[0];
+    return { own: state.map.own && Array.from(state.map.own), bits: btoa(Array.from(bytes, b => String.fromCharCode(b)).join('')), filled };
   })()`);
   const want = readFileSync(name + '.npy').subarray(128), got = Buffer.from(bits, 'base64');
   check(got.equals(want), `${name}: another map than by the program`);
   check(filled > 1000, `${name}: the surface fills ${filled} pixels`);
+  if (name === 'cochlea') {
+    const { measures } = JSON.parse(readFileSync('cochlea.json'));
+    check(own.length === measures.length - 5 && own.every((v, i) => Math.abs(v / measures[i].value - 1) < 1e-9), `measures ${own}, by the program ${JSON.stringify(measures)}`);
+    const shown = await page.evaluate('document.getElementById("measures").textContent');
+    check(shown.includes(Number(measures[0].value.toPrecision(5)).toString()), `the page shows ${shown}`);
+  }
   check(page.complaints.length === 0, `${name}: the console has: ${page.complaints.join(' | ')}`);
   check(page.requests.length === 0, `${name}: requests: ${page.requests.join(' ')}`);
 }

@@ -33,5 +33,6 @@ fi
 "$baseline" pages/runs/linkage/model.sdm linkage.npy q1=0.5 >/dev/null
 "$baseline" pages/runs/statistical/model.sdm statistical.npy m1=0.5 >/dev/null
 "$baseline" pages/runs/cochlea/model.sdm cochlea.npy a=3.5 >/dev/null
+sdmgen exact --shape cochlea -p a=3.5 --measure --depth 10 --json -o cochlea.nrrd >cochlea.json
 node --no-warnings "$source_folder/tests/cli/gallery.mjs" "$chromium" || bad 'the gallery in the browser: see above'
 finish

@@ -2,7 +2,7 @@
 # Pages of models, runs and fits: their files, their text, and the page itself in chromium (page.mjs), where the model must give the same map as
 # the program for the same kernels (third argument). The part in the browser is skipped without chromium or Node.js; fourth argument: whether
 # this build has the runtime for pages.
-# Tests: cmd_report.c page_figures.c page_fit.c page_history.c page_report.c page_still.c page_write.c
+# Tests: cmd_report.c page_errors.c page_figures.c page_fit.c page_history.c page_report.c page_still.c page_write.c
 baseline=$3
 runtime=$4
 . "$(dirname "$0")/common.sh"
@@ -45,11 +45,18 @@ cp out info
 rmse=$(json rmse_mm)
 figures still.html
 [ "$(json rmse_mm)" = "$rmse" ] || bad "error in the page $(json rmse_mm), of the model $rmse"
-sdmgen generate $model -o surface.ply
-expect 0 - sdmgen mesh --mesh surface.ply --json
+expect 0 - sdmgen generate $model --json -o map.nrrd
 volume=$(json volume_mm3)
+# the histogram of the errors has the voxels of 16 shapes, and the root mean square that eval measures there
+sdmgen eval $model --samples 16 --json >out
+rmse=$(json rmse_mm)
 figures still.html
-near "$(json volume_mm3)" "$volume" 1e-3
+histogram=$(sed -n 's/.*"first_edge_mm": *\([^,]*\), "bins_per_decade": *8, "voxels": *\[\([^]]*\)\].*/\1, \2/p' out)
+awk -v text="$histogram" -v rmse="$rmse" 'BEGIN {
+    n = split(text, part, ", *")
+    for (i = 2; i <= n; i++) { sum += part[i]; squares += part[i] * (part[1] * 10 ^ ((i - 2.5) / 8)) ^ 2 }
+    ratio = sum ? sqrt(squares / sum) / rmse : 0; exit !(n == 41 && sum == 16 * 16 * 14 * 12 && ratio > 0.9 && ratio < 1.1) }' ||
+    bad "histogram $histogram, root mean square error $rmse"
 expect 0 - sdmgen report $model --no-model -o of_model.html
 figures of_model.html
 ! grep -q '"history"' out || bad 'a page of a model without its run has a history'
@@ -109,7 +116,7 @@ if [ "$runtime" != ON ]; then
 fi
 expect 0 - sdmgen report run -o live.html
 bytes=$(($(stat -c %s live.html) - ($(stat -c %s $model) + 2) / 3 * 4))
-[ $bytes -lt 330000 ] || bad "live.html: $bytes bytes without the model"
+[ $bytes -lt 300000 ] || bad "live.html: $bytes bytes without the model"
 [ "$failures" -eq 0 ] || finish
 
 chromium=$(command -v chromium || command -v chromium-browser || command -v google-chrome)
@@ -120,7 +127,9 @@ fi
 # maps by the network, with the kernels that WebAssembly has, and beyond the trained range by the exact engine
 "$baseline" $model native.npy rx=2.6 rz=3.1 >/dev/null
 "$baseline" $model beyond.npy rx=4.6 >/dev/null
+sdmgen exact --shape ellipsoid -p rx=4.6 --measure --json -o beyond.nrrd >beyond.json
 node --no-warnings "$source_folder/tests/cli/page.mjs" "$chromium" || bad 'the page in the browser: see above'
+node --no-warnings "$source_folder/tests/cli/page_times.mjs" "$chromium" live.html || bad 'the times of the page: see above'
 if firefox=$(command -v firefox-esr || command -v firefox); then
     node "$source_folder/tests/cli/firefox.mjs" "$firefox" || bad 'the page in Firefox: see above'
 else

@@ -38,6 +38,10 @@ expect 2 'needs a value' a/modules/SdmgenExact --mesh
 expect 3 'label' a/modules/SdmgenFit --labels ct.nrrd --label 77777 --shape torus --rotation 0,0,0
 [ "$failures" -eq 0 ] || finish
 
+# Slicer hands surfaces over in the first format of this list
+[ "$(grep -c 'fileExtensions="\.vtp,' a/modules/SdmgenFit.xml)" -eq 2 ] || bad 'surfaces are not passed as .vtp'
+[ "$failures" -eq 0 ] || finish
+
 # the host
 python=/usr/bin/python3
 [ -x $python ] || python=python3
@@ -60,7 +64,7 @@ shape=torus
 spacing=0.4
 END
 mapfile -t more <more.txt
-expect 0 - host_without_notices SdmgenFit image=ct.nrrd reference=label.nrrd surface=s.ply segmentation=l.nrrd distances=d.nrrd results=r.json "${more[@]}"
+expect 0 - host_without_notices SdmgenFit image=ct.nrrd reference=label.nrrd surface=s.vtp segmentation=l.nrrd distances=d.nrrd results=r.json "${more[@]}"
 has '^progress [1-9][0-9]* 1$'
 has '^verdict: (passed|doubtful)$'
 has '^parameters: *major=3\.[0-9]* minor='
@@ -71,14 +75,14 @@ has '^file segmentation: .* 0\.000 1\.000$'
 has '^file distances: .* -(0\.[89]|1\.0)'
 present r.json
 expect 0 - host_without_notices SdmgenFit labels=label.nrrd surface=s.ply "${more[@]}" # label 1 is the default
-expect 0 - host_without_notices SdmgenFit points=s.ply surface=t.ply "${more[@]}"
+expect 0 - host_without_notices SdmgenFit points=s.vtp surface=t.ply "${more[@]}"
 expect 4 - host_without_notices SdmgenFit image=ct.nrrd surface=no.ply inside=5000,10 max_iterations=1 "${more[@]}"
 grep -q 'the image shows no such shape' errors || bad "no reason: $(cat errors)"
 absent no.ply
 
 model=../files-of-train/run/model.sdm
 present $model
-expect 0 - host SdmgenGenerate model=$model param=a=4.2 surface=c.ply distances=c.nrrd
+expect 0 - host SdmgenGenerate model=$model param=a=4.2 surface=c.vtp distances=c.nrrd
 has '^parameters: *a=4\.2 '
 has '^file surface: [0-9]+ points'
 expect 5 'allowed' host SdmgenGenerate model=$model param=a=9 surface=no.ply

@@ -91,7 +91,7 @@ def describe_file(path):
         reader.Update()
         low, high = reader.GetOutput().GetScalarRange()
         return f"{reader.GetOutput().GetDimensions()} {low:.3f} {high:.3f}"
-    reader = vtk.vtkPLYReader()
+    reader = vtk.vtkXMLPolyDataReader() if path.endswith(".vtp") else vtk.vtkPLYReader()
     reader.SetFileName(path)
     reader.Update()
     mass = vtk.vtkMassProperties()

@@ -109,11 +109,13 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
 }
 
 static sdm_status train_network(const cli_args *args, const sdm_config *config,
-                                const sdm_instance *shape, sdm_error *err)
+                                const sdm_instance *shape, const sdm_map_store *store,
+                                sdm_error *err)
 {
     const char *folder = config->output.folder;
     cli_progress progress;
-    const sdm_train_hooks hooks = cli_train_hooks(&progress);
+    sdm_train_hooks hooks = cli_train_hooks(&progress);
+    hooks.store = store;
     sdm_train_report report = {0};
     if (!args->resume) cli_notice_survey(config, shape);
     cli_progress_start(&progress);
@@ -133,6 +135,7 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     sdm_config *config = NULL;
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
+    sdm_map_store *store = NULL;
     sdm_status s = cli_page_check_option(args, err);
     if (!s) s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && args->out && strlen(args->out) >= sizeof config->output.folder)
@@ -143,7 +146,10 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     const size_t n = strlen(config ? config->output.folder : "");
     if (!s && args->report && (strncmp(args->report, config->output.folder, n) || !n))
         s = cli_check_files(args, NULL, err);
-    if (!s) s = train_network(args, config, shape, err);
+    if (!s && args->dataset)
+        s = sdm_map_store_open(args->dataset, config, shape, NULL, NULL, &store, err);
+    if (!s) s = train_network(args, config, shape, store, err);
+    sdm_map_store_free(store);
     sdm_instance_free(shape);
     sdm_registry_free(registry);
     sdm_free(config);

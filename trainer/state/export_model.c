@@ -18,6 +18,7 @@
 #include "sdm/internal/near.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
+#include "shards/option_texts.h"
 
 static int compare_doubles(const void *a, const void *b)
 {
@@ -144,52 +145,11 @@ static sdm_status check_texts(const trainer *t, sdm_error *err)
     return SDM_OK;
 }
 
-/* Computes checksums of the shape's data files. The model stores them, so that the exact engine
- * cannot be used with other files later. */
-static void checksum_files(trainer *t)
-{
-    const sdm_shape *shape = sdm_instance_shape(t->shape);
-    const sdm_option_value *values = sdm_instance_options(t->shape);
-    for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++)
-        if (shape->options[i].type == SDM_OPTION_FILE && values[i].text[0] &&
-            sdm_file_checksum(values[i].text, &t->file_sums[i], NULL))
-            // a file that cannot be read is no error here: a plug-in may accept a folder, for
-            // example
-            t->file_sums[i] = 0;
-}
-
 sdm_status trainer_export_prepare(trainer *t, sdm_error *err)
 {
-    checksum_files(t);
+    // the model stores them, so that the exact engine cannot be used with other files later
+    trainer_option_sums(t->shape, t->file_sums);
     return check_texts(t, err);
-}
-
-/* Every option of the shape as text, so that the model file can be used without the configuration.
-   A file option is followed by an entry NAME.crc64 with its checksum. */
-typedef struct option_texts {
-    const char *names[2 * SDM_MAX_OPTIONS], *values[2 * SDM_MAX_OPTIONS];
-    char texts[SDM_MAX_OPTIONS][32];              // texts of numbers and of checksums
-    char sums[SDM_MAX_OPTIONS][SDM_NAME_MAX + 8]; // names of the checksum entries
-    size_t n;
-} option_texts;
-
-static void collect_options(const trainer *t, option_texts *o)
-{
-    const sdm_shape *shape = sdm_instance_shape(t->shape);
-    const sdm_option_value *v = sdm_instance_options(t->shape);
-    for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++) {
-        const sdm_option *option = &shape->options[i];
-        const bool text = option->type == SDM_OPTION_CHOICE || option->type == SDM_OPTION_FILE;
-        o->names[o->n] = option->name;
-        o->values[o->n] =
-            text ? (v[i].text ? v[i].text : "") : sdm_format_real(v[i].number, o->texts[i]);
-        o->n++;
-        if (!t->file_sums[i]) continue;
-        snprintf(o->sums[i], sizeof o->sums[i], "%s.crc64", option->name);
-        snprintf(o->texts[i], sizeof o->texts[i], "%016llx", (unsigned long long)t->file_sums[i]);
-        o->names[o->n] = o->sums[i];
-        o->values[o->n++] = o->texts[i];
-    }
 }
 
 /* loss.png, from the lines of metrics.jsonl. */
@@ -245,7 +205,7 @@ static void describe_model(const trainer *t, const sdm_text *config, option_text
         params[i].def = fmin(fmax(p[i].def, params[i].min), params[i].max);
         params[i].distribution = t->data.distribution[i];
     }
-    collect_options(t, options);
+    trainer_option_texts(t->shape, t->file_sums, options);
     *info = (sdm_model_info){.n_params = n,
                              .params = params,
                              .n_options = options->n,

@@ -8,6 +8,7 @@
 #include "inputs/setup.h"
 #include "page/page.h"
 #include "report/files.h"
+#include "report/report_plan.h"
 #include "report/report_survey.h"
 #include "report/report_verdict.h"
 #include "report/terminal.h"
@@ -137,18 +138,23 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     sdm_instance *shape = NULL;
     sdm_map_store *store = NULL;
     sdm_status s = cli_page_check_option(args, err);
+    if (!s && (args->nodes || args->cores) && !args->plan)
+        s = sdm_fail(err, SDM_E_ARG, "--nodes and --cores belong to --plan");
     if (!s) s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && args->out && strlen(args->out) >= sizeof config->output.folder)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
-    if (!s) s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);
+    const bool trains = !args->plan;
+    if (!s && !trains) s = cli_plan_training(args, config, shape, err);
+    if (!s && trains)
+        s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);
     // a page in the folder of the run, which the training makes, needs no check
     const size_t n = strlen(config ? config->output.folder : "");
-    if (!s && args->report && (strncmp(args->report, config->output.folder, n) || !n))
+    if (!s && trains && args->report && (strncmp(args->report, config->output.folder, n) || !n))
         s = cli_check_files(args, NULL, err);
-    if (!s && args->dataset)
+    if (!s && trains && args->dataset)
         s = sdm_map_store_open(args->dataset, config, shape, NULL, NULL, &store, err);
-    if (!s) s = train_network(args, config, shape, store, err);
+    if (!s && trains) s = train_network(args, config, shape, store, err);
     sdm_map_store_free(store);
     sdm_instance_free(shape);
     sdm_registry_free(registry);

@@ -360,6 +360,13 @@ const cli_option cli_options[] = {
     {"dataset", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_TRAIN), AT(dataset),
      "take the exact maps from this folder (of `sdmgen dataset`) and make only those that are "
      "missing; the model has the same bits as without it"},
+    {"plan", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(plan),
+     "train nothing: measure the speed of this machine for a few seconds, and print how long the "
+     "training takes, how much memory it needs and how many bytes it sends"},
+    {"nodes", 0, CLI_INT, "N", NULL, 1, 100000, ON(CLI_TRAIN), AT(nodes),
+     "with --plan: number of machines (default 1)"},
+    {"cores", 0, CLI_INT, "N", NULL, 1, 4096, ON(CLI_TRAIN), AT(cores),
+     "with --plan: cores of each machine (default: the threads of this one)"},
     {"resume", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(resume),
      "continue from the checkpoint in the folder"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(force),

@@ -150,6 +150,8 @@ struct cli_args {
     int64_t threads, seed;
     bool resume;                     /* train */
     const char *dataset;             /* train: folder of maps */
+    bool plan;                       /* train */
+    int64_t nodes, cores;            /* train; 0: option missing */
     const char *part;                /* fit, dataset; NULL: option missing */
     int64_t maps;                    /* dataset; -1: option missing */
     bool force;                      /* train, experiment, fit */

@@ -49,7 +49,7 @@ check() {
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
          own("all", "sdmgen") # the header that includes all public ones
-         own("trainer", "map_store ssm_build train train_file verdict")
+         own("trainer", "map_store ssm_build train train_file train_plan verdict")
         parts("core", "core")
         parts("config", "core config")
         parts("geom", "core geom")

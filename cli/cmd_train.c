@@ -7,8 +7,8 @@
 #include "inputs/config_shape.h"
 #include "inputs/setup.h"
 #include "page/page.h"
+#include "print_plan.h"
 #include "report/files.h"
-#include "report/report_plan.h"
 #include "report/report_survey.h"
 #include "report/report_verdict.h"
 #include "report/terminal.h"
@@ -154,6 +154,7 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
         s = cli_check_files(args, NULL, err);
     if (!s && trains && args->dataset)
         s = sdm_map_store_open(args->dataset, config, shape, NULL, NULL, &store, err);
+    if (!s && store) s = sdm_map_store_compare(store, config, shape, err);
     if (!s && trains) s = train_network(args, config, shape, store, err);
     sdm_map_store_free(store);
     sdm_instance_free(shape);

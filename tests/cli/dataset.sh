@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen dataset: shards in parts, continued, damaged, foreign; a training that takes its maps from them gives the same bits.
-# Tests: cmd_dataset.c make_dataset.c map_store.c option_texts.c part.c shard.c shard_identity.c
+# Tests: cmd_dataset.c compare_maps.c make_dataset.c map_store.c option_texts.c part.c shard.c shard_identity.c
 . "$(dirname "$0")/common.sh"
 coarse_grids=yes
 export OMP_WAIT_POLICY=passive
@@ -106,4 +106,28 @@ for k in (0, 71):
     assert np.array_equal(np.load("one.npy"), maps[k]), k
 END
 expect 0 - python3 reader.py "$program"
+
+# Maps of another program: one value of a held-out map differs, with right checksums.
+cat >other.py <<'END'
+import struct, sys
+sys.path.insert(0, sys.argv[1])
+from sdm_file import crc64
+path = "all/holdout-00000000.sdms"
+data = bytearray(open(path, "rb").read())
+n, = struct.unpack_from("<I", data, 12)
+place = {data[at:at + 24].rstrip(b"\0").decode(): at for at in range(24, 24 + 48 * n, 48)}
+bounds = lambda name: struct.unpack_from("<QQ", data, place[name] + 24)
+maps, size = bounds("maps")
+value, = struct.unpack_from("<f", data, maps)
+struct.pack_into("<f", data, maps, value + 0.25)
+struct.pack_into("<Q", data, bounds("sums")[0], crc64(data[maps:maps + size // 8]))
+for name in ("sums", "maps"):
+    at, size = bounds(name)
+    struct.pack_into("<Q", data, place[name] + 40, crc64(data[at:at + size]))
+struct.pack_into("<Q", data, 24 + 48 * n, crc64(data[:24 + 48 * n]))
+struct.pack_into("<Q", data, len(data) - 8, crc64(data[:-8]))
+open(path, "wb").write(data)
+END
+expect 0 - env PYTHONDONTWRITEBYTECODE=1 python3 other.py "$source_folder/tests/oracle"
+expect 2 'holdout-00000000.sdms: map 0 differs from the one that this program makes by up to 0.25 mm: another version of sdmgen' sdmgen train small.yaml --out no --dataset all -q
 finish

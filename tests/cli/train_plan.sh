@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen train --plan: time, memory and bytes of a training on several nodes; nothing is trained or written.
-# Tests: plan.c plan_measure.c report_plan.c
+# Tests: plan_costs.c plan_measure.c print_plan.c
 . "$(dirname "$0")/common.sh"
 coarse_grids=yes
 export OMP_WAIT_POLICY=passive

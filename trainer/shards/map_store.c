@@ -3,12 +3,10 @@
 
 #include <dirent.h>
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "data/workbench.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/heap.h"
 #include "shard.h"
@@ -102,8 +100,16 @@ sdm_status sdm_map_store_read(const sdm_map_store *s, const double *p, float *ma
     return trainer_shard_map(path, &s->shards[m->shard], &s->form, m->k, map, err);
 }
 
+sdm_stored_map sdm_map_store_map(const sdm_map_store *s, size_t i)
+{
+    const stored_map *m = &s->maps[i];
+    const shard *file = &s->shards[m->shard];
+    sdm_stored_map out = {params_of(s, m), file->place.first + m->k, "", file->version};
+    trainer_shard_name(&file->place, out.file);
+    return out;
+}
+
 size_t sdm_map_store_maps(const sdm_map_store *s) { return s->n_maps; }
-size_t sdm_map_store_files(const sdm_map_store *s) { return s->n_shards; }
 
 /* ---- the folder ---- */
 
@@ -161,47 +167,6 @@ static sdm_status read_shards(sdm_map_store *s, char (*names)[SHARD_NAME_MAX], s
     return status;
 }
 
-/* ---- comparison with maps that are made now ---- */
-
-/* Compares one map of a shard with the one that this program makes. */
-static sdm_status compare_map(const sdm_map_store *s, const dataset *d, workbench *w,
-                              const shard *file, float *map, sdm_error *err)
-{
-    char path[STORE_PATH_MAX];
-    const size_t k = file->place.n / 2;
-    path_of_shard(s, file, path);
-    sdm_status status = trainer_shard_map(path, file, &s->form, k, map, err);
-    if (!status) status = trainer_workbench_exact(w, d, file->params + k * s->form.n_params, err);
-    if (status) return status;
-    double largest = 0;
-    for (size_t v = 0; v < s->form.n_voxels; v++)
-        largest = fmax(largest, fabs((double)map[v] - (double)w->exact[v]));
-    if (!memcmp(map, w->exact, s->form.n_voxels * sizeof *map)) return SDM_OK;
-    return sdm_fail(err, SDM_E_CONFIG,
-                    "%s: map %zu differs from the one that this program makes by up to %.2g mm: "
-                    "another version of sdmgen (%s there, " SDM_VERSION_TEXT
-                    " here) or of the shape made it: make the dataset again in another folder",
-                    path, file->place.first + k, largest, file->version);
-}
-
-/* Compares maps of a few shards, evenly spread. */
-static sdm_status compare_maps(const sdm_map_store *s, const sdm_config *config,
-                               const sdm_instance *shape, sdm_error *err)
-{
-    enum { SHARDS = 4 };
-    const size_t n = s->n_shards < SHARDS ? s->n_shards : SHARDS;
-    const dataset d = {.shape = shape, .grid = &config->grid, .n_voxels = s->form.n_voxels};
-    workbench w = {0};
-    float *map = NULL;
-    sdm_status status = trainer_workbench_create(&w, &d, err);
-    if (!status) status = SDM_ALLOC(&map, s->form.n_voxels, "map", err);
-    for (size_t i = 0; i < n && !status; i++)
-        status = compare_map(s, &d, &w, &s->shards[i * s->n_shards / n], map, err);
-    sdm_free(map);
-    trainer_workbench_dispose(&w);
-    return status;
-}
-
 /* ---- opening ---- */
 
 static sdm_status open_store(sdm_map_store *s, const sdm_config *config, const sdm_instance *shape,
@@ -220,7 +185,6 @@ static sdm_status open_store(sdm_map_store *s, const sdm_config *config, const s
                           s->folder);
     if (!status && n) status = read_shards(s, names, n, damaged, user, err);
     if (!status) status = make_table(s, err);
-    if (!status && !damaged) status = compare_maps(s, config, shape, err);
     sdm_free(names);
     return status;
 }

@@ -1,10 +1,11 @@
 /* All that decides the maps of a configuration, as text, and the names and sizes of shards. */
+#include "shard_identity.h"
+
 #include <stdio.h>
 
 #include "option_texts.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
-#include "shard.h"
 
 static const char *const SETS[MAP_SETS] = {
     [MAP_HOLDOUT] = "holdout", [MAP_STATIC] = "static", [MAP_RANDOM] = "random"};

@@ -15,21 +15,35 @@ typedef struct sdm_map_store sdm_map_store;
 
 /* Opens the shards in `folder`, which must be those of this configuration: shape with options,
    ranges and distributions, grid, static grid, seed. Their maps are not read yet. The grid of the
-   configuration is complete (sdm_train_grid()). The shape must outlive the store. A few maps are
-   computed and compared with those of the files. damaged: NULL, or a function that is told the
-   message about each file that is damaged, which is then left out, and no map is compared. Free
-   with sdm_map_store_free(). SDM_E_IO; SDM_E_CONFIG: there is no shard, a shard is of another
-   configuration, or of a program or shape that makes other maps; the message names what differs;
-   SDM_E_FORMAT: a file is damaged; SDM_E_NOMEM; errors of the shape. */
+   configuration is complete (sdm_train_grid()). damaged: NULL, or a function that is told the
+   message about each file that is damaged, which is then left out; a folder may then be empty or
+   missing. Free with sdm_map_store_free(). SDM_E_IO; SDM_E_CONFIG: there is no shard, or a shard is
+   of another configuration, and the message names what differs; SDM_E_FORMAT: a file is damaged;
+   SDM_E_NOMEM. */
 sdm_status sdm_map_store_open(const char *folder, const sdm_config *config,
                               const sdm_instance *shape,
                               void (*damaged)(void *user, const char *message), void *user,
                               sdm_map_store **out, sdm_error *err);
 void sdm_map_store_free(sdm_map_store *s);
 
-/* Number of maps; number of files. [any thread] */
+/* Number of maps. [any thread] */
 size_t sdm_map_store_maps(const sdm_map_store *s);
-size_t sdm_map_store_files(const sdm_map_store *s);
+
+/* A map of a store. */
+typedef struct sdm_stored_map {
+    const double *p;     /* [n_params], owned by the store */
+    size_t number;       /* in its set */
+    char file[48];       /* name of its file in the folder */
+    const char *version; /* of the program that made it, owned by the store */
+} sdm_stored_map;
+
+/* Map i of sdm_map_store_maps(). [any thread] */
+sdm_stored_map sdm_map_store_map(const sdm_map_store *s, size_t i);
+
+/* Makes a few of the maps and compares them with those of the files. SDM_E_CONFIG: they differ, so
+   another program or shape has made them; errors of the shape and of sdm_map_store_read(). */
+sdm_status sdm_map_store_compare(const sdm_map_store *s, const sdm_config *config,
+                                 const sdm_instance *shape, sdm_error *err);
 
 /* true: the store has the map at p[n_params], bit for bit these parameters. [any thread] */
 bool sdm_map_store_has(const sdm_map_store *s, const double *p);

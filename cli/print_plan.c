@@ -1,10 +1,10 @@
 /* Prints the plan of a training, as text or JSON. */
-#include "report_plan.h"
+#include "print_plan.h"
 
 #include <math.h>
 #include <stdio.h>
 
-#include "terminal.h"
+#include "report/terminal.h"
 
 enum { NODES_MAX = 1024 };
 

@@ -16,8 +16,8 @@ typedef struct option_texts {
 
 /* sums[SDM_MAX_OPTIONS] = CRC-64 of the data files that options name; 0: the option names no file
    that can be read (a plug-in may accept a folder, for example). */
-void trainer_option_sums(const sdm_instance *shape, uint64_t *sums);
+void trainer_option_sums(const sdm_instance *instance, uint64_t *sums);
 
 /* Fills *o, all zero before; its pointers refer to the instance and to *o. sums: as
    trainer_option_sums() computed them. */
-void trainer_option_texts(const sdm_instance *shape, const uint64_t *sums, option_texts *o);
+void trainer_option_texts(const sdm_instance *instance, const uint64_t *sums, option_texts *o);

@@ -68,9 +68,9 @@ static sdm_status check_arguments(cli_fit *f, sdm_error *err)
     const bool with_model = args->files.n == 2;
     if (!args->files.n)
         return sdm_fail(err, SDM_E_ARG, "usage: sdmgen fit %s", args->command->synopsis);
-    if (args->cohort.part || args->cohort.claim)
+    if (args->part || args->cohort.claim)
         return sdm_fail(err, SDM_E_ARG, "fit: --%s belongs to --cases TABLE",
-                        args->cohort.part ? "part" : "claim");
+                        args->part ? "part" : "claim");
     if (with_model && args->shape)
         return sdm_fail(err, SDM_E_ARG,
                         "fit: either MODEL or --shape NAME, not both (files: '%s', '%s')",

@@ -7,6 +7,7 @@
 #include "inputs/config_shape.h"
 #include "inputs/setup.h"
 #include "page/page.h"
+#include "print_plan.h"
 #include "report/files.h"
 #include "report/report_survey.h"
 #include "report/report_verdict.h"
@@ -109,11 +110,13 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
 }
 
 static sdm_status train_network(const cli_args *args, const sdm_config *config,
-                                const sdm_instance *shape, sdm_error *err)
+                                const sdm_instance *shape, const sdm_map_store *store,
+                                sdm_error *err)
 {
     const char *folder = config->output.folder;
     cli_progress progress;
-    const sdm_train_hooks hooks = cli_train_hooks(&progress);
+    sdm_train_hooks hooks = cli_train_hooks(&progress);
+    hooks.store = store;
     sdm_train_report report = {0};
     if (!args->resume) cli_notice_survey(config, shape);
     cli_progress_start(&progress);
@@ -133,17 +136,27 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     sdm_config *config = NULL;
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
+    sdm_map_store *store = NULL;
     sdm_status s = cli_page_check_option(args, err);
+    if (!s && (args->nodes || args->cores) && !args->plan)
+        s = sdm_fail(err, SDM_E_ARG, "--nodes and --cores belong to --plan");
     if (!s) s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && args->out && strlen(args->out) >= sizeof config->output.folder)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
-    if (!s) s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);
+    const bool trains = !args->plan;
+    if (!s && !trains) s = cli_plan_training(args, config, shape, err);
+    if (!s && trains)
+        s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);
     // a page in the folder of the run, which the training makes, needs no check
     const size_t n = strlen(config ? config->output.folder : "");
-    if (!s && args->report && (strncmp(args->report, config->output.folder, n) || !n))
+    if (!s && trains && args->report && (strncmp(args->report, config->output.folder, n) || !n))
         s = cli_check_files(args, NULL, err);
-    if (!s) s = train_network(args, config, shape, err);
+    if (!s && trains && args->dataset)
+        s = sdm_map_store_open(args->dataset, config, shape, NULL, NULL, &store, err);
+    if (!s && store) s = sdm_map_store_compare(store, config, shape, err);
+    if (!s && trains) s = train_network(args, config, shape, store, err);
+    sdm_map_store_free(store);
     sdm_instance_free(shape);
     sdm_registry_free(registry);
     sdm_free(config);

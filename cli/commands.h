@@ -5,6 +5,7 @@
 #include "args/options.h"
 
 sdm_status cmd_train(const cli_args *args, sdm_error *err);
+sdm_status cmd_dataset(const cli_args *args, sdm_error *err);
 sdm_status cmd_generate(const cli_args *args, sdm_error *err);
 sdm_status cmd_exact(const cli_args *args, sdm_error *err);
 sdm_status cmd_mesh(const cli_args *args, sdm_error *err);

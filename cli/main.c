@@ -21,13 +21,13 @@
 
 /* The functions of the commands, by index into cli_commands. */
 static sdm_status (*const functions[CLI_N_COMMANDS])(const cli_args *args, sdm_error *err) = {
-    [CLI_TRAIN] = cmd_train,     [CLI_GENERATE] = cmd_generate, [CLI_EXACT] = cmd_exact,
-    [CLI_MESH] = cmd_mesh,       [CLI_EVAL] = cmd_eval,         [CLI_REPORT] = cmd_report,
-    [CLI_SHAPES] = cmd_shapes,   [CLI_INFO] = cmd_info,         [CLI_VERIFY] = cmd_verify,
-    [CLI_CONFIG] = cmd_config,   [CLI_BENCH] = cmd_bench,       [CLI_EXPERIMENT] = cmd_experiment,
-    [CLI_PHANTOM] = cmd_phantom, [CLI_FIT] = cmd_fit,           [CLI_COLLECT] = cmd_collect,
-    [CLI_EXPORT] = cmd_export,   [CLI_IMPORT] = cmd_import,     [CLI_SLICER] = cmd_slicer,
-    [CLI_HELP] = cmd_help};
+    [CLI_TRAIN] = cmd_train,           [CLI_DATASET] = cmd_dataset, [CLI_GENERATE] = cmd_generate,
+    [CLI_EXACT] = cmd_exact,           [CLI_MESH] = cmd_mesh,       [CLI_EVAL] = cmd_eval,
+    [CLI_REPORT] = cmd_report,         [CLI_SHAPES] = cmd_shapes,   [CLI_INFO] = cmd_info,
+    [CLI_VERIFY] = cmd_verify,         [CLI_CONFIG] = cmd_config,   [CLI_BENCH] = cmd_bench,
+    [CLI_EXPERIMENT] = cmd_experiment, [CLI_PHANTOM] = cmd_phantom, [CLI_FIT] = cmd_fit,
+    [CLI_COLLECT] = cmd_collect,       [CLI_EXPORT] = cmd_export,   [CLI_IMPORT] = cmd_import,
+    [CLI_SLICER] = cmd_slicer,         [CLI_HELP] = cmd_help};
 
 static int print_help(const cli_command *command)
 {

@@ -33,6 +33,7 @@ sdm_status trainer_set_up(trainer *t, sdm_error *err)
     d->shape = t->shape;
     d->grid = &c->grid;
     d->seed = c->seed;
+    d->store = t->hooks.store;
     if (t->kind->prepare && (s = t->kind->prepare(t, err))) return s;
     const sdm_grid *grid = d->target.make ? d->target.grid : &c->grid;
     d->n_voxels = sdm_grid_count(grid);

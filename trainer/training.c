@@ -32,6 +32,35 @@ static bool fill_cancelled(void *user) { return trainer_cancelled(user); }
 /* true when the computation of the data has used half of a time budget. */
 static bool fill_enough(void *user) { return trainer_start_fraction(user) > 0.5; }
 
+/* Tells how many of the maps that the run may need come from files. Those of an error-driven plan
+ * are not known before the training. */
+static void tell_stored(const trainer *t)
+{
+    double p[SDM_POD_MAX_PARAMS];
+    const dataset *d = &t->data;
+    if (!d->store) return;
+    const size_t n_random = d->n_start + (d->plan.by_error ? 0 : d->n_online),
+                 n = d->n_holdout + d->n_static + n_random;
+    size_t found = 0;
+    for (size_t k = 0; k < d->n_holdout; k++) {
+        trainer_dataset_holdout_params(d, k, p);
+        found += sdm_map_store_has(d->store, p);
+    }
+    for (size_t k = 0; k < d->n_static; k++) {
+        trainer_dataset_static_params(d, k, p);
+        found += sdm_map_store_has(d->store, p);
+    }
+    for (size_t k = 0; k < n_random; k++) {
+        trainer_dataset_random_params(d, k, p);
+        found += sdm_map_store_has(d->store, p);
+    }
+    if (found < n)
+        trainer_message(t, "%zu of %zu maps come from the dataset, the other %zu are made now",
+                        found, n, n - found);
+    else
+        trainer_message(t, "all %zu maps come from the dataset", n);
+}
+
 /* Makes all maps needed before training. resumed: exactly as many as the interrupted run made, else
  * as many as the time budget allows. */
 static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
@@ -43,6 +72,7 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
                               .user = t};
     t->phase = SDM_PHASE_DATA;
     trainer_pace_start(t, 1);
+    tell_stored(t);
     t->data.known = t->tried.n_voxels ? &t->tried : NULL;
     const sdm_status s = trainer_dataset_fill(&t->data, t->n_threads, &hooks, err);
     t->data.known = NULL;

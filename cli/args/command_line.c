@@ -268,6 +268,7 @@ static void set_defaults(cli_args *args)
 {
     args->seed = -1;
     args->samples = -1;
+    args->maps = -1;
     args->naive = 2;
     args->origin[0] = args->origin[1] = args->origin[2] = NAN;
     args->direction[0] = NAN;

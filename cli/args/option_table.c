@@ -7,13 +7,13 @@
 #define ON(c) CLI_ON(c)
 #define ALL (ON(CLI_N_COMMANDS) - 1u)
 #define WITH_SHAPES                                                                                \
-    (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) |              \
-     ON(CLI_SHAPES) | ON(CLI_VERIFY) | ON(CLI_CONFIG) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |       \
-     ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_REPORT) | ON(CLI_EXPORT))
+    (ON(CLI_TRAIN) | ON(CLI_DATASET) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) |           \
+     ON(CLI_EVAL) | ON(CLI_SHAPES) | ON(CLI_VERIFY) | ON(CLI_CONFIG) | ON(CLI_BENCH) |             \
+     ON(CLI_EXPERIMENT) | ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_REPORT) | ON(CLI_EXPORT))
 #define REPORTS                                                                                    \
-    (ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_EVAL) |              \
-     ON(CLI_SHAPES) | ON(CLI_INFO) | ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_EXPERIMENT) |         \
-     ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_COLLECT) | ON(CLI_IMPORT))
+    (ON(CLI_TRAIN) | ON(CLI_DATASET) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) |           \
+     ON(CLI_EVAL) | ON(CLI_SHAPES) | ON(CLI_INFO) | ON(CLI_VERIFY) | ON(CLI_BENCH) |               \
+     ON(CLI_EXPERIMENT) | ON(CLI_PHANTOM) | ON(CLI_FIT) | ON(CLI_COLLECT) | ON(CLI_IMPORT))
 
 /* Commands that train networks. */
 #define WITH_MODELS                                                                                \
@@ -31,6 +31,14 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "A folder that holds a model or a checkpoint stays unchanged unless --resume or --force\n"
      "is given.",
      "sdmgen train configs/cochlea.yaml train.minutes=5 --out runs/short", 1, SIZE_MAX},
+    {"dataset", "CONFIG [key=value ...] -o DIR", "make exact maps and keep them for trainings",
+     "Makes the exact maps of a configuration, held-out ones, static grid and random ones, and\n"
+     "keeps them in checksummed files (shards) in DIR, for `sdmgen train --dataset DIR`. The\n"
+     "maps are those that the training makes, bit for bit. --part divides the files among\n"
+     "machines. The same command goes on: files that are there and whole are kept, damaged\n"
+     "ones are made again. DIR holds the maps of one configuration; the kind of network, its\n"
+     "size and its training may differ. Exit code 6: some files failed.",
+     "sdmgen dataset configs/cochlea.yaml -o shards --part 3/20", 1, SIZE_MAX},
     {"generate", "MODEL [-p name=value ...] -o FILE", "make distance maps with a trained network",
      "Parameters without -p have the model's default. The ending of FILE selects the output:\n"
      ".vdb (level set), .nii .nii.gz .nrrd .mha .npy (image), .ply .stl .obj .off .vtk\n"
@@ -343,6 +351,23 @@ const cli_option cli_options[] = {
      "run folder (default: the folder of the configuration, or runs/NAME)"},
     {"out", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_SHAPES), AT(out),
      "new: folder of the plug-in (default: NAME)"},
+    {"output", 'o', CLI_LIST, "DIR", NULL, 0, 0, ON(CLI_DATASET), AT(outputs),
+     "the folder of the files; it is made if it is missing"},
+    {"maps", 0, CLI_INT, "N", NULL, 0, 500000000, ON(CLI_DATASET), AT(maps),
+     "number of random maps (default: data.start + data.online of the configuration); held-out "
+     "maps and the static grid are made in any case"},
+    {"part", 0, CLI_TEXT, "I/N", NULL, 0, 0, ON(CLI_DATASET), AT(part),
+     "make only part I of N of the files"},
+    {"dataset", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_TRAIN), AT(dataset),
+     "take the exact maps from this folder (of `sdmgen dataset`) and make only those that are "
+     "missing; the model has the same bits as without it"},
+    {"plan", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(plan),
+     "train nothing: measure the speed of this machine for a few seconds, and print how long the "
+     "training takes, how much memory it needs and how many bytes it sends"},
+    {"nodes", 0, CLI_INT, "N", NULL, 1, 100000, ON(CLI_TRAIN), AT(nodes),
+     "with --plan: number of machines (default 1)"},
+    {"cores", 0, CLI_INT, "N", NULL, 1, 4096, ON(CLI_TRAIN), AT(cores),
+     "with --plan: cores of each machine (default: the threads of this one)"},
     {"resume", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(resume),
      "continue from the checkpoint in the folder"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(force),
@@ -517,7 +542,7 @@ const cli_option cli_options[] = {
      "fit the cases of a table: a column id, a column image (an image, labels, a mesh or points), "
      "and others with the names of options, or model, for those that differ from case to case; "
      "relative paths start from the folder of the table"},
-    {"part", 0, CLI_TEXT, "I/N", NULL, 0, 0, ON(CLI_FIT), AT(cohort.part),
+    {"part", 0, CLI_TEXT, "I/N", NULL, 0, 0, ON(CLI_FIT), AT(part),
      "fit only part I of N of the cases, contiguous rows of the table"},
     {"claim", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(cohort.claim),
      "share the cases with other processes that run the same command, on this machine or on others "
@@ -583,14 +608,15 @@ const cli_option cli_options[] = {
     {"threads", 0, CLI_INT, "N", NULL, 0, 1024, ALL & ~ON(CLI_HELP) & ~ON(CLI_SLICER) & ~TRAININGS,
      AT(threads), "number of threads; 0: all (default). Results do not depend on it"},
     {"seed", 0, CLI_INT, "N", NULL, 0, 9007199254740992.0,
-     ON(CLI_TRAIN) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_SHAPES) | ON(CLI_VERIFY) |
-         ON(CLI_BENCH) | ON(CLI_PHANTOM),
-     AT(seed), "seed of the random numbers (default 1; train, config: the configuration's)"},
+     ON(CLI_TRAIN) | ON(CLI_DATASET) | ON(CLI_CONFIG) | ON(CLI_EVAL) | ON(CLI_SHAPES) |
+         ON(CLI_VERIFY) | ON(CLI_BENCH) | ON(CLI_PHANTOM),
+     AT(seed),
+     "seed of the random numbers (default 1; train, dataset, config: the configuration's)"},
     {"json", 0, CLI_FLAG, NULL, NULL, 0, 0, REPORTS, AT(json),
      "print the result as one line of JSON"},
     {"progress", 0, CLI_CHOICE, NULL, "auto|plain|json|slicer", 0, 0,
-     ON(CLI_TRAIN) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_EVAL) | ON(CLI_VERIFY) |
-         ON(CLI_EXPERIMENT) | ON(CLI_FIT),
+     ON(CLI_TRAIN) | ON(CLI_DATASET) | ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_EVAL) |
+         ON(CLI_VERIFY) | ON(CLI_EXPERIMENT) | ON(CLI_FIT),
      AT(progress),
      "form of the progress: a bar on a terminal, plain lines elsewhere (auto, default); plain "
      "lines; every line on stderr as JSON; or the elements on stdout that 3D Slicer reads"},

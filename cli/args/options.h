@@ -53,6 +53,7 @@ typedef struct cli_option {
 /* Indices into cli_commands. */
 enum {
     CLI_TRAIN = 0,
+    CLI_DATASET,
     CLI_GENERATE,
     CLI_EXACT,
     CLI_MESH,
@@ -119,7 +120,7 @@ typedef struct cli_fit_args {
 
 /* Options of `fit` for a table of cases; NULL: option missing. */
 typedef struct cli_cohort_args {
-    const char *cases, *part;
+    const char *cases;
     bool claim;
 } cli_cohort_args;
 
@@ -132,8 +133,8 @@ typedef struct cli_import_args {
 } cli_import_args;
 
 /* A parsed command line. Options that are missing keep the default stated in their help text; seed
- * -1, samples -1, size[0] 0, spacing[0] 0 and origin[0] NaN mean "option missing". A comment names
- * the commands that have the options. */
+ * -1, samples -1, maps -1, size[0] 0, spacing[0] 0 and origin[0] NaN mean "option missing". A
+ * comment names the commands that have the options. */
 struct cli_args {
     const cli_command *command;
     int argc; /* the command line as given, owned by main() */
@@ -148,6 +149,11 @@ struct cli_args {
     double isolate_seconds, isolate_memory; /* s, GB; 0: option missing */
     int64_t threads, seed;
     bool resume;                     /* train */
+    const char *dataset;             /* train: folder of maps */
+    bool plan;                       /* train */
+    int64_t nodes, cores;            /* train; 0: option missing */
+    const char *part;                /* fit, dataset; NULL: option missing */
+    int64_t maps;                    /* dataset; -1: option missing */
     bool force;                      /* train, experiment, fit */
     bool dense, half;                /* generate, exact, fit: .vdb */
     bool keep_overlap, certify;      /* exact */

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "cohort.h"
+#include "inputs/part.h"
 #include "report/terminal.h"
 #include "sdm/internal/file.h"
 
@@ -13,7 +14,8 @@
 typedef struct cohort_run {
     cli_cohort cohort;
     cli_cohort_fit *fit;
-    size_t part, n_parts, first, end;
+    cli_part part;
+    size_t first, end;
     struct timespec begin; /* by the clock of the file system of the results */
     size_t done[4];        /* cases by state, of this run and of earlier ones */
     size_t n_earlier;      /* that were done before */
@@ -24,35 +26,24 @@ typedef struct cohort_run {
 
 static sdm_status read_part(cohort_run *r, sdm_error *err)
 {
-    const char *text = r->cohort.args->cohort.part;
-    char word[64];
-    int64_t part = 1, of = 1;
-    if (text) {
-        snprintf(word, sizeof word, "%s", text);
-        char *slash = strchr(word, '/');
-        if (slash) *slash = '\0';
-        if (!slash || !sdm_parse_int(word, &part) || !sdm_parse_int(slash + 1, &of) || of < 1 ||
-            of > 1000000 || part < 1 || part > of)
-            return sdm_fail(err, SDM_E_ARG,
-                            "--part '%s': need I/N, part I of N, counted from 1: 3/5", text);
-    }
+    const sdm_status s = cli_read_part(r->cohort.args->part, &r->part, err);
+    if (s) return s;
     const size_t n = r->cohort.cells.n_rows;
-    r->part = (size_t)part, r->n_parts = (size_t)of;
-    r->first = n * (r->part - 1) / r->n_parts;
-    r->end = n * r->part / r->n_parts;
+    r->first = n * (r->part.part - 1) / r->part.of;
+    r->end = n * r->part.part / r->part.of;
     return SDM_OK;
 }
 
 static void notice_part(const cohort_run *r)
 {
     const size_t n = r->cohort.cells.n_rows;
-    if (r->n_parts == 1) return;
+    if (r->part.of == 1) return;
     if (r->first == r->end)
-        cli_notice("part %zu of %zu: none of the %zu cases; the others do them", r->part,
-                   r->n_parts, n);
+        cli_notice("part %zu of %zu: none of the %zu cases; the others do them", r->part.part,
+                   r->part.of, n);
     else
         cli_notice("part %zu of %zu: cases %zu to %zu of %zu; the others are not done by this call",
-                   r->part, r->n_parts, r->first + 1, r->end, n);
+                   r->part.part, r->part.of, r->first + 1, r->end, n);
 }
 
 /* ---- the fit of one case: whether it is to be done, its lease, its record ---- */

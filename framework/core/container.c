@@ -86,18 +86,17 @@ sdm_status sdm_container_write(const char *path, const uint8_t *bytes, size_t si
     return s;
 }
 
-sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *sections,
-                               char names[SDM_CONTAINER_MAX_SECTIONS][24], size_t *n,
-                               uint64_t *checksum, sdm_error *err)
+sdm_status sdm_container_places(const uint8_t *head, uint64_t size, sdm_section_place *places,
+                                size_t *n, sdm_error *err)
 {
     // header
-    if (size < sizeof magic || memcmp(bytes, magic, sizeof magic))
+    if (size < sizeof magic || memcmp(head, magic, sizeof magic))
         return sdm_fail(err, SDM_E_FORMAT,
                         "not a model file (it does not begin with the signature SDMGEN)");
     if (size < HEADER_BYTES + ENTRY_BYTES + 16)
-        return sdm_fail(err, SDM_E_FORMAT, "truncated: only %zu bytes", size);
-    const uint64_t version = load_le(bytes + 8, 4), count = load_le(bytes + 12, 4),
-                   length = load_le(bytes + 16, 8);
+        return sdm_fail(err, SDM_E_FORMAT, "truncated: only %llu bytes", (unsigned long long)size);
+    const uint64_t version = load_le(head + 8, 4), count = load_le(head + 12, 4),
+                   length = load_le(head + 16, 8);
     if (version > SDM_CONTAINER_VERSION && version < 1000)
         return sdm_fail(
             err, SDM_E_FORMAT,
@@ -113,36 +112,55 @@ sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *s
 
     // sizes, checksum of the header
     if (length != size)
-        return sdm_fail(err, SDM_E_FORMAT, "%s: it has %zu bytes, its header gives %llu",
-                        size < length ? "truncated" : "damaged", size, (unsigned long long)length);
+        return sdm_fail(err, SDM_E_FORMAT, "%s: it has %llu bytes, its header gives %llu",
+                        size < length ? "truncated" : "damaged", (unsigned long long)size,
+                        (unsigned long long)length);
     if (count < 1 || count > SDM_CONTAINER_MAX_SECTIONS)
         return sdm_fail(err, SDM_E_FORMAT, "damaged: %llu sections", (unsigned long long)count);
     const size_t table_end = HEADER_BYTES + (size_t)count * ENTRY_BYTES;
     if (table_end + 16 > size)
         return sdm_fail(err, SDM_E_FORMAT, "truncated: the table of sections is not complete");
-    if (load_le(bytes + table_end, 8) != sdm_crc64(0, bytes, table_end))
+    if (load_le(head + table_end, 8) != sdm_crc64(0, head, table_end))
         return sdm_fail(err, SDM_E_FORMAT, "damaged: the checksum of the header is wrong");
 
     // sections: aligned, in ascending order without overlap, inside the file
     uint64_t end = table_end + 8;
     for (size_t i = 0; i < count; i++) {
-        const uint8_t *entry = bytes + HEADER_BYTES + i * ENTRY_BYTES;
-        const uint64_t at = load_le(entry + 24, 8), bytes_here = load_le(entry + 32, 8);
-        memcpy(names[i], entry, NAME_BYTES);
-        if (names[i][NAME_BYTES - 1])
+        const uint8_t *entry = head + HEADER_BYTES + i * ENTRY_BYTES;
+        sdm_section_place *p = &places[i];
+        p->at = load_le(entry + 24, 8), p->size = load_le(entry + 32, 8);
+        p->checksum = load_le(entry + 40, 8);
+        memcpy(p->name, entry, NAME_BYTES);
+        if (p->name[NAME_BYTES - 1])
             return sdm_fail(err, SDM_E_FORMAT, "damaged: the name of section %zu does not end", i);
-        if (at % ALIGN || at < end || at > size - 8 || bytes_here > size - 8 - at)
+        if (p->at % ALIGN || p->at < end || p->at > size - 8 || p->size > size - 8 - p->at)
             return sdm_fail(err, SDM_E_FORMAT, "damaged: section '%s' lies outside the file",
-                            names[i]);
-        end = at + bytes_here;
-        if (load_le(entry + 40, 8) != sdm_crc64(0, bytes + at, (size_t)bytes_here))
+                            p->name);
+        end = p->at + p->size;
+    }
+    *n = (size_t)count;
+    return SDM_OK;
+}
+
+sdm_status sdm_container_parse(const uint8_t *bytes, size_t size, sdm_section *sections,
+                               char names[SDM_CONTAINER_MAX_SECTIONS][24], size_t *n,
+                               uint64_t *checksum, sdm_error *err)
+{
+    sdm_section_place places[SDM_CONTAINER_MAX_SECTIONS];
+    size_t count;
+    const sdm_status s = sdm_container_places(bytes, size, places, &count, err);
+    if (s) return s;
+    for (size_t i = 0; i < count; i++) {
+        const sdm_section_place *p = &places[i];
+        memcpy(names[i], p->name, NAME_BYTES);
+        if (p->checksum != sdm_crc64(0, bytes + p->at, (size_t)p->size))
             return sdm_fail(err, SDM_E_FORMAT, "damaged: the checksum of section '%s' is wrong",
                             names[i]);
-        sections[i] = (sdm_section){names[i], bytes + at, (size_t)bytes_here};
+        sections[i] = (sdm_section){names[i], bytes + p->at, (size_t)p->size};
     }
     *checksum = load_le(bytes + size - 8, 8);
     if (*checksum != sdm_crc64(0, bytes, size - 8))
         return sdm_fail(err, SDM_E_FORMAT, "damaged: the checksum of the file is wrong");
-    *n = (size_t)count;
+    *n = count;
     return SDM_OK;
 }

@@ -36,6 +36,8 @@ documented 'shapes NAME' sdmgen shapes cochlea --json
 documented 'shapes new' sdmgen shapes new knob --json
 documented 'shapes check' sdmgen shapes check torus --samples 4 --json
 documented generate sdmgen generate "$model" --measure --json
+documented dataset sdmgen dataset "$source_folder/tests/cli/tiny.yaml" data.static=1 -o shards --maps 1 --json -q
+documented 'train --plan' sdmgen train "$source_folder/tests/cli/tiny.yaml" --plan --json -q
 documented verify sdmgen verify map.nrrd --json
 documented phantom sdmgen phantom --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 --spacing 0.8 -o ct.nii --label label.nii --json
 sdmgen info ct.nii --json | grep -q volume_mm3 && bad 'an image of a scanner has a volume'

@@ -49,7 +49,7 @@ check() {
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
          own("all", "sdmgen") # the header that includes all public ones
-         own("trainer", "ssm_build train train_file verdict")
+         own("trainer", "map_store ssm_build train train_file train_plan verdict")
         parts("core", "core")
         parts("config", "core config")
         parts("geom", "core geom")
@@ -65,7 +65,7 @@ check() {
         rooms("framework/nn/", "kernels onnx fine model pod template point sdmnn open")
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit/judge fit vdb")
-        rooms("trainer/", "numerics ssm data state pod fine template direct .")
+        rooms("trainer/", "numerics ssm data shards state pod fine template direct .")
         rooms("cli/", "args slicer report inputs measure shapes phantom fit cohort ssm study page .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", ". survey"); rooms("shapes/", ".")
         while ((getline line < files) > 0) {

@@ -6,13 +6,12 @@
 
 #include "sdm/internal/heap.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/sampling.h"
+#include "streams.h"
 
-sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
+sdm_status trainer_dataset_static(dataset *d, const sdm_config *config, sdm_error *err)
 {
-    // size of the static grid; a huge product is capped at SIZE_MAX / 64, which the memory check
-    // refuses
     d->n_static = config->data.n_static_counts ? 1 : 0;
-    const double bytes = config->data.memory_gb * 1e9;
     for (size_t i = 0; i < d->n_params && config->data.n_static_counts; i++) {
         const bool one_for_all = config->data.n_static_counts == 1;
         if (!one_for_all && config->data.n_static_counts != d->n_params)
@@ -26,6 +25,39 @@ sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_erro
         else
             d->n_static *= d->counts[i];
     }
+    return SDM_OK;
+}
+
+/* The grid is regular for every distribution: it is there to cover the range, which random shapes
+ * leave sparse at the ends. The points along a parameter include both ends of its range; a single
+ * point is the middle. */
+void trainer_dataset_static_params(const dataset *d, size_t k, double *p)
+{
+    for (size_t i = 0; i < d->n_params; i++) {
+        const size_t n = d->counts[i], at = k % n;
+        k /= n;
+        p[i] = n == 1 ? 0.5 * (d->min[i] + d->max[i])
+                      : d->min[i] + (d->max[i] - d->min[i]) * (double)at / (double)(n - 1);
+        if (at + 1 == n && n > 1) p[i] = d->max[i];
+    }
+}
+
+void trainer_dataset_holdout_params(const dataset *d, size_t k, double *p)
+{
+    sdm_sample_params(d->seed, STREAM_HOLDOUT, k, d->min, d->max, d->distribution, d->n_params, p);
+}
+
+void trainer_dataset_random_params(const dataset *d, uint64_t k, double *p)
+{
+    sdm_sample_params(d->seed, STREAM_TRAIN, k, d->min, d->max, d->distribution, d->n_params, p);
+}
+
+sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
+{
+    // the memory check refuses a static grid that is too large
+    const sdm_status counted = trainer_dataset_static(d, config, err);
+    if (counted) return counted;
+    const double bytes = config->data.memory_gb * 1e9;
     d->n_start = (size_t)config->data.start;
     d->n_online = (size_t)config->data.online;
     d->n_holdout = (size_t)config->data.holdout;

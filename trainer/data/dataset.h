@@ -5,6 +5,7 @@
 #pragma once
 
 #include "sample_plan.h"
+#include "sdm/internal/map_store.h"
 #include "sdm/internal/pod.h"
 #include "sdm/internal/train.h"
 
@@ -29,6 +30,7 @@ typedef struct dataset {
     /* Maps that need not be made again: those of another data set of the same shape, grid, target,
        blocks and seed; NULL: none. */
     const struct dataset *known;
+    const sdm_map_store *store; /* exact maps that are in files already; NULL: none */
     const sdm_pod_block *blocks;
     size_t n_blocks, n_voxels, n_params; /* n_voxels: of the maps that the network learns */
     double min[SDM_POD_MAX_PARAMS], max[SDM_POD_MAX_PARAMS];
@@ -55,6 +57,16 @@ typedef struct dataset {
    maps before training. Call trainer_dataset_dispose() also after an error. */
 sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_error *err);
 void trainer_dataset_dispose(dataset *d);
+
+/* Sets counts and n_static from the configuration; a product beyond SIZE_MAX / 64 is that.
+   SDM_E_CONFIG: the number of counts does not fit n_params. */
+sdm_status trainer_dataset_static(dataset *d, const sdm_config *config, sdm_error *err);
+
+/* p[n_params] = parameters of held-out map k, of map k of the static grid, of random map k (point k
+   of the sequence). They depend on k, the parameter space, the seed and counts alone. */
+void trainer_dataset_holdout_params(const dataset *d, size_t k, double *p);
+void trainer_dataset_static_params(const dataset *d, size_t k, double *p);
+void trainer_dataset_random_params(const dataset *d, uint64_t k, double *p);
 
 /* The parameter space of the random samples; its pointers refer to d. */
 sample_space trainer_dataset_space(const dataset *d);

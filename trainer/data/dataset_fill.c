@@ -4,24 +4,8 @@
 #include <stdatomic.h>
 #include <string.h>
 
-#include "sdm/internal/sampling.h"
 #include "sdm/internal/threads.h"
-#include "streams.h"
 #include "workbench.h"
-
-/* Parameters p[n_params] of point `index` of the static grid: the points along a parameter include
- * both ends of its range; a single point is the middle. The grid is regular for every distribution:
- * it is there to cover the range, which random shapes leave sparse at the ends. */
-static void static_params(const dataset *d, size_t index, double *p)
-{
-    for (size_t i = 0; i < d->n_params; i++) {
-        const size_t n = d->counts[i], k = index % n;
-        index /= n;
-        p[i] = n == 1 ? 0.5 * (d->min[i] + d->max[i])
-                      : d->min[i] + (d->max[i] - d->min[i]) * (double)k / (double)(n - 1);
-        if (k + 1 == n && n > 1) p[i] = d->max[i];
-    }
-}
 
 /* Copies held-out map `index` from d->known; false: it is not there. */
 static bool take_holdout(const dataset *d, size_t index, const double *p)
@@ -71,8 +55,7 @@ sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hoo
             sdm_status s = made;
             if (!s && at < d->n_holdout) {
                 double *p = d->holdout_params + at * d->n_params;
-                sdm_sample_params(d->seed, STREAM_HOLDOUT, at, d->min, d->max, d->distribution,
-                                  d->n_params, p);
+                trainer_dataset_holdout_params(d, at, p);
                 if (!take_holdout(d, at, p))
                     s = trainer_workbench_map(&w, d, p, d->holdout + at * d->n_voxels, &mine);
             } else if (!s) {
@@ -80,10 +63,9 @@ sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hoo
                 const size_t slot = at - d->n_holdout;
                 double *p = d->params + slot * d->n_params;
                 if (slot < d->n_static)
-                    static_params(d, slot, p);
+                    trainer_dataset_static_params(d, slot, p);
                 else
-                    sdm_sample_params(d->seed, STREAM_TRAIN, slot - d->n_static, d->min, d->max,
-                                      d->distribution, d->n_params, p);
+                    trainer_dataset_random_params(d, slot - d->n_static, p);
                 if (slot < d->n_static || !take_random(d, slot, slot - d->n_static, p))
                     s = trainer_workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels,
                                                      &d->scale[slot], &mine);

@@ -4,9 +4,7 @@
 #include <pthread.h>
 #include <string.h>
 
-#include "sdm/internal/sampling.h"
 #include "sdm/memory.h"
-#include "streams.h"
 #include "workbench.h"
 
 /* Finished samples wait in a window between the workers and the trainer: sample i in place i mod
@@ -51,8 +49,7 @@ static void *worker_run(void *user)
         pthread_mutex_unlock(&p->lock);
         // compute it without the lock
         double *params = p->params + place * d->n_params;
-        sdm_sample_params(d->seed, STREAM_TRAIN, trainer_sample_plan_point(&d->plan, index), d->min,
-                          d->max, d->distribution, d->n_params, params);
+        trainer_dataset_random_params(d, trainer_sample_plan_point(&d->plan, index), params);
         const sdm_status s =
             made ? made
                  : trainer_workbench_packed_map(&w, d, params, p->maps + place * d->n_voxels,

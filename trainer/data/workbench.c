@@ -1,4 +1,4 @@
-/* Computes exact maps, one at a time. */
+/* Computes exact maps, one at a time, or takes them from the store. */
 #include "workbench.h"
 
 #include <math.h>
@@ -21,7 +21,8 @@ void trainer_workbench_dispose(workbench *w)
     *w = (workbench){0};
 }
 
-sdm_status trainer_workbench_exact(workbench *w, const dataset *d, const double *p, sdm_error *err)
+/* Computes the map that w->exact is to hold. */
+static sdm_status make_exact(workbench *w, const dataset *d, const double *p, sdm_error *err)
 {
     sdm_status s = sdm_instance_mesh(d->shape, p, &w->mesh, err);
     if (s) return s;
@@ -30,7 +31,16 @@ sdm_status trainer_workbench_exact(workbench *w, const dataset *d, const double 
     s = sdm_exact_create(&w->mesh, &opts, &exact, err);
     if (!s) s = sdm_exact_map(exact, d->grid, w->exact, err);
     sdm_exact_free(exact);
-    if (s) return sdm_fail_in(err, s, "shape '%s'", sdm_instance_shape(d->shape)->name);
+    return s ? sdm_fail_in(err, s, "shape '%s'", sdm_instance_shape(d->shape)->name) : SDM_OK;
+}
+
+sdm_status trainer_workbench_exact(workbench *w, const dataset *d, const double *p, sdm_error *err)
+{
+    bool found = false;
+    sdm_status s = SDM_OK;
+    if (d->store) s = sdm_map_store_read(d->store, p, w->exact, &found, err);
+    if (!s && !found) s = make_exact(w, d, p, err);
+    if (s) return s;
     w->inside = false;
     for (size_t i = 0, n = sdm_grid_count(d->grid); i < n; i++) w->inside |= w->exact[i] < 0;
     return SDM_OK;

@@ -16,7 +16,8 @@ typedef struct workbench {
 sdm_status trainer_workbench_create(workbench *w, const dataset *d, sdm_error *err);
 void trainer_workbench_dispose(workbench *w);
 
-/* Sets w->exact and w->inside: the exact map of the shape at p[n_params], mm. One thread. */
+/* Sets w->exact and w->inside: the exact map of the shape at p[n_params], mm, from d->store where
+   it has the map. One thread. */
 sdm_status trainer_workbench_exact(workbench *w, const dataset *d, const double *p, sdm_error *err);
 
 /* blocked[n_voxels] = the map that the network learns (the exact map, or d->target) at p[n_params]

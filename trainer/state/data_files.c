@@ -1,4 +1,4 @@
-/* The data files of the shape: their checksums, and their copies in the folder of the run. */
+/* Copies of the data files of the shape in the folder of the run. */
 #include "data_files.h"
 
 #include <stdio.h>
@@ -25,21 +25,24 @@ static uint32_t option_count(const trainer *t)
     return n < SDM_MAX_OPTIONS ? n : SDM_MAX_OPTIONS;
 }
 
-void trainer_data_files_sum(trainer *t)
-{
-    for (uint32_t i = 0; i < option_count(t); i++) {
-        const char *path = file_of(t, i);
-        if (!path || sdm_file_checksum(path, &t->file_sums[i], NULL)) t->file_sums[i] = 0;
-    }
-}
-
-void trainer_data_file_name(const trainer *t, uint32_t option, char name[TRAINER_DATA_FILE_MAX])
+static void name_copy(const trainer *t, uint32_t option, char name[TRAINER_DATA_FILE_MAX])
 {
     const char *path = file_of(t, option), *slash = strrchr(path, '/');
     const char *ending = strchr(slash ? slash + 1 : path, '.');
     if (ending && strlen(ending) > 32) ending = strrchr(ending, '.');
     snprintf(name, TRAINER_DATA_FILE_MAX, "shape.%s%.32s",
              sdm_instance_shape(t->shape)->options[option].name, ending ? ending : "");
+}
+
+void trainer_data_file_names(const trainer *t, char (*names)[TRAINER_DATA_FILE_MAX],
+                             const char **file)
+{
+    for (uint32_t i = 0; i < option_count(t); i++) {
+        file[i] = NULL;
+        if (!file_of(t, i)) continue;
+        name_copy(t, i, names[i]);
+        file[i] = names[i];
+    }
 }
 
 static sdm_status copy_file(const char *from, const char *to, uint64_t wanted, sdm_error *err)
@@ -62,7 +65,7 @@ sdm_status trainer_data_files_copy(const trainer *t, sdm_error *err)
     for (uint32_t i = 0; i < option_count(t) && !s; i++) {
         char name[TRAINER_DATA_FILE_MAX], path[SDM_PATH_TEXT_MAX + TRAINER_DATA_FILE_MAX];
         if (!file_of(t, i)) continue;
-        trainer_data_file_name(t, i, name);
+        name_copy(t, i, name);
         snprintf(path, sizeof path, "%s/%s", t->folder, name);
         if (t->file_sums[i])
             s = copy_file(file_of(t, i), path, t->file_sums[i], err);

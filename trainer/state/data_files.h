@@ -4,17 +4,15 @@
 
 #include "trainer.h"
 
-/* Length of a name by trainer_data_file_name(), with its zero byte. */
+/* Length of the name of a copy, with its zero byte. */
 #define TRAINER_DATA_FILE_MAX (2 * SDM_NAME_MAX + 16)
 
-/* t->file_sums = checksums of the data files. One that cannot be read has the checksum 0 and is not
-   copied, which is no error: an option of a plug-in may name a folder, for example. */
-void trainer_data_files_sum(trainer *t);
+/* names[SDM_MAX_OPTIONS] = those of the copies, "shape.OPTION" and the ending of the file, for
+   example "shape.mean.ply"; file[i] = names[i], NULL if option i is no file or names none. */
+void trainer_data_file_names(const trainer *t, char (*names)[TRAINER_DATA_FILE_MAX],
+                             const char **file);
 
-/* name = that of the copy of option number `option`, which is the path of a file: "shape.OPTION"
-   and the ending of the file, for example "shape.mean.ply". */
-void trainer_data_file_name(const trainer *t, uint32_t option, char name[TRAINER_DATA_FILE_MAX]);
-
-/* Writes the copies; one that is there already stays. SDM_E_IO, SDM_E_NOMEM; SDM_E_FORMAT: a file
-   has changed since trainer_data_files_sum(). */
+/* Writes the copies of the files with a checksum in t->file_sums; one that is there already stays.
+   One without a checksum is not copied, which is no error: an option of a plug-in may name a folder,
+   for example. SDM_E_IO, SDM_E_NOMEM; SDM_E_FORMAT: a file does not have its checksum any more. */
 sdm_status trainer_data_files_copy(const trainer *t, sdm_error *err);

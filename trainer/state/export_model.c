@@ -18,6 +18,7 @@
 #include "sdm/internal/near.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
+#include "shards/option_texts.h"
 
 static int compare_doubles(const void *a, const void *b)
 {
@@ -146,43 +147,9 @@ static sdm_status check_texts(const trainer *t, sdm_error *err)
 
 sdm_status trainer_export_prepare(trainer *t, sdm_error *err)
 {
-    trainer_data_files_sum(t);
+    // the model stores them, so that the exact engine cannot be used with other files later
+    trainer_option_sums(t->shape, t->file_sums);
     return check_texts(t, err);
-}
-
-/* Every option of the shape as text, so that the model file can be used without the configuration.
-   The value of a file option is the name of the copy beside the model, followed by an entry
-   NAME.crc64 with its checksum. */
-typedef struct option_texts {
-    const char *names[2 * SDM_MAX_OPTIONS], *values[2 * SDM_MAX_OPTIONS];
-    char files[SDM_MAX_OPTIONS][TRAINER_DATA_FILE_MAX];
-    char texts[SDM_MAX_OPTIONS][32];              // texts of numbers and of checksums
-    char sums[SDM_MAX_OPTIONS][SDM_NAME_MAX + 8]; // names of the checksum entries
-    size_t n;
-} option_texts;
-
-static void collect_options(const trainer *t, option_texts *o)
-{
-    const sdm_shape *shape = sdm_instance_shape(t->shape);
-    const sdm_option_value *v = sdm_instance_options(t->shape);
-    for (uint32_t i = 0; i < shape->n_options && i < SDM_MAX_OPTIONS; i++) {
-        const sdm_option *option = &shape->options[i];
-        o->names[o->n] = option->name;
-        const char **value = &o->values[o->n++];
-        if (option->type == SDM_OPTION_FILE) {
-            if (v[i].text[0]) trainer_data_file_name(t, i, o->files[i]);
-            *value = o->files[i];
-        } else if (option->type == SDM_OPTION_CHOICE) {
-            *value = v[i].text;
-        } else {
-            *value = sdm_format_real(v[i].number, o->texts[i]);
-        }
-        if (!t->file_sums[i]) continue;
-        snprintf(o->sums[i], sizeof o->sums[i], "%s.crc64", option->name);
-        snprintf(o->texts[i], sizeof o->texts[i], "%016llx", (unsigned long long)t->file_sums[i]);
-        o->names[o->n] = o->sums[i];
-        o->values[o->n++] = o->texts[i];
-    }
 }
 
 /* loss.png, from the lines of metrics.jsonl. */
@@ -223,10 +190,10 @@ sdm_status trainer_export_config(const trainer *t, sdm_outfile **out, sdm_error 
     return s;
 }
 
-/* Fills params[P], *options and *info with the description of shape, grid and training for the
+/* file: names of the data files, see trainer_option_texts(). Fills params[P], *options and *info with the description of shape, grid and training for the
  * model file. The pointers in *info refer to the other arguments. */
-static void describe_model(const trainer *t, const sdm_text *config, option_texts *options,
-                           sdm_model_param *params, sdm_model_info *info)
+static void describe_model(const trainer *t, const sdm_text *config, const char *const *file,
+                           option_texts *options, sdm_model_param *params, sdm_model_info *info)
 {
     size_t n;
     const sdm_param *p = sdm_instance_params(t->shape, &n);
@@ -238,7 +205,7 @@ static void describe_model(const trainer *t, const sdm_text *config, option_text
         params[i].def = fmin(fmax(p[i].def, params[i].min), params[i].max);
         params[i].distribution = t->data.distribution[i];
     }
-    collect_options(t, options);
+    trainer_option_texts(t->shape, t->file_sums, file, options);
     *info = (sdm_model_info){.n_params = n,
                              .params = params,
                              .n_options = options->n,
@@ -256,6 +223,8 @@ static void describe_model(const trainer *t, const sdm_text *config, option_text
 /* The texts and numbers of a model file, and the memory they point to. */
 typedef struct description {
     sdm_text config;
+    char names[SDM_MAX_OPTIONS][TRAINER_DATA_FILE_MAX];
+    const char *file[SDM_MAX_OPTIONS];
     option_texts options;
     sdm_model_param params[SDM_POD_MAX_PARAMS];
     sdm_model_info info;
@@ -267,8 +236,9 @@ static sdm_status description_create(const trainer *t, description **out, sdm_er
     sdm_status s = SDM_ALLOC(&d, 1, "description of the model", err);
     if (s) return s;
     *out = d;
+    trainer_data_file_names(t, d->names, d->file);
     if (!(s = trainer_export_dump(t, &d->config, err)))
-        describe_model(t, &d->config, &d->options, d->params, &d->info);
+        describe_model(t, &d->config, d->file, &d->options, d->params, &d->info);
     return s;
 }
 

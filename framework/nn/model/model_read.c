@@ -152,6 +152,9 @@ sdm_status sdm_model_read(uint8_t *bytes, size_t size, const sdm_model_kind *con
     if (!s && meta && sdm_section_find(sections, n, "checkpoint"))
         s = sdm_fail(err, SDM_E_FORMAT,
                      "a checkpoint, not a finished model: go on with `sdmgen train --resume`");
+    if (!s && sdm_section_find(sections, n, "shard"))
+        s = sdm_fail(err, SDM_E_FORMAT,
+                     "a shard of maps, not a model: `sdmgen train --dataset` takes its folder");
     if (!s && (!meta || !config))
         s = sdm_fail(err, SDM_E_FORMAT, "damaged: a section of a model is missing");
 

@@ -1,5 +1,5 @@
-/* The file format of models and checkpoints: named sections, 64-byte aligned, with one checksum for
-   each and one for the whole file. Little-endian:
+/* The file format of models, checkpoints and shards of maps: named sections, 64-byte aligned, with
+   one checksum for each and one for the whole file. Little-endian:
 
      offset 0   "SDMGEN\r\n"   8 bytes; a transfer as text changes the line end and is detected
             8   version        u32, SDM_CONTAINER_VERSION
@@ -38,6 +38,22 @@ sdm_status sdm_container_build(const sdm_section *sections, size_t n, uint8_t **
 /* Writes a built file to `path` atomically: after an error (SDM_E_IO, SDM_E_NOMEM) an existing file
    is unchanged. [any thread] */
 sdm_status sdm_container_write(const char *path, const uint8_t *bytes, size_t size, sdm_error *err);
+
+/* Bytes at the beginning of a file that hold its header with any table. */
+#define SDM_CONTAINER_HEAD_BYTES (24 + 48 * SDM_CONTAINER_MAX_SECTIONS + 8)
+
+/* Where a section lies in the file, and the checksum that its content has. */
+typedef struct sdm_section_place {
+    char name[24]; /* zero-terminated */
+    uint64_t at, size, checksum;
+} sdm_section_place;
+
+/* Reads header and table of a file of `size` bytes from its first bytes, `head`, at least the
+   smaller of `size` and SDM_CONTAINER_HEAD_BYTES: sets *n and places[0 .. *n - 1]; places[] has
+   room for SDM_CONTAINER_MAX_SECTIONS. The contents are not looked at. SDM_E_FORMAT as
+   sdm_container_parse(). [any thread] */
+sdm_status sdm_container_places(const uint8_t *head, uint64_t size, sdm_section_place *places,
+                                size_t *n, sdm_error *err);
 
 /* Parses the file bytes[size], 64-byte aligned: sets *n, *checksum (the one in the last 8 bytes),
    and sections[0 .. *n - 1], whose data point into `bytes` and whose names point into names[].

@@ -3,6 +3,7 @@
 
 #include "sdm/exact.h"
 #include "sdm/internal/config.h"
+#include "sdm/internal/map_store.h"
 #include "sdm/internal/mistakes.h"
 #include "sdm/internal/verdict.h"
 #include "sdm/model.h"
@@ -45,7 +46,7 @@ typedef struct sdm_progress {
     double seconds, seconds_left; /* of the run; NaN: not known */
 } sdm_progress;
 
-/* Callbacks of the caller; each may be NULL. */
+/* Callbacks and maps of the caller; each may be NULL. */
 typedef struct sdm_train_hooks {
     /* Called by the training thread about 10 times a second at most. */
     void (*progress)(void *user, const sdm_progress *p);
@@ -56,6 +57,9 @@ typedef struct sdm_train_hooks {
     /* The same with a warning: the result is probably not what the user wants. NULL: message. */
     void (*warning)(void *user, const char *line);
     void *user;
+    /* Maps that need not be made, of this configuration; NULL: none. The result has the same bits.
+     */
+    const sdm_map_store *store;
 } sdm_train_hooks;
 
 typedef struct sdm_train_report {

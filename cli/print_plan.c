@@ -1,0 +1,141 @@
+/* Prints the plan of a training, as text or JSON. */
+#include "print_plan.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "report/terminal.h"
+
+enum { NODES_MAX = 1024 };
+
+/* Writes a number of bytes as "2.1 GB" into buf; returns buf. */
+static const char *format_bytes(double bytes, char buf[32])
+{
+    static const char *const units[] = {"B", "kB", "MB", "GB", "TB", "PB"};
+    size_t unit = 0;
+    for (; bytes >= 999.5 && unit + 1 < sizeof units / sizeof *units; unit++) bytes /= 1000;
+    snprintf(buf, 32, "%.3g %s", bytes, units[unit]);
+    return buf;
+}
+
+/* Writes a time as "12 s", "3.5 min" or "2.1 h" into buf; returns buf. */
+static const char *format_seconds(double seconds, char buf[32])
+{
+    if (seconds < 120)
+        snprintf(buf, 32, "%.3g s", seconds);
+    else if (seconds < 7200)
+        snprintf(buf, 32, "%.3g min", seconds / 60);
+    else
+        snprintf(buf, 32, "%.3g h", seconds / 3600);
+    return buf;
+}
+
+static double total_seconds(const sdm_train_work *w, int nodes, int cores)
+{
+    sdm_train_plan plan;
+    sdm_train_plan_make(w, nodes, cores, &plan);
+    return plan.all_seconds;
+}
+
+static void print_stages(const sdm_train_work *w, const sdm_train_plan *p)
+{
+    char time[32], bytes[32], count[64];
+    printf("  %-8s %-22s %10s  %s\n", "stage", "work", "time", "received by a node");
+    for (int i = 0; i < SDM_PLAN_STAGES; i++) {
+        const double n = i == SDM_PLAN_MAPS     ? w->n_maps + w->n_holdout
+                         : i == SDM_PLAN_FIT    ? w->steps
+                         : i == SDM_PLAN_REFINE ? w->refine_steps
+                                                : 0;
+        if (!(p->seconds[i] > 0)) continue;
+        char words[32] = "";
+        if (n > 0)
+            snprintf(words, sizeof words, "%.20s %s", cli_format_count((int64_t)n, count),
+                     i == SDM_PLAN_MAPS ? "maps" : "steps");
+        printf("  %-8s %-22s %10s  %s\n", sdm_plan_stage_name((sdm_plan_stage)i), words,
+               format_seconds(p->seconds[i], time), format_bytes(p->received[i], bytes));
+    }
+    printf("  %-8s %-22s %10s  %s\n", "all", "", format_seconds(p->all_seconds, time),
+           format_bytes(p->all_received, bytes));
+}
+
+static void print_text(const sdm_train_work *w, const sdm_train_plan *p, int nodes, int cores)
+{
+    char a[32], b[32], c[32];
+    const int pays = sdm_train_plan_pays(w, cores);
+    printf("plan for %d %s of %d cores, from %.2g s on %d threads of this machine: %.3g exact maps "
+           "a second on a core",
+           nodes, nodes == 1 ? "node" : "nodes", cores, w->measured_seconds, w->threads,
+           1 / w->map);
+    if (w->fit_step > 0) printf(", %.3g steps a second on a core", 1 / w->fit_step);
+    printf("\n");
+    print_stages(w, p);
+    printf("  memory   %s on each node\n", format_bytes(p->memory, a));
+    printf("  files    model %s, checkpoint up to %s; all maps would take %s if they were kept "
+           "(sdmgen dataset)\n",
+           format_bytes(p->model, a), format_bytes(p->checkpoint, b), format_bytes(p->dataset, c));
+    printf("  nodes    1: %s", format_seconds(total_seconds(w, 1, cores), a));
+    for (int n = 2; n <= 2 * pays && n <= NODES_MAX; n *= 2)
+        printf(", %d: %s", n, format_seconds(total_seconds(w, n, cores), a));
+    if (pays == 1)
+        printf("; more than one does not pay: two are less than 1.5 times as fast\n");
+    else
+        printf("; it pays up to %d: twice as many are less than 1.5 times as fast\n", pays);
+}
+
+static sdm_status print_json(const sdm_train_work *w, const sdm_train_plan *p, int nodes, int cores,
+                             sdm_error *err)
+{
+    sdm_json j = {0};
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_int(&j, "nodes", nodes);
+    sdm_json_int(&j, "cores", cores);
+    sdm_json_real(&j, "seconds", p->all_seconds);
+    sdm_json_real(&j, "received_bytes", p->all_received);
+    sdm_json_open(&j, "stages", '[');
+    for (int i = 0; i < SDM_PLAN_STAGES; i++) {
+        sdm_json_open(&j, NULL, '{');
+        sdm_json_text(&j, "stage", sdm_plan_stage_name((sdm_plan_stage)i));
+        sdm_json_real(&j, "seconds", p->seconds[i]);
+        sdm_json_real(&j, "received_bytes", p->received[i]);
+        sdm_json_close(&j, '}');
+    }
+    sdm_json_close(&j, ']');
+    sdm_json_int(&j, "maps", (int64_t)w->n_maps);
+    sdm_json_int(&j, "heldout", (int64_t)w->n_holdout);
+    sdm_json_int(&j, "steps", (int64_t)w->steps);
+    sdm_json_int(&j, "refine_steps", (int64_t)w->refine_steps);
+    sdm_json_real(&j, "memory_bytes", p->memory);
+    sdm_json_real(&j, "model_bytes", p->model);
+    sdm_json_real(&j, "checkpoint_bytes", p->checkpoint);
+    sdm_json_real(&j, "dataset_bytes", p->dataset);
+    sdm_json_real(&j, "maps_per_core_second", 1 / w->map);
+    sdm_json_real(&j, "steps_per_core_second", w->fit_step > 0 ? 1 / w->fit_step : NAN);
+    sdm_json_real(&j, "measured_seconds", w->measured_seconds);
+    sdm_json_int(&j, "pays_to_nodes", sdm_train_plan_pays(w, cores));
+    sdm_json_open(&j, "scaling", '[');
+    for (int n = 1; n <= NODES_MAX; n *= 2) {
+        sdm_json_open(&j, NULL, '{');
+        sdm_json_int(&j, "nodes", n);
+        sdm_json_real(&j, "seconds", total_seconds(w, n, cores));
+        sdm_json_close(&j, '}');
+    }
+    sdm_json_close(&j, ']');
+    sdm_json_close(&j, '}');
+    return cli_print_json(&j, err);
+}
+
+sdm_status cli_plan_training(const cli_args *args, const sdm_config *config,
+                             const sdm_instance *shape, sdm_error *err)
+{
+    const sdm_train_hooks hooks = {.cancelled = cli_interrupted};
+    sdm_train_work work;
+    sdm_train_plan plan;
+    const sdm_status s = sdm_train_measure(config, shape, &hooks, &work, err);
+    if (s) return s;
+    const int nodes = args->nodes ? (int)args->nodes : 1,
+              cores = args->cores ? (int)args->cores : work.threads;
+    sdm_train_plan_make(&work, nodes, cores, &plan);
+    if (args->json) return print_json(&work, &plan, nodes, cores, err);
+    print_text(&work, &plan, nodes, cores);
+    return SDM_OK;
+}

@@ -1,0 +1,47 @@
+#!/usr/bin/env bash
+# sdmgen train --plan: time, memory and bytes of a training on several nodes; nothing is trained or written.
+# Tests: plan_costs.c plan_measure.c print_plan.c
+. "$(dirname "$0")/common.sh"
+coarse_grids=yes
+export OMP_WAIT_POLICY=passive
+tiny=$source_folder/tests/cli/tiny.yaml
+
+# equal A B: fails unless the numbers agree to 1e-9 of them
+equal() { awk -v a="$1" -v b="$2" 'BEGIN { d = a - b; exit !(a != "" && d * d <= 1e-18 * b * b) }' || bad "$1 is not $2"; }
+
+# tiny.yaml: 2688 voxels, 4 parameters; 16 + 96 + 64 maps, 8 held out; 60 steps, of which 0.4 refine; a model of 16 units and modes.
+expect 0 - sdmgen train "$tiny" --plan --nodes 4 --cores 8 --json -q
+[ "$(ls)" = 'err
+out' ] || bad "something was written: $(ls)"
+[ "$(json maps)/$(json heldout)/$(json steps)/$(json refine_steps)" = 176/8/36/24 ] || bad "work: $(cat out)"
+grep -o '"stage": "[a-z]*", "seconds": [^,]*, "received_bytes": [0-9.e+]*' out | sed 's/[",]//g' | awk '{ print $2, $4, $6 }' >stages
+[ "$(cut -d' ' -f1 stages | tr '\n' ' ')" = 'design maps bases modes fit refine ' ] || bad "stages: $(cat out)"
+read -r all_seconds all_bytes <<<"$(sed 's/.*"cores": 8, "seconds": \([^,]*\), "received_bytes": \([^,]*\),.*/\1 \2/' out)"
+equal "$all_seconds" "$(awk '{ s += $2 } END { printf "%.17g", s }' stages)"
+equal "$all_bytes" "$(awk '{ s += $3 } END { printf "%.17g", s }' stages)"
+bytes() { awk -v name="$1" '$1 == name { print $3 }' stages; }
+equal "$(bytes maps)" $(((176 * (2 * 2688 + 8 * 4 + 4) + 8 * (4 * 2688 + 8 * 4)) * 3 / 4))
+# 14 inputs (degree 2), one layer: weights and biases of 16 units, 16 modes
+equal "$(bytes fit)" $((36 * (16 * (8 + 4 * 16 + 8 * 16) + 4 * (15 * 16 + 16 * 16)) * 3 / 4))
+equal "$(json dataset_bytes)" $((184 * (4 * 2688 + 8 * 4 + 8)))
+awk '$1 != "design" && !($2 > 0) { exit 1 }' stages || bad "times: $(cat stages)"
+[ "$(grep -o '"nodes": [0-9]*, "seconds"' out | wc -l)" -eq 11 ] || bad "scaling: $(cat out)"
+
+# On one node nothing is sent. A template has a design, and by default no perceptron.
+cat >template.yaml <<'END'
+shape: {name: ellipsoid}
+grid: {size: [14, 12, 12], spacing: 1}
+network: {kind: template}
+data: {static: 2, online: 16, start: 24, holdout: 4}
+train: {steps: 20, batch: 4}
+END
+expect 0 - sdmgen train template.yaml --plan -q
+has '^plan for 1 node of [0-9]+ cores, from [0-9.]+ s on '
+has '^  maps     52 maps +[0-9.e-]+ s  0 B$'
+has '^  design  '
+has '^  refine   20 steps '
+has '^  nodes    1: '
+has '; (more than one does not pay|it pays up to [0-9]+)'
+expect 2 '--nodes and --cores belong to --plan' sdmgen train "$tiny" --nodes 2
+expect 2 "'0'" sdmgen train "$tiny" --plan --nodes 0
+finish

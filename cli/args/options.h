@@ -148,6 +148,7 @@ struct cli_args {
     double isolate_seconds, isolate_memory; /* s, GB; 0: option missing */
     int64_t threads, seed;
     bool resume;                     /* train */
+    int64_t ranks;                   /* train; 0: option missing */
     bool force;                      /* train, experiment, fit */
     bool dense, half;                /* generate, exact, fit: .vdb */
     bool keep_overlap, certify;      /* exact */

@@ -192,13 +192,13 @@ static double mode_fit_fraction(const pod_state *pod)
         return (double)t->phase_step / fmax(steps, 1);
     }
     const double length = pod->mode_fit_end - t->phase_started;
-    return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
+    return length > 0 ? (trainer_shared_seconds(t) - t->phase_started) / length : 1;
 }
 
 /* Measures the averaged weights on the held-out maps and adds a line to the metrics. */
 static sdm_status evaluate(pod_state *pod, mode_batch *b, size_t batch, double rate, sdm_error *err)
 {
-    const double began = trainer_seconds(pod->t);
+    const double began = trainer_shared_seconds(pod->t);
     trainer_evaluated(pod->t, modes_evaluate(pod, pod->mode_fit.average, b, batch), began);
     return trainer_metric(pod->t, rate, err);
 }
@@ -218,7 +218,7 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
     while (!s && at < 1 && !done) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
-        if (trainer_cancelled(t)) {
+        if (trainer_all_cancelled(t)) {
             s = trainer_stop(t, err);
             break;
         }
@@ -237,7 +237,7 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
             break;
         }
         // evaluate, report, save
-        const double now = trainer_seconds(t);
+        const double now = trainer_shared_seconds(t);
         if (trainer_evaluation_due(t, now)) {
             if ((s = evaluate(pod, &b, batch, rate, err))) break;
             if (trainer_evaluation_counts(t))

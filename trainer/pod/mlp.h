@@ -1,6 +1,8 @@
 /* The multi-layer perceptron of the `pod` network on batches: forward and backward pass. Letters: B
    batch, I inputs, W width. Results do not depend on n_threads, the number of threads of the
-   caller's team (sdm/internal/team.h). */
+   caller's team (sdm/internal/team.h).
+
+   Ranks (sdm/internal/comm.h) share a pass with the functions of mlp_ranks.h. */
 #pragma once
 
 #include "sdm/internal/pod.h"
@@ -18,7 +20,7 @@ const float *trainer_mlp_bias(const sdm_pod_arch *a, const float *weights, size_
 void trainer_mlp_init(const sdm_pod_arch *a, uint64_t seed, float *weights);
 
 /* Floats of workspace for a batch: activations and their derivatives for every layer, and two
-   buffers of the backward pass. */
+   buffers [B][W] of the backward pass. */
 size_t trainer_mlp_workspace(const sdm_pod_arch *a, size_t batch);
 
 /* Inputs x[B][I]. Returns the output h[B][W] of the last layer, which lies in the workspace. */

@@ -233,8 +233,7 @@ static sdm_status make_children(forked *f, sdm_error *err)
 static sdm_status share_memory(forked *f, sdm_error *err)
 {
     f->bytes = sizeof *f->common + (size_t)f->size * 2 * PIECE;
-    void *memory =
-        mmap(NULL, f->bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    void *memory = mmap(NULL, f->bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (memory == MAP_FAILED)
         return sdm_fail(err, SDM_E_NOMEM, "no memory to share between %d ranks", f->size);
     f->common = memory;

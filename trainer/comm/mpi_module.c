@@ -29,8 +29,7 @@ static bool gather(void *state, void *data, const size_t *at)
 {
     world *w = state;
     if (at[w->size] - at[0] > INT_MAX) {
-        for (int r = 0; r < w->size; r++)
-            broadcast(w, r, (char *)data + at[r], at[r + 1] - at[r]);
+        for (int r = 0; r < w->size; r++) broadcast(w, r, (char *)data + at[r], at[r + 1] - at[r]);
         return true;
     }
     for (int r = 0; r < w->size; r++) {

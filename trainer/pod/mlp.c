@@ -132,8 +132,8 @@ const float *trainer_mlp_forward_rows(const sdm_pod_arch *a, const float *weight
                            .h = outputs_of(a, batch, workspace, l),
                            .slope = slopes_of(a, batch, workspace, l)};
         sdm_gemm(rows.end - rows.first, w, k, (sdm_view){x + rows.first * k, k, 1},
-                 (sdm_view){trainer_mlp_layer(a, weights, l), 1, k}, false,
-                 loop.h + rows.first * w, w, n_threads);
+                 (sdm_view){trainer_mlp_layer(a, weights, l), 1, k}, false, loop.h + rows.first * w,
+                 w, n_threads);
         sdm_team_run(n_threads, n_slices(&loop, ROWS), activate_rows, &loop);
         x = loop.h;
     }
@@ -225,8 +225,7 @@ sdm_status trainer_mlp_gather_units(const sdm_pod_arch *a, sdm_comm *comm, float
         const size_t k = layer_inputs(a, l);
         float *dw = gradient + layer_offset(a, l);
         s = sdm_comm_gather_shares(comm, dw, a->width, k * sizeof *dw, err);
-        if (!s)
-            s = sdm_comm_gather_shares(comm, dw + k * a->width, a->width, sizeof *dw, err);
+        if (!s) s = sdm_comm_gather_shares(comm, dw + k * a->width, a->width, sizeof *dw, err);
     }
     return s;
 }

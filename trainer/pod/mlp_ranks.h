@@ -1,6 +1,7 @@
-/* Passes of a batch through the perceptron that ranks (sdm/internal/comm.h) share. In the forward and
-   backward pass each has rows of the batch, in the gradient by the weights each has units of every
-   layer: so each sum is that of one rank, in the order in which a single process computes it. */
+/* Passes of a batch through the perceptron that ranks (sdm/internal/comm.h) share. In the forward
+   and backward pass each has rows of the batch, in the gradient by the weights each has units of
+   every layer: so each sum is that of one rank, in the order in which a single process computes it.
+ */
 #pragma once
 
 #include "mlp.h"

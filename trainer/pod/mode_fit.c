@@ -56,8 +56,8 @@ static sdm_status mode_batch_create(const pod_state *pod, size_t rows, mode_batc
     return s;
 }
 
-/* predicted[B][R] = MLP and readout at x with weights w, in some rows. Returns h[B][W], the output of
- * the MLP. */
+/* predicted[B][R] = MLP and readout at x with weights w, in some rows. Returns h[B][W], the output
+ * of the MLP. */
 static const float *predict_rows(const pod_state *pod, const float *w, size_t batch, mlp_part rows,
                                  mode_batch *b)
 {
@@ -190,11 +190,11 @@ static sdm_status weight_gradient(const pod_state *pod, mode_batch *b, size_t ba
     const mlp_part modes = trainer_mlp_part(comm, r);
     float *readout = b->gradient + trainer_mlp_count(a);
     sdm_gemm(modes.end - modes.first, a->width, batch, (sdm_view){b->predicted + modes.first, 1, r},
-             (sdm_view){h, a->width, 1}, false, readout + modes.first * a->width, a->width, threads);
+             (sdm_view){h, a->width, 1}, false, readout + modes.first * a->width, a->width,
+             threads);
     trainer_mlp_gradient_units(a, batch, trainer_mlp_part(comm, a->width), b->x, b->workspace,
                                b->gradient, threads);
-    const sdm_status s =
-        sdm_comm_gather_shares(comm, readout, r, a->width * sizeof *readout, err);
+    const sdm_status s = sdm_comm_gather_shares(comm, readout, r, a->width * sizeof *readout, err);
     return s ? s : trainer_mlp_gather_units(a, comm, b->gradient, err);
 }
 

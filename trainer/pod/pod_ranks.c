@@ -100,8 +100,7 @@ sdm_status trainer_pod_gather_columns(const pod_state *pod, size_t n, float *y, 
     sdm_status s = SDM_ALLOC(&packed, rows * k, "coefficients of the ranks", err);
     if (!s) s = SDM_ALLOC(&column, ranks + 1, "parts of the ranks", err);
     if (!s) s = SDM_ALLOC(&at, ranks + 1, "parts of the ranks", err);
-    if (!s)
-        find_parts(pod, pod->arch.levels.n - 1, trainer_pod_place_coefficient, 1, column);
+    if (!s) find_parts(pod, pod->arch.levels.n - 1, trainer_pod_place_coefficient, 1, column);
     for (size_t from = 0; from < n && !s; from += CHUNK) {
         const size_t here = n - from < CHUNK ? n - from : CHUNK;
         float *part = y + from * k;

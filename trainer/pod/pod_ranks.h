@@ -1,5 +1,6 @@
-/* Shares the trees (pod_tree.h) of a `pod` network among ranks: each rank has consecutive trees, and
-   so consecutive blocks, voxels, bases and coefficients on each level. Letters as in pod_state.h. */
+/* Shares the trees (pod_tree.h) of a `pod` network among ranks: each rank has consecutive trees,
+   and so consecutive blocks, voxels, bases and coefficients on each level. Letters as in
+   pod_state.h. */
 #pragma once
 
 #include "pod_state.h"
@@ -25,8 +26,8 @@ pod_place trainer_pod_place_voxel;       /* [n_voxels], lowest level */
 pod_place trainer_pod_place_matrix;      /* pod->basis */
 pod_place trainer_pod_place_coefficient; /* [K], highest level */
 
-/* Gives all ranks the elements of data that belong to blocks of `level`, each from the rank that has
-   the block's tree. bytes: of an element. */
+/* Gives all ranks the elements of data that belong to blocks of `level`, each from the rank that
+   has the block's tree. bytes: of an element. */
 sdm_status trainer_pod_gather(const pod_state *pod, size_t level, pod_place *place, size_t bytes,
                               void *data, sdm_error *err);
 

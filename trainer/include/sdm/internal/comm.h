@@ -25,7 +25,7 @@ typedef struct sdm_comm sdm_comm;
    then. */
 sdm_status sdm_comm_fork(int size, sdm_comm **out, sdm_error *err);
 
-/* Joins the processes that mpirun, mpiexec or srun have started. *out = NULL if there is only one.
+/* Joins the processes that mpirun or mpiexec has started. *out = NULL if there is only one.
    SDM_E_UNSUPPORTED: the back-end for their MPI is missing or cannot be loaded. */
 sdm_status sdm_comm_mpi(sdm_comm **out, sdm_error *err);
 
@@ -42,8 +42,8 @@ size_t sdm_comm_first(const sdm_comm *c, size_t n, int rank);
 /* data[bytes] becomes that of rank `root` on all ranks. */
 sdm_status sdm_comm_broadcast(sdm_comm *c, int root, void *data, size_t bytes, sdm_error *err);
 
-/* Bytes at[r] .. at[r + 1] - 1 of data become those of rank r, for all ranks; at[size + 1], the same
-   on all ranks. */
+/* Bytes at[r] .. at[r + 1] - 1 of data become those of rank r, for all ranks; at[size + 1], the
+   same on all ranks. */
 sdm_status sdm_comm_gather(sdm_comm *c, void *data, const size_t *at, sdm_error *err);
 
 /* The same for n units of `bytes` each, of which every rank has those of sdm_comm_first(). */
@@ -53,8 +53,8 @@ sdm_status sdm_comm_gather_shares(sdm_comm *c, void *data, size_t n, size_t byte
    rank has one. s, *err: those of this rank; err may be NULL. */
 sdm_status sdm_comm_agree(sdm_comm *c, sdm_status s, sdm_error *err);
 
-/* true: the last call was sdm_comm_agree() and gave a failure: all ranks know of it, and each ends by
-   itself. */
+/* true: the last call was sdm_comm_agree() and gave a failure: all ranks know of it, and each ends
+   by itself. */
 bool sdm_comm_agreed(const sdm_comm *c);
 
 /* true: a rank has ended early. [any thread] */

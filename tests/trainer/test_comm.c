@@ -139,10 +139,9 @@ static void one_process_needs_no_others(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(data_arrive),
-                                       cmocka_unit_test(all_learn_of_an_error),
-                                       cmocka_unit_test(a_killed_rank_ends_all),
-                                       cmocka_unit_test(an_aborting_rank_tells_why),
-                                       cmocka_unit_test(one_process_needs_no_others)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(data_arrive), cmocka_unit_test(all_learn_of_an_error),
+        cmocka_unit_test(a_killed_rank_ends_all), cmocka_unit_test(an_aborting_rank_tells_why),
+        cmocka_unit_test(one_process_needs_no_others)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "data/streams.h"
-#include "mlp_ranks.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/rng.h"
 #include "sdm/internal/team.h"

@@ -7,7 +7,6 @@
 
 #include "data/streams.h"
 #include "mlp.h"
-#include "mlp_ranks.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/team.h"
 #include "sdm/memory.h"

@@ -15,6 +15,7 @@
 
 #include "sdm/image.h"
 #include "sdm/internal/text.h"
+#include "sdm/memory.h"
 #include "sdm/meshfile.h"
 
 namespace
@@ -67,13 +68,32 @@ void throw_error(sdm_status s, const sdm_error &err)
     if (s) throw std::runtime_error(err.text);
 }
 
+void read_points(const char *path, peer::job &j)
+{
+    double *values = nullptr;
+    size_t shape[4] = {0};
+    int n_dim = 0;
+    sdm_error err{};
+    throw_error(sdm_npy_read(path, &values, shape, &n_dim, &err), err);
+    const bool right = n_dim == 2 && shape[0] > 0 && shape[1] == 3;
+    if (right) j.points.assign(values, values + 3 * shape[0]);
+    sdm_free(values);
+    if (!right) throw std::runtime_error(std::string(path) + ": not points of [n][3]");
+}
+
 void read_job(int argc, char **argv, peer::job &j)
 {
-    if (argc != 15)
+    if (argc != 5 && argc != 15)
         throw std::runtime_error(
-            "arguments: MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT VALUES.npy");
+            "arguments: MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT VALUES.npy, or MESH "
+            "POINTS.npy REPEAT VALUES.npy");
     sdm_error err{};
     throw_error(sdm_mesh_read(argv[1], &j.mesh, &err), err);
+    if (argc == 5) {
+        read_points(argv[2], j);
+        j.repeat = static_cast<int>(parse_real(argv[3]));
+        return;
+    }
     const double zero[3] = {0, 0, 0};
     int64_t n[3];
     for (int i = 0; i < 3; i++) n[i] = static_cast<int64_t>(parse_real(argv[2 + i]));
@@ -91,6 +111,7 @@ void read_job(int argc, char **argv, peer::job &j)
 /* Fraction of the rows for which has_row() is true. */
 double row_share(const peer::job &j)
 {
+    if (!j.points.empty()) return 1;
     const int64_t rows = j.grid.n[1] * j.grid.n[2];
     int64_t done = 0;
     for (int64_t r = 0; r < rows; r++) done += j.has_row(r);
@@ -101,7 +122,10 @@ void measure(const char *path, const peer::job &j, const peer::about &a,
              const std::function<peer::map_function(const peer::job &)> &prepare)
 {
     // the fastest of several runs
-    std::vector<float> values(sdm_grid_count(&j.grid), std::numeric_limits<float>::quiet_NaN());
+    if (!j.points.empty() && !a.points) throw std::runtime_error("no distances at single points");
+    const bool at_points = !j.points.empty();
+    std::vector<float> values(at_points ? j.points.size() / 3 : sdm_grid_count(&j.grid),
+                              std::numeric_limits<float>::quiet_NaN());
     double prepare_s = HUGE_VAL, map_s = HUGE_VAL;
     const long before = start_peak();
     long peak = -1;
@@ -121,10 +145,10 @@ void measure(const char *path, const peer::job &j, const peer::about &a,
         if (i == 0 && before >= 0) peak = std::max(0L, status_kb("VmHWM") - before);
     }
     // the values
-    const size_t shape[3] = {static_cast<size_t>(j.grid.n[2]), static_cast<size_t>(j.grid.n[1]),
-                             static_cast<size_t>(j.grid.n[0])};
+    const size_t shape[3] = {at_points ? values.size() : static_cast<size_t>(j.grid.n[2]),
+                             static_cast<size_t>(j.grid.n[1]), static_cast<size_t>(j.grid.n[0])};
     sdm_error err{};
-    throw_error(sdm_npy_write(path, values.data(), shape, 3, &err), err);
+    throw_error(sdm_npy_write(path, values.data(), shape, at_points ? 1 : 3, &err), err);
 
     // the line of JSON
     sdm_json out{};
@@ -150,7 +174,7 @@ int peer::run(int argc, char **argv, const about &a,
     int code = 0;
     try {
         read_job(argc, argv, j);
-        measure(argv[14], j, a, prepare);
+        measure(argv[argc - 1], j, a, prepare);
     } catch (const std::exception &e) {
         sdm_json out{};
         sdm_json_open(&out, nullptr, '{');

@@ -56,7 +56,7 @@ peer::map_function prepare(const peer::job &j)
 {
     const auto s = std::make_shared<solid>(j.mesh);
     return [s, &j](float *values) {
-        peer::for_voxels(j, values, [&](const double x[3]) {
+        peer::for_places(j, values, [&](const double x[3]) {
             const kernel::Point_3 p(x[0], x[1], x[2]);
             const double d = std::sqrt(s->boxes->squared_distance(p));
             return (*s->inside)(p) == CGAL::ON_BOUNDED_SIDE ? -d : d;
@@ -69,6 +69,7 @@ peer::map_function prepare(const peer::job &j)
 int main(int argc, char **argv)
 {
     peer::about a;
+    a.points = true;
     a.version = "CGAL " CGAL_VERSION_STR;
     a.note = "AABB tree with accelerate_distance_queries, Side_of_triangle_mesh; measures to all "
              "triangles";

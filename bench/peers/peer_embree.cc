@@ -158,9 +158,9 @@ peer::map_function prepare(const peer::job &j)
         RTCPointQueryContext context;
         rtcInitPointQueryContext(&context);
         vec last{};
-        // abs(distance) at the previous voxel; abs(distance here) <= bound + length of the step
+        // abs(distance) at the previous place; abs(distance here) <= bound + length of the step
         float bound = INFINITY;
-        peer::for_voxels(j, values, [&](const double x[3]) {
+        peer::for_places(j, values, [&](const double x[3]) {
             const vec p = {static_cast<float>(x[0]), static_cast<float>(x[1]),
                            static_cast<float>(x[2])};
             const vec step = p - last;
@@ -185,9 +185,10 @@ peer::map_function prepare(const peer::job &j)
 int main(int argc, char **argv)
 {
     peer::about a;
+    a.points = true;
     a.version = "Embree " RTC_VERSION_STRING;
     a.note =
-        "float32; point queries bounded by the distance of the previous voxel, pseudo-normals; "
+        "float32; point queries bounded by the distance of the previous place, pseudo-normals; "
         "measures to all triangles";
     a.band = true;
     return peer::run(argc, argv, a, prepare);

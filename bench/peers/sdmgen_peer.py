@@ -44,10 +44,15 @@ def read_ply(path):
 
 class Job:
     def __init__(self, arguments):
-        if len(arguments) != 14:
+        if len(arguments) not in (4, 14):
             raise ValueError("need the arguments MESH NX NY NZ OX OY OZ SX SY SZ SHARE BAND REPEAT "
-                             "VALUES.npy")
+                             "VALUES.npy, or MESH POINTS.npy REPEAT VALUES.npy")
         self.vert, self.tri = read_ply(arguments[0])
+        self.given = None  # [n][3] points; None: the voxels of the grid
+        if len(arguments) == 4:
+            self.given = np.load(arguments[1])
+            self.repeat, self.out = int(arguments[2]), arguments[3]
+            return
         self.n = [int(a) for a in arguments[1:4]]
         self.origin = np.array([float(a) for a in arguments[4:7]])
         self.spacing = np.array([float(a) for a in arguments[7:10]])
@@ -57,7 +62,9 @@ class Job:
         self.rows = np.flatnonzero(multiple - np.floor(multiple) < self.share)
 
     def points(self):
-        """Voxel centres of the rows to compute, [rows * nx][3]."""
+        """The given points [n][3], or the voxel centres of the rows to compute, [rows * nx][3]."""
+        if self.given is not None:
+            return self.given
         x = np.empty((len(self.rows), self.n[0], 3))
         x[..., 0] = self.origin[0] + self.spacing[0] * np.arange(self.n[0])
         x[..., 1] = (self.origin[1] + self.spacing[1] * (self.rows % self.n[1]))[:, None]
@@ -81,12 +88,26 @@ def start_peak():
         return -1
 
 
+def save(job, values, whole):
+    """Writes the values; returns the share of the voxels that were computed."""
+    if job.given is not None:
+        np.save(job.out, np.asarray(values, np.float32).reshape(-1))
+        return 1
+    out = np.full((job.n[1] * job.n[2], job.n[0]), np.nan, np.float32)
+    rows = slice(None) if whole else job.rows
+    out[rows] = np.asarray(values).reshape(-1, job.n[0])
+    np.save(job.out, out.reshape(job.n[2], job.n[1], job.n[0]))
+    return 1 if whole else len(job.rows) / (job.n[1] * job.n[2])
+
+
 def run(version, note, prepare, whole=False, band=False):
     """Measures prepare(job) and the function that it returns, and prints the result. That function
     returns the values at job.points() or, with `whole`, of all voxels [nz][ny][nx]. band: the peer
     does less work for a narrow band."""
     try:
         job = Job(sys.argv[1:])
+        if whole and job.given is not None:
+            raise ValueError("no distances at single points")
         best, before, peak, begin = None, start_peak(), -1, time.monotonic()
         for i in range(max(1, job.repeat)):
             start = time.process_time()
@@ -99,11 +120,7 @@ def run(version, note, prepare, whole=False, band=False):
                 peak = max(0, status_kb("VmHWM") - before)
             if time.monotonic() - begin > TIME_LIMIT_S:
                 break
-        out = np.full((job.n[1] * job.n[2], job.n[0]), np.nan, np.float32)
-        rows = slice(None) if whole else job.rows
-        out[rows] = np.asarray(values).reshape(-1, job.n[0])
-        np.save(job.out, out.reshape(job.n[2], job.n[1], job.n[0]))
-        share = 1 if whole else len(job.rows) / (job.n[1] * job.n[2])
+        share = save(job, values, whole)
         print(json.dumps({"prepare_ms": 1e3 * best[0], "map_ms": 1e3 * best[1], "share": share,
                           "peak_kb": peak, "band": band, "version": version, "note": note}))
     except Exception as e:  # an exception of a library is a result: its message

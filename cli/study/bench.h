@@ -56,9 +56,6 @@ sdm_status cli_bench_own(cli_bench_case *c, cli_bench_rows *rows, sdm_error *err
 sdm_status cli_bench_peers(const cli_bench_case *c, const cli_args *args, cli_bench_rows *rows,
                            sdm_error *err);
 
-/* Name of the i-th known peer; NULL after the last one. */
-const char *cli_bench_peer_name(size_t i);
-
 /* Measures the peer `name`: stores times, memory and errors in *row, and its map in
  * values[nz][ny][nx] (NaN: not computed) unless values is NULL. If the program is missing or fails,
  * row->done is false and row->note is the reason; that is no error. */

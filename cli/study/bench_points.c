@@ -1,12 +1,16 @@
-/* sdmgen bench points: time per point of exact distances at many points, one by one and by brute
- * force. */
+/* sdmgen bench points: time per point of exact distances at many points, one by one, by brute force
+ * and by other programs. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "bench.h"
+#include "bench_programs.h"
 #include "report/terminal.h"
+#include "sdm/image.h"
 #include "sdm/internal/brute_force.h"
 #include "sdm/internal/clock.h"
+#include "sdm/internal/npy.h"
 #include "sdm/internal/rng.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
@@ -14,6 +18,7 @@
 #define MOST 100000  // points of the largest batch
 #define SINGLE 10000 // points that are computed one by one
 #define NAIVE 20     // points that are computed by brute force
+#define OTHERS 10000 // points that other programs compute, the first of all; that of a row
 #define SEED 2026
 // "near the surface": up to this fraction of the diagonal away from it along each axis
 #define NEAR 0.015
@@ -115,15 +120,73 @@ static sdm_status measure_row(const bench_points *b, int row, const sdm_exact *e
     return SDM_OK;
 }
 
+/* Another program, at OTHERS points; NAN: no figures, the note is the reason. */
+typedef struct other {
+    const char *name; /* of *peers */
+    char note[256];
+    double us[2];      /* microseconds per point, [random, near] */
+    double difference; /* largest one from the exact distance, outside, mm */
+} other;
+
 /* Microseconds per point of all rows, [random, near], by one thread and by all. */
 typedef struct times {
     double one[2][N_ROWS], all[2][N_ROWS];
+    cli_peers peers;
+    other *others; /* [peers.n] */
 } times;
+
+/* The row with as many points as other programs compute. */
+static size_t row_of_others(void)
+{
+    size_t row = 0;
+    while (rows[row].n != OTHERS || rows[row].kind != BATCH) row++;
+    return row;
+}
+
+/* Stores in *o the largest difference of a program's values from b->distance outside the surface:
+ * inside, programs that know no union measure to the triangles within it. */
+static void compare(const bench_points *b, const char *path, other *o)
+{
+    double *values = NULL;
+    size_t shape[4] = {0};
+    int n_dim = 0;
+    sdm_error err = {0};
+    const sdm_status s = sdm_npy_read(path, &values, shape, &n_dim, &err);
+    if (s || shape[0] != OTHERS || n_dim > 2 || (n_dim == 2 && shape[1] != 1))
+        snprintf(o->note, sizeof o->note, "%.200s",
+                 s ? err.text : "its values are not those of the points");
+    for (size_t i = 0; !*o->note && i < OTHERS; i++)
+        if (b->distance[i] > 0)
+            o->difference = fmax(o->difference, fabs(values[i] - b->distance[i]));
+    sdm_free(values);
+}
+
+/* Measures all other programs at the first points, b->distance of which are known. */
+static sdm_status measure_others(const bench_points *b, size_t repeat, bool near, times *t,
+                                 sdm_error *err)
+{
+    char runs[32], *argument[2] = {t->peers.points_path, runs};
+    snprintf(runs, sizeof runs, "%zu", repeat);
+    sdm_status s =
+        sdm_npy_write_double(t->peers.points_path, b->x, (const size_t[]){OTHERS, 3}, 2, err);
+    for (size_t i = 0; i < t->peers.n && !s; i++) {
+        other *o = &t->others[i];
+        cli_peer_answer answer;
+        if (near && isnan(o->us[0])) continue;
+        s = cli_peers_run(&t->peers, o->name, argument, 2, &answer, err);
+        if (!s && answer.done) compare(b, t->peers.values_path, o);
+        if (!s && !answer.done) memcpy(o->note, answer.note, sizeof o->note);
+        if (!s && answer.done && !*o->note) o->us[near] = 1e3 * answer.ms_map / OTHERS;
+        if (!s && near && answer.done && !*o->note) memcpy(o->note, answer.note, sizeof o->note);
+        if (!s) s = cli_check_interrupt(err);
+    }
+    return s;
+}
 
 static sdm_status measure(const bench_points *b, size_t repeat, times *t, sdm_error *err)
 {
     sdm_status s = SDM_OK;
-    for (int near = 0; near < 2; near++) {
+    for (int near = 0; near < 2 && !s; near++) {
         draw_points(b, near);
         for (int row = 0; row < N_ROWS && !s; row++) {
             s = measure_row(b, row, b->engine, repeat, &t->one[near][row], err);
@@ -131,8 +194,42 @@ static sdm_status measure(const bench_points *b, size_t repeat, times *t, sdm_er
             if (!s && rows[row].kind == BATCH)
                 s = measure_row(b, row, b->all_cores, repeat, &t->all[near][row], err);
         }
+        if (!s && t->peers.n)
+            s = measure_row(b, (int)row_of_others(), b->engine, 1, &(double){0}, err);
+        if (!s && t->peers.n) s = measure_others(b, repeat, near, t, err);
     }
     return s;
+}
+
+/* Opens the other programs. */
+static sdm_status open_others(const cli_bench_case *c, const cli_args *args, times *t,
+                              sdm_error *err)
+{
+    if (args->peers && !strcmp(args->peers, "none")) return SDM_OK;
+    sdm_status s = cli_peers_open(args->peers, &c->mesh, &t->peers, err);
+    if (!s) s = SDM_ALLOC(&t->others, t->peers.n, "other programs", err);
+    for (size_t i = 0; i < t->peers.n && !s; i++)
+        t->others[i] = (other){.name = t->peers.names[i], .us = {NAN, NAN}};
+    return s;
+}
+
+/* The other programs that have figures, then the reasons of those that have none. */
+static void print_others(const times *t)
+{
+    const double *own[2] = {t->one[0], t->one[1]};
+    const size_t row = row_of_others();
+    if (!t->peers.n) return;
+    printf("\nother programs, %d points, without preparation (times \"%s\"):\n", OTHERS,
+           rows[row].name);
+    for (size_t i = 0; i < t->peers.n; i++) {
+        const other *o = &t->others[i];
+        if (isnan(o->us[1])) continue;
+        printf("  %-16s %9.3f %9.3f   x %.0f, x %.0f; largest difference outside %.1e mm\n",
+               o->name, o->us[0], o->us[1], o->us[0] / own[0][row], o->us[1] / own[1][row],
+               o->difference);
+    }
+    for (size_t i = 0; i < t->peers.n; i++)
+        printf("  %s: %s\n", t->others[i].name, t->others[i].note);
 }
 
 static void print_times(const cli_bench_case *c, double ms_build, const times *t)
@@ -150,6 +247,7 @@ static void print_times(const cli_bench_case *c, double ms_build, const times *t
     printf("\nrandom: in twice the bounding box; near: up to %g of its diagonal from the surface "
            "along each axis\n",
            NEAR);
+    print_others(t);
 }
 
 static sdm_status print_times_json(const cli_bench_case *c, double ms_build, const times *t,
@@ -172,6 +270,19 @@ static sdm_status print_times_json(const cli_bench_case *c, double ms_build, con
         sdm_json_close(&j, '}');
     }
     sdm_json_close(&j, ']');
+    sdm_json_open(&j, "peers", '[');
+    for (size_t i = 0; i < t->peers.n; i++) {
+        const other *o = &t->others[i];
+        sdm_json_open(&j, NULL, '{');
+        sdm_json_text(&j, "name", o->name);
+        sdm_json_int(&j, "points", OTHERS);
+        sdm_json_real(&j, "us_random", o->us[0]);
+        sdm_json_real(&j, "us_near", o->us[1]);
+        sdm_json_real(&j, "max_difference_mm", isnan(o->us[1]) ? NAN : o->difference);
+        sdm_json_text(&j, "note", o->note);
+        sdm_json_close(&j, '}');
+    }
+    sdm_json_close(&j, ']');
     sdm_json_close(&j, '}');
     return cli_print_json(&j, err);
 }
@@ -180,13 +291,14 @@ sdm_status cli_bench_points(const cli_args *args, sdm_error *err)
 {
     cli_bench_case c = {0};
     bench_points b = {.mesh = &c.mesh};
-    times t;
+    times t = {.others = NULL};
     sdm_status s = cli_bench_case_open(args, 1, 1, &c, err);
     if (!s) s = sdm_exact_create(&c.mesh, &(sdm_exact_opts){.n_threads = 1}, &b.engine, err);
     if (!s)
         s = sdm_exact_create(&c.mesh, &(sdm_exact_opts){.n_threads = c.threads}, &b.all_cores, err);
     if (!s) s = SDM_ALLOC(&b.x, 3 * (size_t)MOST, "points", err);
     if (!s) s = SDM_ALLOC(&b.distance, MOST, "distances", err);
+    if (!s) s = open_others(&c, args, &t, err);
     if (!s) s = measure(&b, c.repeat, &t, err);
     if (!s) {
         const double ms_build = sdm_exact_get_report(b.engine)->ms_build;
@@ -195,6 +307,8 @@ sdm_status cli_bench_points(const cli_args *args, sdm_error *err)
         else
             print_times(&c, ms_build, &t);
     }
+    cli_peers_close(&t.peers);
+    sdm_free(t.others);
     sdm_free(b.x);
     sdm_free(b.distance);
     sdm_exact_free(b.engine);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "bench.h"
+#include "bench_programs.h"
 #include "experiment_command.h"
 #include "report/terminal.h"
 #include "sdm/internal/clock.h"
@@ -20,7 +21,7 @@ sdm_status cli_experiment_check_engine(const char *name, sdm_error *err)
     const char *names[64];
     size_t n = 0;
     for (size_t i = 0; i < sdm_method_count() && n < 32; i++) names[n++] = sdm_method_at(i)->name;
-    for (size_t i = 0; cli_bench_peer_name(i) && n < 64; i++) names[n++] = cli_bench_peer_name(i);
+    for (size_t i = 0; cli_peers_known(i) && n < 64; i++) names[n++] = cli_peers_known(i);
     for (size_t i = 0; i < n; i++)
         if (!strcmp(names[i], name)) return SDM_OK;
     sdm_text list = {0};

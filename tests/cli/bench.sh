@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # sdmgen bench exact: results of the built-in methods and of other programs (replaced by scripts with known answers), and messages about
 # missing programs.
-# Tests: bench_case.c bench_compare.c bench_own.c bench_peers.c bench_points.c bench_report.c cmd_bench.c
+# Tests: bench_case.c bench_compare.c bench_own.c bench_peers.c bench_points.c bench_programs.c bench_report.c cmd_bench.c
 . "$(dirname "$0")/common.sh"
 
 mkdir tmp peers none
@@ -152,14 +152,34 @@ expect 2 "unexpected argument 'x'" sdmgen bench exact x
 expect 2 'edge' sdmgen bench exact --shape ellipsoid --edge 1e-9
 [ -z "$(ls tmp)" ] || bad "left in TMPDIR: $(ls tmp)"
 # Distances at points: figures for every row; many points at once are faster than brute force.
-expect 0 - sdmgen bench points --shape torus --repeat 1 --threads 2 --json
+expect 0 - sdmgen bench points --shape torus --repeat 1 --threads 2 --peers none --json
 for name in 'batch of 1000' 'batch of 100000' 'one by one' naive; do
     above "$(row "$name" us_random)" 0
     above "$(row "$name" us_near)" 0
 done
 above "$(row naive us_near)" "$(row 'batch of 100000' us_near)"
-expect 0 - sdmgen bench points --shape torus --repeat 1
+expect 0 - sdmgen bench points --shape torus --repeat 1 --peers none
 has '^  one by one +[0-9]'
+# Other programs at points: their arguments, their times, the difference from the exact distances.
+rm peers/*
+peer right "echo \"\$@\" >$PWD/asked" "\"$program\" exact --mesh \"\$1\" --points \"\$2\" --quiet -o \"\$4\"" "$answer"
+peer small "cp $PWD/small.npy \"\$4\"" "$answer"
+peer voxels 'echo "{\"error\": \"no distances at single points\"}"'
+expect 0 - sdmgen bench points --shape torus --repeat 3 --peers peers --json
+read -r -a asked <asked
+[ "${#asked[@]}" -eq 4 ] && [ "${asked[2]}" = 3 ] || bad "asked: ${asked[*]}"
+near "$(row right us_random)" 0.5 1e-9
+near "$(row right us_near)" 0.5 1e-9
+near "$(row right max_difference_mm)" 0 1e-12
+row right note | grep -q '^V 1: n$' || bad "note: $(row right note)"
+for name in small voxels embree; do [ "$(row $name us_near)" = null ] || bad "$name has figures"; done
+row small note | grep -q 'not those of the points' || bad "note: $(row small note)"
+row voxels note | grep -q 'no distances at single points' || bad "note: $(row voxels note)"
+row embree note | grep -q 'libembree-dev' || bad "note: $(row embree note)"
+expect 0 - sdmgen bench points --shape torus --repeat 1 --peers peers
+has '^  right +0\.500 +0\.500 +x '
+has '^  voxels: no distances at single points$'
+[ -z "$(ls tmp)" ] || bad "left in TMPDIR: $(ls tmp)"
 expect 2 "unexpected argument 'x'" sdmgen bench points x
 
 finish

@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "inputs/config_shape.h"
+#include "inputs/ranks.h"
 #include "inputs/setup.h"
 #include "page/page.h"
 #include "print_plan.h"
@@ -13,6 +14,7 @@
 #include "report/report_verdict.h"
 #include "report/terminal.h"
 #include "report/train_progress.h"
+#include "sdm/internal/threads.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 #include "sdm/picture.h"
@@ -111,17 +113,20 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
 
 static sdm_status train_network(const cli_args *args, const sdm_config *config,
                                 const sdm_instance *shape, const sdm_map_store *store,
-                                sdm_error *err)
+                                sdm_comm *comm, sdm_error *err)
 {
     const char *folder = config->output.folder;
+    const bool first = sdm_comm_rank(comm) == 0;
     cli_progress progress;
     sdm_train_hooks hooks = cli_train_hooks(&progress);
     hooks.store = store;
     sdm_train_report report = {0};
-    if (!args->resume) cli_notice_survey(config, shape);
-    cli_progress_start(&progress);
+    hooks.comm = comm;
+    if (first && !args->resume) cli_notice_survey(config, shape);
+    if (first) cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
-    cli_progress_end(&progress, !s);
+    if (first) cli_progress_end(&progress, !s);
+    s = cli_ranks_end(comm, s, err);
     if (s) return s;
     cli_timing times;
     s = look_at_model(report.model_path, shape, folder, &times, err);
@@ -131,22 +136,34 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
                : cli_page_report(args, folder, cli_page_has_runtime(), args->report, err);
 }
 
+/* Each process that --ranks makes has its part of the threads, unless the configuration gives a
+ * number. */
+static void share_threads(const cli_args *args, sdm_config *config)
+{
+    const int n = args->ranks > 1 && !config->threads ? sdm_threads(0) / (int)args->ranks : 0;
+    if (args->ranks > 1 && !config->threads) config->threads = n > 1 ? n : 1;
+}
+
 sdm_status cmd_train(const cli_args *args, sdm_error *err)
 {
     sdm_config *config = NULL;
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
+    sdm_comm *comm = NULL;
     sdm_map_store *store = NULL;
     sdm_status s = cli_page_check_option(args, err);
     if (!s && (args->nodes || args->cores) && !args->plan)
         s = sdm_fail(err, SDM_E_ARG, "--nodes and --cores belong to --plan");
+    if (!s && args->ranks && args->plan)
+        s = sdm_fail(err, SDM_E_ARG, "--plan trains nothing: leave out --ranks");
+    const bool trains = !args->plan;
+    if (!s && trains) s = cli_ranks_start(args, &comm, err);
     if (!s) s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && args->out && strlen(args->out) >= sizeof config->output.folder)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
-    const bool trains = !args->plan;
     if (!s && !trains) s = cli_plan_training(args, config, shape, err);
-    if (!s && trains)
+    if (!s && trains && !sdm_comm_rank(comm))
         s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);
     // a page in the folder of the run, which the training makes, needs no check
     const size_t n = strlen(config ? config->output.folder : "");
@@ -155,7 +172,13 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     if (!s && trains && args->dataset)
         s = sdm_map_store_open(args->dataset, config, shape, NULL, NULL, &store, err);
     if (!s && store) s = sdm_map_store_compare(store, config, shape, err);
-    if (!s && trains) s = train_network(args, config, shape, store, err);
+    s = sdm_comm_agree(comm, s, err);
+    if (!s && trains) {
+        share_threads(args, config);
+        s = train_network(args, config, shape, store, comm, err);
+    } else if (trains) {
+        s = cli_ranks_end(comm, s, err);
+    }
     sdm_map_store_free(store);
     sdm_instance_free(shape);
     sdm_registry_free(registry);

@@ -30,6 +30,7 @@ sdm_status trainer_set_up(trainer *t, sdm_error *err)
     if (!s) s = sdm_train_ranges(c, t->shape, d->min, d->max, err);
     if (!s) s = sdm_train_distributions(c, t->shape, d->min, d->max, d->distribution, err);
     if (s) return s;
+    d->comm = t->hooks.comm;
     d->shape = t->shape;
     d->grid = &c->grid;
     d->seed = c->seed;

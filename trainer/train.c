@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "race.h"
+#include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/team.h"
@@ -41,6 +42,8 @@ static void trainer_init(run *r, const sdm_instance *shape, const char *folder,
                    .metrics = &r->metrics,
                    .turns = &r->turns};
     if (hooks) t->hooks = *hooks;
+    // rank 0 alone tells and asks
+    if (!trainer_writes(t)) t->hooks = (sdm_train_hooks){.comm = hooks->comm};
 }
 
 /* Settles which kinds are trained: with network.kind: auto by a race, or as the checkpoint says. */
@@ -156,6 +159,26 @@ static sdm_status train_all(run *r, trainer *t, sdm_train_report *report, sdm_er
     return s || r->turns.at == 0 ? s : train_second(r, t, report, err);
 }
 
+/* Refuses ranks with another program or configuration than rank 0. */
+static sdm_status check_same(const trainer *t, sdm_error *err)
+{
+    sdm_comm *comm = t->hooks.comm;
+    sdm_text text = {0};
+    if (!comm) return SDM_OK;
+    sdm_status s = trainer_export_dump(t, &text, err);
+    if (!s) sdm_text_add(&text, "%s", SDM_VERSION_TEXT);
+    const uint64_t mine = sdm_crc64(0, text.data, text.size);
+    uint64_t first = mine;
+    sdm_text_dispose(&text);
+    if (!s) s = sdm_comm_broadcast(comm, 0, &first, sizeof first, err);
+    if (!s && mine != first)
+        s = sdm_fail(err, SDM_E_UNSUPPORTED,
+                     "rank %d of %d has another configuration or another version of the program "
+                     "than rank 0",
+                     sdm_comm_rank(comm), sdm_comm_size(comm));
+    return s;
+}
+
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder,
                      bool resume, const sdm_train_hooks *hooks, sdm_train_report *report,
                      sdm_error *err)
@@ -167,13 +190,15 @@ sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const 
     trainer_init(&r, shape, folder, hooks, &t);
     const size_t existing = sdm_folder_existing(folder);
     int lock = -1;
-    sdm_status s = sdm_make_folder(folder, err);
-    if (!s) s = trainer_folder_take(folder, &lock, err);
+    sdm_status s = check_same(&t, err);
+    if (!s && trainer_writes(&t)) s = sdm_make_folder(folder, err);
+    if (!s && trainer_writes(&t)) s = trainer_folder_take(folder, &lock, err);
+    s = sdm_comm_agree(t.hooks.comm, s, err);
     if (!s) s = SDM_ALLOC(&r.settled, 1, "configuration", err);
     if (!s) s = sdm_team_start(t.n_threads, &team, err);
     if (!s) s = train_all(&r, &t, &result, err);
     trainer_folder_leave(folder, lock);
-    if (s) sdm_folder_remove_empty(folder, existing);
+    if (s && trainer_writes(&t)) sdm_folder_remove_empty(folder, existing);
     if (!s && report) *report = result;
     for (size_t i = 0; i < 2; i++) trainer_dataset_dispose(&r.gain[i].maps);
     sdm_text_dispose(&r.metrics);

@@ -114,7 +114,7 @@ static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_er
  * checkpoint. The folder stays as it was. */
 static sdm_status train_begin(trainer *t, bool resume, bool *found, sdm_error *err)
 {
-    sdm_status s = trainer_set_up(t, err);
+    sdm_status s = sdm_comm_agree(t->hooks.comm, trainer_set_up(t, err), err);
     if (!s && resume) {
         s = trainer_checkpoint_read(t, found, err);
         if (!s && !*found)
@@ -140,11 +140,14 @@ static sdm_status train_run(trainer *t, bool resume, bool found, sdm_outfile **c
 {
     sdm_status s = SDM_OK;
     if (!resume && !is_second(t)) s = trainer_checkpoint_clear_folder(t, err);
-    if (!s && !is_second(t)) s = trainer_data_files_copy(t, err);
-    if (!s && !is_second(t)) s = sdm_outfile_commit(config, err);
+    const bool writes = !is_second(t) && trainer_writes(t);
+    if (!s && writes) s = trainer_data_files_copy(t, err);
+    if (!s && writes) s = sdm_outfile_commit(config, err);
+    s = sdm_comm_agree(t->hooks.comm, s, err);
+    if (!s && !is_second(t)) s = trainer_metric_ranks(t, err);
     if (s) return s;
     if (!found) trainer_enter(t, SDM_PHASE_MODE_FIT);
-    t->last_checkpoint = t->prepared_seconds = trainer_seconds(t);
+    t->last_checkpoint = t->prepared_seconds = trainer_shared_seconds(t);
     return t->kind->run(t, found, err);
 }
 
@@ -162,6 +165,14 @@ static void tell_overrun(trainer *t, double measured)
         over, t->prepared_seconds, measured);
 }
 
+/* Writes the model, then a better one with a fine level if that is asked for. */
+static sdm_status write_model(trainer *t, sdm_outfile **config, sdm_error *err)
+{
+    sdm_status s = trainer_export_model(t, err);
+    if (!s && is_second(t)) s = sdm_outfile_commit(config, err);
+    return s ? s : trainer_fine_add(t, err);
+}
+
 /* Measures the model, and writes it unless the one that the folder holds is better. If it cannot be
  * written, a checkpoint keeps the trained weights. */
 static sdm_status train_finish(trainer *t, sdm_outfile **config, sdm_train_report *report,
@@ -173,12 +184,11 @@ static sdm_status train_finish(trainer *t, sdm_outfile **config, sdm_train_repor
     t->phase = SDM_PHASE_EVALUATE;
     trainer_report(t, 1, true);
     sdm_status s = trainer_export_judge(t, report, err);
-    if (!s && (!is_second(t) || trainer_second_wins(t->turns, &report->accuracy))) {
-        s = trainer_export_model(t, err);
-        if (!s && is_second(t)) s = sdm_outfile_commit(config, err);
-        if (!s) s = trainer_fine_add(t, err);
-    }
-    report->seconds = trainer_seconds(t);
+    if (!s && trainer_writes(t) &&
+        (!is_second(t) || trainer_second_wins(t->turns, &report->accuracy)))
+        s = write_model(t, config, err);
+    report->seconds = trainer_shared_seconds(t);
+    s = sdm_comm_agree(t->hooks.comm, s, err);
     if (!s) {
         tell_overrun(t, report->seconds - started);
         return trainer_checkpoint_remove(t, err);
@@ -199,10 +209,11 @@ sdm_status trainer_training(trainer *t, bool resume, bool *unfit, sdm_train_repo
     bool found = false;
     *unfit = false;
     t->kind = trainer_kind_find(t->config->network.kind);
-    sdm_status s = trainer_export_config(t, &config, err);
+    sdm_status s = trainer_writes(t) ? trainer_export_config(t, &config, err) : SDM_OK;
+    s = sdm_comm_agree(t->hooks.comm, s, err);
     if (!s) {
         s = train_begin(t, resume, &found, err);
-        *unfit = s && s != SDM_E_CANCELLED && !resume;
+        *unfit = s && s != SDM_E_CANCELLED && !resume && !sdm_comm_broken(t->hooks.comm);
     }
     if (!s) s = train_run(t, resume, found, &config, err);
     trainer_producer_stop(t->producer);

@@ -370,6 +370,10 @@ const cli_option cli_options[] = {
      "with --plan: cores of each machine (default: the threads of this one)"},
     {"resume", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN), AT(resume),
      "continue from the checkpoint in the folder"},
+    {"ranks", 0, CLI_INT, "N", NULL, 1, 256, ON(CLI_TRAIN), AT(ranks),
+     "processes on this machine that share the work, each with its part of the cores; mpirun "
+     "shares "
+     "it among machines"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(force),
      "start again in a folder that holds a model"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(force),

@@ -154,6 +154,7 @@ struct cli_args {
     int64_t nodes, cores;            /* train; 0: option missing */
     const char *part;                /* fit, dataset; NULL: option missing */
     int64_t maps;                    /* dataset; -1: option missing */
+    int64_t ranks;                   /* train; 0: option missing */
     bool force;                      /* train, experiment, fit */
     bool dense, half;                /* generate, exact, fit: .vdb */
     bool keep_overlap, certify;      /* exact */

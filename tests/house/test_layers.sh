@@ -49,7 +49,7 @@ check() {
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
          own("all", "sdmgen") # the header that includes all public ones
-         own("trainer", "map_store ssm_build train train_file train_plan verdict")
+         own("trainer", "comm map_store ssm_build train train_file train_plan verdict")
         parts("core", "core")
         parts("config", "core config")
         parts("geom", "core geom")
@@ -65,7 +65,7 @@ check() {
         rooms("framework/nn/", "kernels onnx fine model pod template point sdmnn open")
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit/judge fit vdb")
-        rooms("trainer/", "numerics ssm data shards state pod fine template direct .")
+        rooms("trainer/", "comm numerics ssm data shards state pod fine template direct .")
         rooms("cli/", "args slicer report inputs measure shapes phantom fit cohort ssm study page .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", ". survey"); rooms("shapes/", ".")
         while ((getline line < files) > 0) {
@@ -110,7 +110,8 @@ check() {
         if (name ~ /^(openvdb|tbb)\// && FILENAME !~ /^runtime\/vdb\//) wrong(name " outside of runtime/vdb")
         if (name ~ /cairo.*\.h$/ && FILENAME !~ /^framework\/io\/picture\//) wrong(name " outside of framework/io/picture")
         if (name ~ /^z(lib|conf)\.h$/ && part != "io") wrong(name " outside of framework/io")
-        if (name ~ /^dlfcn\.h$/ && part != "shape") wrong(name " outside of framework/shape")
+        if (name ~ /^dlfcn\.h$/ && part != "shape" && FILENAME != "trainer/comm/comm_mpi.c") wrong(name " outside of framework/shape and trainer/comm/comm_mpi.c")
+        if (name == "mpi.h" && FILENAME != "trainer/comm/mpi_module.c") wrong(name " outside of trainer/comm/mpi_module.c")
         if (is_header(FILENAME) && !quoted && name !~ /^(std(arg|bool|def|int)|pthread|math)\.h$/) wrong(name " in a header between parts")
     }
     function owner_folder(part) { return part == "all" ? "runtime/" : part ~ /^(runtime|trainer|shapes)$/ ? part "/" : "framework/" }

@@ -1,7 +1,6 @@
-/* Computes the maps that are needed before training, on all threads. */
+/* Computes the maps that are needed before training, on all threads of all ranks. */
 #include "dataset_fill.h"
 
-#include <stdatomic.h>
 #include <string.h>
 
 #include "sdm/internal/threads.h"
@@ -33,65 +32,156 @@ static bool take_random(const dataset *d, size_t slot, size_t index, const doubl
     return true;
 }
 
-sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err)
+/* The maps while they are made: number i of `all` is a held-out map, then one of the static grid,
+   then a random one. */
+typedef struct filling {
+    dataset *d;
+    const fill_hooks *hooks;
+    int n_threads;
+    size_t all;
+    size_t done;     // maps made, by all ranks
+    size_t each;     // maps made when this rank has made one
+    bool stop;       // after an error, or on request
+    long failed;     // lowest number of a map that failed; -1: none. So the message does not
+    sdm_error first; // depend on scheduling
+    bool enough;
+} filling;
+
+/* Makes map number `at`. */
+static sdm_status fill_one(const dataset *d, workbench *w, size_t at, sdm_error *err)
+{
+    if (at < d->n_holdout) {
+        double *p = d->holdout_params + at * d->n_params;
+        trainer_dataset_holdout_params(d, at, p);
+        return take_holdout(d, at, p)
+                   ? SDM_OK
+                   : trainer_workbench_map(w, d, p, d->holdout + at * d->n_voxels, err);
+    }
+    // n_start <= n_ring, so random sample k lies in slot n_static + k
+    const size_t slot = at - d->n_holdout;
+    double *p = d->params + slot * d->n_params;
+    if (slot < d->n_static)
+        trainer_dataset_static_params(d, slot, p);
+    else
+        trainer_dataset_random_params(d, slot - d->n_static, p);
+    return slot >= d->n_static && take_random(d, slot, slot - d->n_static, p)
+               ? SDM_OK
+               : trainer_workbench_packed_map(w, d, p, d->maps + slot * d->n_voxels,
+                                              &d->scale[slot], err);
+}
+
+/* Notes the result of map number `at`, reports progress, and checks whether to stop. One thread at
+ * a time. */
+static void note_map(filling *f, const workbench *w, size_t at, sdm_status s, const sdm_error *err)
+{
+    const fill_hooks *hooks = f->hooks;
+    if (s && (f->failed < 0 || (long)at < f->failed)) f->failed = (long)at, f->first = *err;
+    if (s) f->stop = true;
+    if (at < f->d->n_holdout && w->inside) f->d->inside = true;
+    f->done = f->done + f->each < f->all ? f->done + f->each : f->all;
+    if (hooks->report && sdm_thread() == 0) hooks->report(hooks->user, f->done, f->all);
+    if (hooks->enough && hooks->enough(hooks->user)) f->enough = true;
+    if (hooks->cancelled && !f->stop && hooks->cancelled(hooks->user)) {
+        f->stop = true;
+        f->failed = (long)f->all;
+        sdm_fail(&f->first, SDM_E_CANCELLED, "stopped on request");
+    }
+}
+
+/* Makes the maps begin .. end - 1 on all threads of this rank. */
+static sdm_status fill_range(filling *f, size_t begin, size_t end, sdm_error *err)
 {
     enum { MIN_RANDOM = 128 }; // random maps made even if hooks->enough() is true
-    const size_t all = d->n_holdout + d->n_static + d->n_start;
-    size_t done = 0;
-    if (d->known) d->inside = d->known->inside;
-    long failed = -1; // lowest index of a failed map: so the message does not depend on scheduling
-    sdm_error first = {0};
-    atomic_bool stop = false, enough = false;
-    n_threads = sdm_threads(n_threads);
-#pragma omp parallel num_threads(n_threads)
+    const dataset *d = f->d;
+#pragma omp parallel num_threads(f->n_threads)
     {
         workbench w = {0};
         sdm_error mine = {0};
         const sdm_status made = trainer_workbench_create(&w, d, &mine);
 #pragma omp for schedule(dynamic)
-        for (long i = 0; i < (long)all; i++) {
+        for (long i = (long)begin; i < (long)end; i++) {
             const size_t at = (size_t)i;
-            if (stop || (enough && at >= d->n_holdout + d->n_static + MIN_RANDOM)) continue;
-            sdm_status s = made;
-            if (!s && at < d->n_holdout) {
-                double *p = d->holdout_params + at * d->n_params;
-                trainer_dataset_holdout_params(d, at, p);
-                if (!take_holdout(d, at, p))
-                    s = trainer_workbench_map(&w, d, p, d->holdout + at * d->n_voxels, &mine);
-            } else if (!s) {
-                // n_start <= n_ring, so random sample k lies in slot n_static + k
-                const size_t slot = at - d->n_holdout;
-                double *p = d->params + slot * d->n_params;
-                if (slot < d->n_static)
-                    trainer_dataset_static_params(d, slot, p);
-                else
-                    trainer_dataset_random_params(d, slot - d->n_static, p);
-                if (slot < d->n_static || !take_random(d, slot, slot - d->n_static, p))
-                    s = trainer_workbench_packed_map(&w, d, p, d->maps + slot * d->n_voxels,
-                                                     &d->scale[slot], &mine);
-            }
-            // keep the first error, report progress, and check whether to stop
+            bool skip;
 #pragma omp critical(sdm_dataset_fill)
-            {
-                if (s && (failed < 0 || i < failed)) failed = i, first = mine;
-                if (s) stop = true;
-                if (at < d->n_holdout && w.inside) d->inside = true;
-                done++;
-                if (hooks->report && sdm_thread() == 0) hooks->report(hooks->user, done, all);
-                if (hooks->enough && hooks->enough(hooks->user)) enough = true;
-                if (hooks->cancelled && !stop && hooks->cancelled(hooks->user)) {
-                    stop = true;
-                    failed = (long)all;
-                    sdm_fail(&first, SDM_E_CANCELLED, "stopped on request");
-                }
-            }
+            skip = f->stop || (f->enough && at >= d->n_holdout + d->n_static + MIN_RANDOM);
+            if (skip) continue;
+            const sdm_status s = made ? made : fill_one(d, &w, at, &mine);
+#pragma omp critical(sdm_dataset_fill)
+            note_map(f, &w, at, s, &mine);
         }
         trainer_workbench_dispose(&w);
     }
-    if (failed >= 0) {
-        if (err) *err = first;
-        return first.status;
+    if (f->failed < 0) return SDM_OK;
+    if (err) *err = f->first;
+    return f->first.status;
+}
+
+/* Makes the maps begin .. end - 1, all of them held-out or none, on all ranks, and gives all to
+ * each. */
+static sdm_status fill_round(filling *f, size_t begin, size_t end, sdm_error *err)
+{
+    dataset *d = f->d;
+    sdm_comm *comm = d->comm;
+    const size_t n = end - begin, p = d->n_params, v = d->n_voxels;
+    const int rank = sdm_comm_rank(comm);
+    sdm_status s = fill_range(f, begin + sdm_comm_first(comm, n, rank),
+                              begin + sdm_comm_first(comm, n, rank + 1), err);
+    s = sdm_comm_agree(comm, s, err);
+    const bool holdout = begin < d->n_holdout;
+    const size_t slot = holdout ? 0 : begin - d->n_holdout;
+    double *params = holdout ? d->holdout_params + begin * p : d->params + slot * p;
+    if (!s) s = sdm_comm_gather_shares(comm, params, n, p * sizeof *params, err);
+    if (holdout && !s)
+        s = sdm_comm_gather_shares(comm, d->holdout + begin * v, n, v * sizeof *d->holdout, err);
+    if (!holdout && !s)
+        s = sdm_comm_gather_shares(comm, d->maps + slot * v, n, v * sizeof *d->maps, err);
+    if (!holdout && !s) s = sdm_comm_gather_shares(comm, d->scale + slot, n, sizeof *d->scale, err);
+    // rank 0 decides
+    if (!s) s = sdm_comm_broadcast(comm, 0, &f->enough, sizeof f->enough, err);
+    f->done = end;
+    return s;
+}
+
+/* d->inside becomes true if it is so on any rank. */
+static sdm_status share_inside(dataset *d, sdm_error *err)
+{
+    sdm_status s = SDM_OK;
+    for (int r = 0; r < sdm_comm_size(d->comm) && !s; r++) {
+        bool inside = d->inside;
+        s = sdm_comm_broadcast(d->comm, r, &inside, sizeof inside, err);
+        d->inside = d->inside || inside;
     }
+    return s;
+}
+
+/* Makes the maps in rounds, after each of which all ranks know whether to stop. */
+static sdm_status fill_by_ranks(filling *f, sdm_error *err)
+{
+    enum { PER_THREAD = 16 };
+    dataset *d = f->d;
+    int threads = f->n_threads;
+    sdm_status s = sdm_comm_broadcast(d->comm, 0, &threads, sizeof threads, err);
+    f->each = (size_t)sdm_comm_size(d->comm);
+    const size_t round = (size_t)threads * PER_THREAD * f->each;
+    for (size_t at = 0, end; at < f->all && !s; at = end) {
+        const size_t until = at < d->n_holdout ? d->n_holdout : f->all;
+        end = until - at < round ? until : at + round;
+        s = fill_round(f, at, end, err);
+    }
+    return s ? s : share_inside(d, err);
+}
+
+sdm_status trainer_dataset_fill(dataset *d, int n_threads, const fill_hooks *hooks, sdm_error *err)
+{
+    filling f = {.d = d,
+                 .hooks = hooks,
+                 .n_threads = sdm_threads(n_threads),
+                 .all = d->n_holdout + d->n_static + d->n_start,
+                 .each = 1,
+                 .failed = -1};
+    if (d->known) d->inside = d->known->inside;
+    const sdm_status s = d->comm ? fill_by_ranks(&f, err) : fill_range(&f, 0, f.all, err);
+    if (s) return s;
     // a slot with a map has scale > 0; maps after the first gap are made again during training
     size_t made = 0;
     while (made < d->n_start && d->scale[d->n_static + made] > 0) made++;

@@ -29,6 +29,19 @@ struct producer {
     pthread_t workers[MAX_WORKERS];
 };
 
+/* The rank that makes sample `index`. */
+static int maker(const dataset *d, size_t index)
+{
+    return (int)(index % (size_t)sdm_comm_size(d->comm));
+}
+
+/* The first sample from `index` on that this rank makes. */
+static size_t next_own(const dataset *d, size_t index)
+{
+    while (maker(d, index) != sdm_comm_rank(d->comm)) index++;
+    return index;
+}
+
 /* A worker: computes the next sample as soon as its place in the window is free and its Sobol'
  * point is planned. */
 static void *worker_run(void *user)
@@ -45,7 +58,8 @@ static void *worker_run(void *user)
                (p->next >= p->base + WINDOW || p->next >= p->allowed))
             pthread_cond_wait(&p->taken, &p->lock);
         if (p->stop || p->next >= p->end) break;
-        const size_t index = p->next++, place = index % WINDOW;
+        const size_t index = p->next, place = index % WINDOW;
+        p->next = next_own(d, index + 1);
         pthread_mutex_unlock(&p->lock);
         // compute it without the lock
         double *params = p->params + place * d->n_params;
@@ -76,7 +90,8 @@ sdm_status trainer_producer_start(dataset *d, size_t first, int n_threads, produ
     sdm_status s = SDM_ALLOC(&p, 1, "sample producer", err);
     if (s) return s;
     p->d = d;
-    p->next = p->base = first;
+    p->base = first;
+    p->next = next_own(d, first);
     p->end = d->n_start + d->n_online;
     p->allowed = d->plan.n_planned;
     p->failed = SIZE_MAX;
@@ -109,13 +124,60 @@ void trainer_producer_allow(producer *p, size_t n_planned)
     pthread_mutex_unlock(&p->lock);
 }
 
+/* The smallest value of n of all ranks. */
+static size_t shared_minimum(sdm_comm *comm, size_t n)
+{
+    size_t least = n;
+    for (int r = 0; r < sdm_comm_size(comm); r++) {
+        size_t other = n;
+        sdm_comm_broadcast(comm, r, &other, sizeof other, NULL);
+        if (other < least) least = other;
+    }
+    return least;
+}
+
 size_t trainer_producer_ready(producer *p)
 {
     pthread_mutex_lock(&p->lock);
     size_t n = 0;
-    while (n < WINDOW && p->done[(p->base + n) % WINDOW]) n++;
+    while (n < WINDOW && (maker(p->d, p->base + n) != sdm_comm_rank(p->d->comm) ||
+                          p->done[(p->base + n) % WINDOW]))
+        n++;
     pthread_mutex_unlock(&p->lock);
-    return n;
+    return shared_minimum(p->d->comm, n < p->end - p->base ? n : p->end - p->base);
+}
+
+/* Waits until this rank has made sample number p->base, and puts it into its slot. */
+static sdm_status take_own(producer *p, size_t slot, sdm_error *err)
+{
+    const dataset *d = p->d;
+    const size_t place = p->base % WINDOW;
+    pthread_mutex_lock(&p->lock);
+    while (!p->done[place]) pthread_cond_wait(&p->made, &p->lock);
+    const bool failed = p->base == p->failed;
+    pthread_mutex_unlock(&p->lock);
+    if (failed) {
+        if (err) *err = p->error;
+        return p->error.status;
+    }
+    // workers do not touch this place until `base` moves on
+    memcpy(d->params + slot * d->n_params, p->params + place * d->n_params,
+           d->n_params * sizeof *d->params);
+    memcpy(d->maps + slot * d->n_voxels, p->maps + place * d->n_voxels,
+           d->n_voxels * sizeof *d->maps);
+    d->scale[slot] = p->scale[place];
+    return SDM_OK;
+}
+
+/* Sends the sample in `slot` from the rank that has made it to the others. */
+static sdm_status spread(const dataset *d, int root, size_t slot, sdm_error *err)
+{
+    sdm_status s = sdm_comm_broadcast(d->comm, root, d->params + slot * d->n_params,
+                                      d->n_params * sizeof *d->params, err);
+    if (!s)
+        s = sdm_comm_broadcast(d->comm, root, d->maps + slot * d->n_voxels,
+                               d->n_voxels * sizeof *d->maps, err);
+    return s ? s : sdm_comm_broadcast(d->comm, root, d->scale + slot, sizeof *d->scale, err);
 }
 
 sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err)
@@ -123,23 +185,12 @@ sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err)
     dataset *d = p->d;
     if (until > p->end) until = p->end;
     while (p->base < until) {
-        const size_t place = p->base % WINDOW;
-        // wait for the sample
-        pthread_mutex_lock(&p->lock);
-        while (!p->done[place]) pthread_cond_wait(&p->made, &p->lock);
-        const bool failed = p->base == p->failed;
-        pthread_mutex_unlock(&p->lock);
-        if (failed) {
-            if (err) *err = p->error;
-            return p->error.status;
-        }
-        // workers do not touch this place until `base` moves on
-        const size_t slot = trainer_dataset_slot(d, p->base);
-        memcpy(d->params + slot * d->n_params, p->params + place * d->n_params,
-               d->n_params * sizeof *d->params);
-        memcpy(d->maps + slot * d->n_voxels, p->maps + place * d->n_voxels,
-               d->n_voxels * sizeof *d->maps);
-        d->scale[slot] = p->scale[place];
+        const size_t place = p->base % WINDOW, slot = trainer_dataset_slot(d, p->base);
+        const int root = maker(d, p->base);
+        sdm_status s = root == sdm_comm_rank(d->comm) ? take_own(p, slot, err) : SDM_OK;
+        s = sdm_comm_agree(d->comm, s, err);
+        if (!s) s = spread(d, root, slot, err);
+        if (s) return s;
         // free the place
         pthread_mutex_lock(&p->lock);
         p->done[place] = false;

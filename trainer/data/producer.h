@@ -1,4 +1,6 @@
-/* Worker threads that compute random training maps in the background while the caller trains. */
+/* Worker threads that compute random training maps in the background while the caller trains. Ranks
+   (sdm/internal/comm.h) take turns: sample i is made by rank i mod size, and the others get it when
+   it is taken. */
 #pragma once
 
 #include "dataset.h"
@@ -14,11 +16,11 @@ sdm_status trainer_producer_start(dataset *d, size_t first, int n_threads, produ
 /* Lets the workers compute the samples below n_planned, whose points are in d->plan. */
 void trainer_producer_allow(producer *p, size_t n_planned);
 
-/* Number of finished samples that can be taken now without waiting. */
+/* Number of finished samples that can be taken now without waiting. Called by all ranks. */
 size_t trainer_producer_ready(producer *p);
 
 /* Moves finished samples into the pool until it holds `until` random samples; waits for unfinished
-   ones. Returns the error of the first sample that failed. */
+   ones. Returns the error of the first sample that failed. Called by all ranks. */
 sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err);
 
 /* Stops the workers and frees the producer; NULL does nothing. */

@@ -111,13 +111,13 @@ static double direct_fraction(const trainer *t, const direct_state *d)
                  // the measurement of the model, and of its error on training maps
         reserve = fmin(d->export_seconds + 2 * t->evaluation_seconds, 0.5 * total);
     const double length = total - reserve - t->phase_started;
-    return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
+    return length > 0 ? (trainer_shared_seconds(t) - t->phase_started) / length : 1;
 }
 
 /* Measures the averaged weights on held-out maps and adds a line to the metrics. */
 static sdm_status direct_evaluate(trainer *t, direct_state *d, double rate, sdm_error *err)
 {
-    const double began = trainer_seconds(t);
+    const double began = trainer_shared_seconds(t);
     double mse;
     const sdm_status s = d->kind->evaluate(t, d->network, d->weights.average, false, &mse, err);
     if (s) return s;
@@ -136,12 +136,12 @@ static sdm_status direct_run(trainer *t, bool resumed, sdm_error *err)
     for (double at; !s && (at = direct_fraction(t, d)) < 1;) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
-        if (trainer_cancelled(t)) return trainer_stop(t, err);
+        if (trainer_all_cancelled(t)) return trainer_stop(t, err);
         // one step
         const double rate = c->train.learning_rate * trainer_rate_schedule(at, c->train.warmup);
         if ((s = direct_step(t, d, rate, err))) break;
         // evaluate, report, save
-        const double now = trainer_seconds(t);
+        const double now = trainer_shared_seconds(t);
         if (trainer_evaluation_due(t, now) && (s = direct_evaluate(t, d, rate, err))) break;
         trainer_step_done(t);
         trainer_checkpoint_if_due(t, now);

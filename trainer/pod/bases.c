@@ -9,6 +9,7 @@
 #include "coefficients.h"
 #include "data/streams.h"
 #include "numerics/linalg.h"
+#include "pod_ranks.h"
 #include "pod_tree.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/memory.h"
@@ -38,6 +39,7 @@ typedef struct basis_work {
     pod_state *pod;
     size_t n, *slots; // slots of the n maps used
     size_t keep;      // largest number of functions of a lowest-level block
+    pod_share share;  // the trees of this rank; it has the bases of their blocks alone
     float *lowest;    // [n_voxels][keep] eigenvectors on the lowest level, block after block
     double *values;   // [blocks of the lowest level][keep]
     double min_gain;
@@ -125,7 +127,8 @@ static sdm_status lowest_level_ranks(basis_work *m, sdm_error *err)
     }
     sdm_free(c);
     // copy the chosen functions
-    for (size_t b = 0; b < n_blocks && !s; b++) {
+    const size_t end = trainer_pod_first_block(pod, 0, m->share.end);
+    for (size_t b = trainer_pod_first_block(pod, 0, m->share.first); b < end && !s; b++) {
         const size_t size = pod->blocks[b].rank * sdm_pod_block_voxels(&pod->blocks[b]);
         if (!(s = SDM_ALLOC(&m->basis[b], size, "local bases", err)))
             memcpy(m->basis[b], m->lowest + pod->blocks[b].voxel * m->keep,
@@ -250,9 +253,10 @@ static sdm_status check_cancelled(const pod_state *pod, sdm_error *err)
 static sdm_status lowest_level(basis_work *m, sdm_error *err)
 {
     const pod_state *pod = m->pod;
-    const long n_blocks = (long)pod->arch.levels.first[1];
+    const long begin = (long)trainer_pod_first_block(pod, 0, m->share.first),
+               end = (long)trainer_pod_first_block(pod, 0, m->share.end);
     size_t largest = 0;
-    for (long b = 0; b < n_blocks; b++)
+    for (long b = begin; b < end; b++)
         if (sdm_pod_block_voxels(&pod->blocks[b]) > largest)
             largest = sdm_pod_block_voxels(&pod->blocks[b]);
     first_error first = {.index = -1};
@@ -263,7 +267,7 @@ static sdm_status lowest_level(basis_work *m, sdm_error *err)
         sdm_status s = SDM_ALLOC(&rows, m->n * largest, "local bases", &mine);
         if (!s) s = SDM_ALLOC(&covariance, largest * largest, "local bases", &mine);
 #pragma omp for schedule(dynamic)
-        for (long b = 0; b < n_blocks; b++)
+        for (long b = begin; b < end; b++)
             if (s || check_cancelled(pod, &mine) ||
                 lowest_level_block(m, (size_t)b, rows, covariance, &mine))
                 first_error_note(&first, b, &mine);
@@ -276,7 +280,8 @@ static sdm_status lowest_level(basis_work *m, sdm_error *err)
 static sdm_status upper_levels(basis_work *m, sdm_error *err)
 {
     const sdm_pod_levels *levels = &m->pod->arch.levels;
-    const long begin = (long)levels->first[levels->n - 1], end = (long)levels->first[levels->n];
+    const long top = (long)levels->first[levels->n - 1], begin = top + (long)m->share.first,
+               end = top + (long)m->share.end;
     first_error first = {.index = -1};
     if (levels->n == 1) return SDM_OK;
 #pragma omp parallel for schedule(dynamic) num_threads(m->pod->t->n_threads)
@@ -286,6 +291,29 @@ static sdm_status upper_levels(basis_work *m, sdm_error *err)
             first_error_note(&first, root, &mine);
     }
     return first_error_status(&first, err);
+}
+
+/* Gives all ranks the mean map and the eigenvalues of the lowest level. s, err: of this rank. */
+static sdm_status share_lowest_level(const basis_work *m, sdm_status s, sdm_error *err)
+{
+    const pod_state *pod = m->pod;
+    s = sdm_comm_agree(pod->t->hooks.comm, s, err);
+    if (!s)
+        s = trainer_pod_gather(pod, 0, trainer_pod_place_voxel, sizeof *pod->mean, pod->mean, err);
+    return s ? s
+             : trainer_pod_gather(pod, 0, trainer_pod_place_block, m->keep * sizeof *m->values,
+                                  m->values, err);
+}
+
+/* The same for the numbers of functions of all blocks. */
+static sdm_status share_ranks(const basis_work *m, sdm_status s, sdm_error *err)
+{
+    const pod_state *pod = m->pod;
+    s = sdm_comm_agree(pod->t->hooks.comm, s, err);
+    for (size_t level = 1; level < pod->arch.levels.n && !s; level++)
+        s = trainer_pod_gather(pod, level, trainer_pod_place_block, sizeof *pod->blocks,
+                               pod->blocks, err);
+    return s;
 }
 
 /* Numbers the coefficients by the ranks and copies the bases into one array, pod->basis. */
@@ -306,12 +334,27 @@ static sdm_status collect_bases(basis_work *m, sdm_error *err)
     pod->arch.n_coefficients = sum_ranks(pod, levels->first[levels->n - 1], n_blocks);
     if ((s = SDM_ALLOC(&pod->basis, count, "local bases", err))) return s;
     for (size_t b = 0; b < n_blocks; b++) {
+        if (!m->basis[b]) continue;
         memcpy(pod->basis + pod->matrix_at[b], m->basis[b],
                (pod->matrix_at[b + 1] - pod->matrix_at[b]) * sizeof *pod->basis);
         sdm_free(m->basis[b]);
         m->basis[b] = NULL;
     }
-    return SDM_OK;
+    for (size_t level = 0; level < levels->n && !s; level++)
+        s = trainer_pod_gather(pod, level, trainer_pod_place_matrix, sizeof *pod->basis, pod->basis,
+                               err);
+    return s;
+}
+
+static sdm_status all_levels(basis_work *m, sdm_error *err)
+{
+    sdm_status s = lowest_level(m, err);
+    s = share_lowest_level(m, s, err);
+    if (s) return s;
+    s = lowest_level_ranks(m, err);
+    if (!s) s = upper_levels(m, err);
+    s = share_ranks(m, s, err);
+    return s ? s : collect_bases(m, err);
 }
 
 sdm_status trainer_bases_make(pod_state *pod, sdm_error *err)
@@ -320,7 +363,8 @@ sdm_status trainer_bases_make(pod_state *pod, sdm_error *err)
     const size_t n_blocks = pod->arch.levels.first[pod->arch.levels.n];
     basis_work m = {.pod = pod,
                     .n = n < BASES_MAPS ? n : BASES_MAPS,
-                    .keep = 4 * (size_t)pod->t->config->network.rank};
+                    .keep = 4 * (size_t)pod->t->config->network.rank,
+                    .share = trainer_pod_share(pod)};
     sdm_status s = SDM_ALLOC(&pod->mean, pod->arch.n_voxels, "mean map", err);
     if (!s) s = SDM_ALLOC(&m.slots, m.n, "local bases", err);
     if (!s) s = SDM_ALLOC(&m.lowest, pod->arch.n_voxels * m.keep, "local bases", err);
@@ -328,10 +372,7 @@ sdm_status trainer_bases_make(pod_state *pod, sdm_error *err)
     if (!s) s = SDM_ALLOC(&m.basis, n_blocks, "local bases", err);
     // maps evenly spread over the slots
     for (size_t i = 0; i < m.n && !s; i++) m.slots[i] = i * n / m.n;
-    if (!s) s = lowest_level(&m, err);
-    if (!s) s = lowest_level_ranks(&m, err);
-    if (!s) s = upper_levels(&m, err);
-    if (!s) s = collect_bases(&m, err);
+    if (!s) s = all_levels(&m, err);
     for (size_t b = 0; b < n_blocks && m.basis; b++) sdm_free(m.basis[b]);
     sdm_free(m.basis);
     sdm_free(m.values);

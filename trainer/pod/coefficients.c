@@ -3,6 +3,7 @@
 
 #include <stdatomic.h>
 
+#include "pod_ranks.h"
 #include "pod_tree.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/team.h"
@@ -79,10 +80,11 @@ typedef struct projection {
     const size_t *slots;
     size_t n;
     float *y;
+    size_t first; // tree of this rank
     atomic_bool short_of_memory;
 } projection;
 
-/* Projects the maps on the tree below root number `index`; maps in chunks, to limit the scratch
+/* Projects the maps on tree number `index` of this rank; maps in chunks, to limit the scratch
  * memory. */
 static void project_tree(void *user, size_t index, int member)
 {
@@ -92,7 +94,7 @@ static void project_tree(void *user, size_t index, int member)
     const sdm_pod_levels *levels = &pod->arch.levels;
     const size_t n = p->n, chunk = n < CHUNK ? n : CHUNK;
     const pod_tree tree =
-        trainer_pod_tree(levels, pod->blocks, levels->first[levels->n - 1] + index);
+        trainer_pod_tree(levels, pod->blocks, levels->first[levels->n - 1] + p->first + index);
     const size_t widest = trainer_pod_tree_coefficients(pod->blocks, &tree, 0);
     float *rows = NULL, *below = NULL, *here = NULL;
     (void)member;
@@ -111,11 +113,11 @@ static void project_tree(void *user, size_t index, int member)
 sdm_status trainer_coefficients_project(const pod_state *pod, bool holdout, const size_t *slots,
                                         size_t n, float *y, sdm_error *err)
 {
-    const sdm_pod_levels *levels = &pod->arch.levels;
-    projection p = {.pod = pod, .holdout = holdout, .slots = slots, .n = n, .y = y};
-    sdm_team_run(trainer_threads(pod->t), levels->first[levels->n] - levels->first[levels->n - 1],
-                 project_tree, &p);
+    const pod_share share = trainer_pod_share(pod);
+    projection p = {
+        .pod = pod, .holdout = holdout, .slots = slots, .n = n, .y = y, .first = share.first};
+    sdm_team_run(trainer_threads(pod->t), share.end - share.first, project_tree, &p);
     return atomic_load(&p.short_of_memory)
                ? sdm_fail(err, SDM_E_NOMEM, "no memory for local coefficients")
-               : SDM_OK;
+               : trainer_pod_gather_columns(pod, n, y, err);
 }

@@ -55,15 +55,25 @@ static sdm_status mode_batch_create(const pod_state *pod, size_t rows, mode_batc
     return s;
 }
 
-/* predicted[B][R] = MLP and readout at x with weights w. Returns h[B][W], the output of the MLP. */
-static const float *modes_predict(const pod_state *pod, const float *w, size_t rows, mode_batch *b)
+/* predicted[B][R] = MLP and readout at x with weights w, in some rows. Returns h[B][W], the output
+ * of the MLP. */
+static const float *predict_rows(const pod_state *pod, const float *w, size_t batch, mlp_part rows,
+                                 mode_batch *b)
 {
     const sdm_pod_arch *a = &pod->arch;
-    const float *h = trainer_mlp_forward(a, w, rows, b->x, b->workspace, trainer_threads(pod->t));
-    sdm_gemm(rows, pod->n_modes, a->width, (sdm_view){h, a->width, 1},
-             (sdm_view){w + trainer_mlp_count(a), 1, a->width}, false, b->predicted, pod->n_modes,
-             trainer_threads(pod->t));
+    const int threads = trainer_threads(pod->t);
+    const float *h = trainer_mlp_forward_rows(a, w, batch, rows, b->x, b->workspace, threads);
+    sdm_gemm(rows.end - rows.first, pod->n_modes, a->width,
+             (sdm_view){h + rows.first * a->width, a->width, 1},
+             (sdm_view){w + trainer_mlp_count(a), 1, a->width}, false,
+             b->predicted + rows.first * pod->n_modes, pod->n_modes, threads);
     return h;
+}
+
+/* The same in all rows. */
+static void modes_predict(const pod_state *pod, const float *w, size_t batch, mode_batch *b)
+{
+    predict_rows(pod, w, batch, (mlp_part){0, batch}, b);
 }
 
 /* Mean square error (mm^2) on the held-out maps: the error of the mode coefficients plus the error
@@ -113,6 +123,7 @@ typedef struct mode_loop {
     const pod_state *pod;
     mode_batch *batch;
     size_t rows;
+    mlp_part own; // rows of this rank
 } mode_loop;
 
 /* Rows of a batch that a thread computes at a time. */
@@ -135,14 +146,16 @@ static void draw_rows(void *user, size_t index, int member)
     }
 }
 
-/* Loss, and its gradient with respect to the predictions, in the rows index * ROWS and up. */
+/* Loss, and its gradient with respect to the predictions, in the rows index * ROWS of this rank and
+ * up. */
 static void compare_rows(void *user, size_t index, int member)
 {
     const mode_loop *l = user;
     mode_batch *b = l->batch;
     const size_t r = l->pod->n_modes;
+    const size_t first = l->own.first + index * ROWS;
     (void)member;
-    for (size_t i = index * ROWS; i < index * ROWS + ROWS && i < l->rows; i++) {
+    for (size_t i = first; i < first + ROWS && i < l->own.end; i++) {
         double sum = 0;
         for (size_t j = i * r; j < (i + 1) * r; j++) {
             const float e = b->predicted[j] - b->target[j];
@@ -153,33 +166,67 @@ static void compare_rows(void *user, size_t index, int member)
     }
 }
 
-/* One Adam step on a random batch. */
-static void mode_fit_step(pod_state *pod, mode_batch *b, size_t batch, double rate)
+/* Gives all ranks the rows of the batch that the others have computed. */
+static sdm_status gather_rows(const pod_state *pod, mode_batch *b, size_t batch, sdm_error *err)
+{
+    sdm_comm *comm = pod->t->hooks.comm;
+    sdm_status s = sdm_comm_gather_shares(comm, b->loss, batch, sizeof *b->loss, err);
+    if (!s)
+        s = sdm_comm_gather_shares(comm, b->predicted, batch, pod->n_modes * sizeof *b->predicted,
+                                   err);
+    return s ? s : trainer_mlp_gather_rows(&pod->arch, comm, batch, b->workspace, err);
+}
+
+/* b->gradient = gradient with respect to the weights: each rank computes that of some modes and of
+ * some units of each layer. h[B][W]: output of the MLP. */
+static sdm_status weight_gradient(const pod_state *pod, mode_batch *b, size_t batch, const float *h,
+                                  sdm_error *err)
 {
     const sdm_pod_arch *a = &pod->arch;
-    const size_t r = pod->n_modes, readout = trainer_mlp_count(a),
-                 slices = (batch + ROWS - 1) / ROWS;
+    sdm_comm *comm = pod->t->hooks.comm;
+    const size_t r = pod->n_modes;
     const int threads = trainer_threads(pod->t);
-    mode_loop loop = {pod, b, batch};
-    sdm_team_run(threads, slices, draw_rows, &loop);
-    const float *h = modes_predict(pod, pod->mode_fit.w, batch, b);
-    sdm_team_run(threads, slices, compare_rows, &loop);
+    const mlp_part modes = trainer_mlp_part(comm, r);
+    float *readout = b->gradient + trainer_mlp_count(a);
+    sdm_gemm(modes.end - modes.first, a->width, batch, (sdm_view){b->predicted + modes.first, 1, r},
+             (sdm_view){h, a->width, 1}, false, readout + modes.first * a->width, a->width,
+             threads);
+    trainer_mlp_gradient_units(a, batch, trainer_mlp_part(comm, a->width), b->x, b->workspace,
+                               b->gradient, threads);
+    const sdm_status s = sdm_comm_gather_shares(comm, readout, r, a->width * sizeof *readout, err);
+    return s ? s : trainer_mlp_gather_units(a, comm, b->gradient, err);
+}
+
+/* One Adam step on a random batch. */
+static sdm_status mode_fit_step(pod_state *pod, mode_batch *b, size_t batch, double rate,
+                                sdm_error *err)
+{
+    const sdm_pod_arch *a = &pod->arch;
+    const mlp_part own = trainer_mlp_part(pod->t->hooks.comm, batch);
+    const size_t r = pod->n_modes, n = own.end - own.first, readout = trainer_mlp_count(a);
+    const int threads = trainer_threads(pod->t);
+    mode_loop loop = {pod, b, batch, own};
+    sdm_team_run(threads, (batch + ROWS - 1) / ROWS, draw_rows, &loop);
+    // forward and backward pass in the rows of this rank
+    const float *h = predict_rows(pod, pod->mode_fit.w, batch, own, b);
+    sdm_team_run(threads, (n + ROWS - 1) / ROWS, compare_rows, &loop);
+    sdm_gemm(n, a->width, r, (sdm_view){b->predicted + own.first * r, r, 1},
+             (sdm_view){pod->mode_fit.w + readout, a->width, 1}, false,
+             b->dh + own.first * a->width, a->width, threads);
+    trainer_mlp_backward_rows(a, pod->mode_fit.w, batch, own, b->workspace, b->dh, threads);
+
+    sdm_status s = gather_rows(pod, b, batch, err);
+    if (!s) s = weight_gradient(pod, b, batch, h, err);
+    if (s) return s;
+    trainer_adam_update_all(&pod->mode_fit, b->gradient,
+                            trainer_adam_begin(rate, MODE_FIT_DECAY, pod->t->phase_step + 1),
+                            threads);
     double sum = 0;
     for (size_t i = 0; i < batch; i++) sum += b->loss[i];
     const double scale = pod->target_scale;
     pod->t->loss =
         pod->training_floor + sum * scale * scale / ((double)batch * (double)pod->t->data.n_voxels);
-
-    // gradient with respect to the weights
-    sdm_gemm(r, a->width, batch, (sdm_view){b->predicted, 1, r}, (sdm_view){h, a->width, 1}, false,
-             b->gradient + readout, a->width, threads);
-    sdm_gemm(batch, a->width, r, (sdm_view){b->predicted, r, 1},
-             (sdm_view){pod->mode_fit.w + readout, a->width, 1}, false, b->dh, a->width, threads);
-    trainer_mlp_backward(a, pod->mode_fit.w, batch, b->x, b->workspace, b->dh, b->gradient,
-                         threads);
-    trainer_adam_update_all(&pod->mode_fit, b->gradient,
-                            trainer_adam_begin(rate, MODE_FIT_DECAY, pod->t->phase_step + 1),
-                            threads);
+    return SDM_OK;
 }
 
 /* Used fraction of the phase's budget, which is (1 - train.refine) * (number of steps), at least
@@ -192,13 +239,13 @@ static double mode_fit_fraction(const pod_state *pod)
         return (double)t->phase_step / fmax(steps, 1);
     }
     const double length = pod->mode_fit_end - t->phase_started;
-    return length > 0 ? (trainer_seconds(t) - t->phase_started) / length : 1;
+    return length > 0 ? (trainer_shared_seconds(t) - t->phase_started) / length : 1;
 }
 
 /* Measures the averaged weights on the held-out maps and adds a line to the metrics. */
 static sdm_status evaluate(pod_state *pod, mode_batch *b, size_t batch, double rate, sdm_error *err)
 {
-    const double began = trainer_seconds(pod->t);
+    const double began = trainer_shared_seconds(pod->t);
     trainer_evaluated(pod->t, modes_evaluate(pod, pod->mode_fit.average, b, batch), began);
     return trainer_metric(pod->t, rate, err);
 }
@@ -218,13 +265,13 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
     while (!s && at < 1 && !done) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, trainer_samples_wanted(t, at), err))) break;
-        if (trainer_cancelled(t)) {
+        if (trainer_all_cancelled(t)) {
             s = trainer_stop(t, err);
             break;
         }
         // one step
         const double rate = c->train.learning_rate * trainer_rate_schedule(at, c->train.warmup);
-        mode_fit_step(pod, &b, batch, rate);
+        if ((s = mode_fit_step(pod, &b, batch, rate, err))) break;
         t->step++, t->phase_step++;
         at = mode_fit_fraction(pod);
         trainer_average_follow(&pod->mode_fit, c->train.average, t->phase_step, !(at < 1),
@@ -237,7 +284,7 @@ sdm_status trainer_mode_fit_run(pod_state *pod, sdm_error *err)
             break;
         }
         // evaluate, report, save
-        const double now = trainer_seconds(t);
+        const double now = trainer_shared_seconds(t);
         if (trainer_evaluation_due(t, now)) {
             if ((s = evaluate(pod, &b, batch, rate, err))) break;
             if (trainer_evaluation_counts(t))

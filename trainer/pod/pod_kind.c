@@ -152,6 +152,11 @@ static parameters *pod_weights(trainer *t)
     return t->phase == SDM_PHASE_MODE_FIT ? &pod->mode_fit : &pod->refine;
 }
 
+static sdm_status pod_gather(trainer *t, sdm_error *err)
+{
+    return t->phase == SDM_PHASE_REFINE ? trainer_refine_gather(t->state, err) : SDM_OK;
+}
+
 /* Checksum over ranks, mean map, bases and modes. */
 static uint64_t pod_fingerprint(const trainer *t)
 {
@@ -216,6 +221,7 @@ const train_kind trainer_kind_pod = {.block = pod_block,
                                      .errors = pod_errors,
                                      .run = pod_run,
                                      .weights = pod_weights,
+                                     .gather = pod_gather,
                                      .fingerprint = pod_fingerprint,
                                      .build = pod_build,
                                      .parts = trainer_pod_parts,

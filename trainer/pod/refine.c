@@ -1,6 +1,6 @@
 /* Trains MLP, head, bases and mean map together, end to end, on maps. The blocks of a tree
-   (pod_tree.h) are computed by one thread. B is the size of a batch; other letters as in
-   pod_state.h. */
+   (pod_tree.h) are computed by one thread, of the rank that has the tree. B is the size of a batch;
+   other letters as in pod_state.h. */
 #include "refine.h"
 
 #include <math.h>
@@ -10,6 +10,7 @@
 #include "head.h"
 #include "mlp.h"
 #include "numerics/loss.h"
+#include "pod_ranks.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/team.h"
 #include "sdm/memory.h"
@@ -36,6 +37,9 @@ typedef struct refine_batch {
     size_t tree_floats; // floats of scratch memory of a tree
     int tree_threads;   // threads that have scratch memory for a tree
     float *scratch;
+    // of this rank: trees; columns of c and dc, which are rows of the head
+    pod_share share;
+    size_t column, columns;
 } refine_batch;
 
 static void refine_batch_dispose(refine_batch *b)
@@ -64,11 +68,23 @@ static size_t n_trees(const pod_state *pod)
     return pod->arch.levels.first[pod->arch.levels.n] - first_tree(pod);
 }
 
+/* The first coefficient of the highest level in the trees from number `tree` on. */
+static size_t first_column(const pod_state *pod, size_t tree)
+{
+    return trainer_pod_place_coefficient(pod, first_tree(pod) + tree);
+}
+
 static sdm_status refine_batch_create(const pod_state *pod, size_t rows, refine_batch *b,
                                       sdm_error *err)
 {
     const sdm_pod_arch *a = &pod->arch;
-    *b = (refine_batch){.rows = rows, .tree_threads = (int)n_trees(pod)};
+    const pod_share share = trainer_pod_share(pod);
+    const size_t column = first_column(pod, share.first);
+    *b = (refine_batch){.rows = rows,
+                        .tree_threads = (int)n_trees(pod),
+                        .share = share,
+                        .column = column,
+                        .columns = first_column(pod, share.end) - column};
     if (b->tree_threads > pod->t->n_threads) b->tree_threads = pod->t->n_threads;
     for (size_t i = 0; i < n_trees(pod); i++) {
         const size_t need = trainer_tree_floats(pod, rows, first_tree(pod) + i);
@@ -96,13 +112,14 @@ static int threads_for_trees(const pod_state *pod, const refine_batch *b)
     return n < b->tree_threads ? n : b->tree_threads;
 }
 
-/* b->c[rows][K] = coefficients of the highest level from the latent variables b->z. */
+/* b->c[rows][K] = coefficients of the highest level from the latent variables b->z, in the columns
+ * of this rank. */
 static void head_forward(const pod_state *pod, const float *w, refine_batch *b, size_t rows)
 {
     const sdm_pod_arch *a = &pod->arch;
-    sdm_gemm(rows, a->n_coefficients, a->n_latent, (sdm_view){b->z, a->n_latent, 1},
-             (sdm_view){w + pod->head_at, 1, a->n_latent}, false, b->c, a->n_coefficients,
-             trainer_threads(pod->t));
+    sdm_gemm(rows, b->columns, a->n_latent, (sdm_view){b->z, a->n_latent, 1},
+             (sdm_view){w + pod->head_at + b->column * a->n_latent, 1, a->n_latent}, false,
+             b->c + b->column, a->n_coefficients, trainer_threads(pod->t));
 }
 
 /* The arrays of a tree in the scratch memory of a member of the team. */
@@ -148,12 +165,13 @@ typedef struct refine_loop {
     size_t first, rows;
 } refine_loop;
 
-/* Forward pass, backward pass and weight update of tree i on the batch. */
-static void tree_train(void *user, size_t i, int member)
+/* Forward pass, backward pass and weight update of tree `index` of this rank on the batch. */
+static void tree_train(void *user, size_t index, int member)
 {
     const refine_loop *l = user;
     pod_state *pod = l->pod;
     refine_batch *b = l->batch;
+    const size_t i = b->share.first + index;
     const tree_work w = batch_tree(pod, b, first_tree(pod) + i, member);
     const size_t first = pod->blocks[w.tree.first[0]].voxel, voxels = w.tree.voxels;
     trainer_tree_forward(pod, pod->refine.w, b->rows, &w);
@@ -169,16 +187,16 @@ static void tree_train(void *user, size_t i, int member)
     tree_backward(pod, b->rows, &w, l->adam);
 }
 
-/* Updates rows of the head, HEAD_ROWS from row index * HEAD_ROWS on, from the gradient of the
- * batch. */
+/* Updates rows of the head, HEAD_ROWS from row index * HEAD_ROWS of this rank on, from the gradient
+ * of the batch. */
 static void head_train(void *user, size_t index, int member)
 {
     const refine_loop *l = user;
     pod_state *pod = l->pod;
     const refine_batch *b = l->batch;
     const size_t n_c = pod->arch.n_coefficients, latents = pod->arch.n_latent;
-    const size_t first = index * HEAD_ROWS,
-                 rows = n_c - first < HEAD_ROWS ? n_c - first : HEAD_ROWS;
+    const size_t done = index * HEAD_ROWS, first = b->column + done,
+                 rows = b->columns - done < HEAD_ROWS ? b->columns - done : HEAD_ROWS;
     float *gradient = b->scratch + HEAD_ROWS * latents * (size_t)member;
     sdm_gemm(rows, latents, b->rows, (sdm_view){b->dc + first, 1, n_c},
              (sdm_view){b->z, latents, 1}, false, gradient, latents, 1);
@@ -187,12 +205,26 @@ static void head_train(void *user, size_t index, int member)
                             gradient + i * latents, l->adam, HEAD_STEP * pod->deviation[first + i]);
 }
 
+/* Gives all ranks the losses of all trees. */
+static sdm_status share_losses(const pod_state *pod, refine_batch *b, sdm_error *err)
+{
+    return trainer_pod_gather(pod, pod->arch.levels.n - 1, trainer_pod_place_root, sizeof *b->loss,
+                              b->loss, err);
+}
+
+/* Gives all ranks the rows of the head in an array laid out as the weights. */
+static sdm_status share_head(const pod_state *pod, float *weights, sdm_error *err)
+{
+    return trainer_pod_gather(pod, pod->arch.levels.n - 1, trainer_pod_place_coefficient,
+                              pod->arch.n_latent * sizeof *weights, weights + pod->head_at, err);
+}
+
 /* One Adam step on a random batch. */
 static sdm_status refine_step(pod_state *pod, refine_batch *b, double rate, sdm_error *err)
 {
     const sdm_pod_arch *a = &pod->arch;
     const float **phi = NULL;
-    const sdm_status s = SDM_ALLOC(&phi, b->rows, "batch", err);
+    sdm_status s = SDM_ALLOC(&phi, b->rows, "batch", err);
     if (s) return s;
     // random batch
     for (size_t i = 0; i < b->rows; i++) {
@@ -210,7 +242,9 @@ static sdm_status refine_step(pod_state *pod, refine_batch *b, double rate, sdm_
     refine_loop loop = {.pod = pod,
                         .batch = b,
                         .adam = trainer_adam_begin(rate, ADAM_DECAY, pod->t->phase_step + 1)};
-    sdm_team_run(threads_for_trees(pod, b), n_trees(pod), tree_train, &loop);
+    sdm_team_run(threads_for_trees(pod, b), b->share.end - b->share.first, tree_train, &loop);
+    if ((s = share_losses(pod, b, err))) return s;
+    if ((s = trainer_pod_gather_columns(pod, b->rows, b->dc, err))) return s;
     double sum = 0;
     for (size_t i = 0; i < n_trees(pod); i++) sum += b->loss[i];
     pod->t->loss = sum / ((double)b->rows * (double)pod->t->data.n_voxels);
@@ -223,18 +257,35 @@ static sdm_status refine_step(pod_state *pod, refine_batch *b, double rate, sdm_
         trainer_mlp_backward(a, w, b->rows, b->x, b->workspace, b->dz, b->gradient,
                              trainer_threads(pod->t));
     }
-    sdm_team_run(trainer_threads(pod->t), (a->n_coefficients + HEAD_ROWS - 1) / HEAD_ROWS,
-                 head_train, &loop);
-    if (a->depth)
-        trainer_adam_update(&pod->refine, 0, trainer_mlp_count(a), b->gradient, loop.adam, 1);
-    return SDM_OK;
+    sdm_team_run(trainer_threads(pod->t), (b->columns + HEAD_ROWS - 1) / HEAD_ROWS, head_train,
+                 &loop);
+    if (!a->depth) return SDM_OK;
+    trainer_adam_update(&pod->refine, 0, trainer_mlp_count(a), b->gradient, loop.adam, 1);
+    return share_head(pod, pod->refine.w, err); // the gradient of the MLP needs all rows
 }
 
-/* batch->loss[i] = sum of the squared errors of tree i on held-out maps. */
-static void tree_evaluate(void *user, size_t i, int member)
+sdm_status trainer_refine_gather(pod_state *pod, sdm_error *err)
+{
+    parameters *p = &pod->refine;
+    float *const arrays[] = {p->w, p->m, p->v, p->average, p->best};
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays && !s; i++) {
+        float *mean = arrays[i] + pod->mean_at, *basis = arrays[i] + pod->basis_at;
+        s = share_head(pod, arrays[i], err);
+        if (!s) s = trainer_pod_gather(pod, 0, trainer_pod_place_voxel, sizeof *mean, mean, err);
+        for (size_t level = 0; level < pod->arch.levels.n && !s; level++)
+            s = trainer_pod_gather(pod, level, trainer_pod_place_matrix, sizeof *basis, basis, err);
+    }
+    return s;
+}
+
+/* batch->loss[i] = sum of the squared errors of tree i on held-out maps; the tree has number
+ * `index` among those of this rank. */
+static void tree_evaluate(void *user, size_t index, int member)
 {
     const refine_loop *l = user;
     const pod_state *pod = l->pod;
+    const size_t i = l->batch->share.first + index;
     const dataset *d = &pod->t->data;
     const tree_work w = batch_tree(pod, l->batch, first_tree(pod) + i, member);
     const size_t voxels = w.tree.voxels;
@@ -266,8 +317,9 @@ sdm_status trainer_refine_evaluate(pod_state *pod, const float *w, double *mse, 
         trainer_head_latent(pod, w, rows, phi, b.x, b.z, b.workspace);
         head_forward(pod, w, &b, rows);
         refine_loop loop = {.pod = pod, .batch = &b, .weights = w, .first = at, .rows = rows};
-        sdm_team_run(threads_for_trees(pod, &b), n_trees(pod), tree_evaluate, &loop);
-        for (size_t i = 0; i < n_trees(pod); i++) sum += b.loss[i];
+        sdm_team_run(threads_for_trees(pod, &b), b.share.end - b.share.first, tree_evaluate, &loop);
+        s = share_losses(pod, &b, err);
+        for (size_t i = 0; i < n_trees(pod) && !s; i++) sum += b.loss[i];
     }
     refine_batch_dispose(&b);
     *mse = sum / ((double)d->n_holdout * (double)d->n_voxels);
@@ -276,7 +328,7 @@ sdm_status trainer_refine_evaluate(pod_state *pod, const float *w, double *mse, 
 
 sdm_status trainer_refine_note(pod_state *pod, const float *w, double rate, sdm_error *err)
 {
-    const double began = trainer_seconds(pod->t);
+    const double began = trainer_shared_seconds(pod->t);
     double mse;
     const sdm_status s = trainer_refine_evaluate(pod, w, &mse, err);
     if (s) return s;
@@ -302,13 +354,14 @@ sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err)
 }
 
 /* Used fraction of the phase's budget: of the steps that the mode fit left over (a resumed run may
- * have a different budget), or of the time until trainer_seconds() = `end`. */
+ * have a different budget), or of the time until trainer_shared_seconds() = `end`. */
 static double refine_fraction(const trainer *t, double end)
 {
     const bool by_time = trainer_by_time(t);
     const double length =
         by_time ? end - t->phase_started : (double)(trainer_steps(t) - (t->step - t->phase_step));
-    const double used = by_time ? trainer_seconds(t) - t->phase_started : (double)t->phase_step;
+    const double used =
+        by_time ? trainer_shared_seconds(t) - t->phase_started : (double)t->phase_step;
     return length > 0 ? used / length : 1;
 }
 
@@ -327,7 +380,7 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
     while (!s && at < 1 && !done) {
         // new maps, or stop
         if ((s = trainer_samples_take(t, t->data.n_start + t->data.n_online, err))) break;
-        if (trainer_cancelled(t)) {
+        if (trainer_all_cancelled(t)) {
             s = trainer_stop(t, err);
             break;
         }
@@ -346,7 +399,7 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
             break;
         }
         // evaluate, report, save
-        const double now = trainer_seconds(t);
+        const double now = trainer_shared_seconds(t);
         if (trainer_evaluation_due(t, now)) {
             if ((s = trainer_refine_note(pod, pod->refine.average, rate, err))) break;
             if (trainer_evaluation_counts(t))
@@ -360,6 +413,7 @@ sdm_status trainer_refine_run(pod_state *pod, sdm_error *err)
     if (!s) {
         trainer_best_note(t, &pod->refine, at, t->heldout_mse);
         trainer_best_restore(t, &pod->refine);
+        s = trainer_refine_gather(pod, err);
     }
     if (!s && done) trainer_ended_early(t, at);
     refine_batch_dispose(&b);

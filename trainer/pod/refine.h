@@ -7,6 +7,10 @@
    mode fit, bases and mean map as computed. resumed: trainer_checkpoint_weights() fills them. */
 sdm_status trainer_refine_start(pod_state *pod, bool resumed, sdm_error *err);
 
+/* Gives all ranks all weights of the phase: during the phase each has those of its trees and of
+   their rows of the head, and of the MLP. */
+sdm_status trainer_refine_gather(pod_state *pod, sdm_error *err);
+
 /* Runs phase SDM_PHASE_REFINE to its end; nothing if train.refine is 0. */
 sdm_status trainer_refine_run(pod_state *pod, sdm_error *err);
 

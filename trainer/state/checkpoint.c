@@ -35,6 +35,7 @@ static void checkpoint_path(const trainer *t, char *path, size_t size)
 
 static sdm_status remove_file(const trainer *t, const char *name, sdm_error *err)
 {
+    if (!trainer_writes(t)) return SDM_OK;
     char path[SDM_PATH_TEXT_MAX + 32];
     snprintf(path, sizeof path, "%s/%s", t->folder, name);
     if (unlink(path) && errno != ENOENT)
@@ -53,7 +54,8 @@ sdm_status trainer_checkpoint_clear_folder(const trainer *t, sdm_error *err)
     return s ? s : remove_file(t, "model.sdm", err);
 }
 
-sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err)
+/* Writes the file; t has all weights. */
+static sdm_status write_file(trainer *t, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];
     checkpoint_path(t, path, sizeof path);
@@ -95,8 +97,16 @@ sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err)
     if (!s) s = sdm_container_write(path, bytes, size, err);
     sdm_free(bytes);
     sdm_text_dispose(&config);
-    t->last_checkpoint = trainer_seconds(t);
     return s;
+}
+
+sdm_status trainer_checkpoint_write(trainer *t, sdm_error *err)
+{
+    sdm_status s = t->kind->gather ? t->kind->gather(t, err) : SDM_OK;
+    if (s) return s;
+    if (trainer_writes(t)) s = write_file(t, err);
+    t->last_checkpoint = trainer_shared_seconds(t);
+    return sdm_comm_agree(t->hooks.comm, s, err);
 }
 
 void trainer_checkpoint_if_due(trainer *t, double now)
@@ -131,20 +141,31 @@ static const sdm_section *section_find(const checkpoint_file *o, const char *nam
     return NULL;
 }
 
+/* *bytes = the file, for all ranks, which need not see the folder of rank 0. *found: false if there
+ * is no file. */
+static sdm_status read_bytes(const trainer *t, const char *path, uint8_t **bytes, size_t *size,
+                             bool *found, sdm_error *err)
+{
+    sdm_comm *comm = t->hooks.comm;
+    sdm_status s = SDM_OK;
+    *found = !access(path, F_OK) || errno != ENOENT;
+    if (trainer_writes(t) && *found) s = sdm_file_read(path, (size_t)64 << 30, bytes, size, err);
+    s = sdm_comm_agree(comm, s, err);
+    if (!s) s = sdm_comm_broadcast(comm, 0, found, sizeof *found, err);
+    if (!s) s = sdm_comm_broadcast(comm, 0, size, sizeof *size, err);
+    if (!s && *found && !trainer_writes(t)) s = SDM_ALLOC(bytes, *size, "checkpoint", err);
+    return s || !*found ? s : sdm_comm_broadcast(comm, 0, *bytes, *size, err);
+}
+
 /* Reads the checkpoint file. *found: false, without an error, if there is no file. */
 static sdm_status checkpoint_open(const trainer *t, checkpoint_file *o, bool *found, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];
     checkpoint_path(t, path, sizeof path);
-    FILE *f = fopen(path, "rb");
-    *found = f != NULL;
-    if (!f && errno == ENOENT) return SDM_OK;
-    if (!f) return sdm_fail(err, SDM_E_IO, "%s: cannot open: %s", path, strerror(errno));
-    fclose(f);
     size_t size = 0;
     uint64_t checksum = 0;
-    sdm_status s = sdm_file_read(path, (size_t)64 << 30, &o->bytes, &size, err);
-    if (s) return s;
+    sdm_status s = read_bytes(t, path, &o->bytes, &size, found, err);
+    if (s || !*found) return s;
     s = sdm_container_parse(o->bytes, size, o->sections, o->names, &o->n, &checksum, err);
     const sdm_section *c = s ? NULL : section_find(o, "checkpoint");
     if (!s &&

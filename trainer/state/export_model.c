@@ -284,6 +284,7 @@ sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err)
     const double start = trainer_seconds(t);
     if (!s) s = measure_model(t, model, 1, &one, &more, err);
     *seconds = (trainer_seconds(t) - start) * (double)t->data.n_holdout;
+    if (!s) s = sdm_comm_broadcast(t->hooks.comm, 0, seconds, sizeof *seconds, err);
     sdm_model_free(model);
     description_free(d);
     return s;

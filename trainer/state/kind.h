@@ -44,6 +44,9 @@ struct train_kind {
     sdm_status (*run)(trainer *t, bool resumed, sdm_error *err);
     /* Returns the weights that are trained in the current phase. */
     parameters *(*weights)(trainer *t);
+    /* Gives all ranks the weights of the current phase, of which each may have only its part; NULL:
+       each has all. */
+    sdm_status (*gather)(trainer *t, sdm_error *err);
     /* Checksum of everything besides the configuration that the meaning of the weights depends on.
      */
     uint64_t (*fingerprint)(const trainer *t);

@@ -75,7 +75,7 @@ sdm_status trainer_samples_take(trainer *t, size_t wanted, sdm_error *err)
         // the wait can be long: report progress and allow the run to be stopped
         if (d->n_taken < until) {
             trainer_report(t, trainer_fraction(t), false);
-            if (trainer_cancelled(t)) return SDM_OK;
+            if (trainer_all_cancelled(t)) return SDM_OK;
         }
     }
     if (d->n_taken == all) {
@@ -91,7 +91,8 @@ sdm_status trainer_samples_retake(trainer *t, size_t n_taken, sdm_error *err)
         size_t slots[SAMPLE_ROUND];
         const size_t left = n_taken - t->data.n_taken;
         sdm_status s = samples_take_group(t, left < SAMPLE_ROUND ? left : SAMPLE_ROUND, slots, err);
-        if (!s && trainer_cancelled(t)) s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request");
+        if (!s && trainer_all_cancelled(t))
+            s = sdm_fail(err, SDM_E_CANCELLED, "stopped on request");
         if (s) return s;
         trainer_report(t, 0, false);
     }

@@ -11,6 +11,13 @@
 
 double trainer_seconds(const trainer *t) { return sdm_clock() - t->started; }
 
+double trainer_shared_seconds(const trainer *t)
+{
+    double seconds = trainer_seconds(t);
+    sdm_comm_broadcast(t->hooks.comm, 0, &seconds, sizeof seconds, NULL);
+    return seconds;
+}
+
 double trainer_budget_seconds(const trainer *t)
 {
     return (t->config->network.fine ? 0.9 : 1) * 60 * t->config->train.minutes;
@@ -40,7 +47,7 @@ void trainer_enter(trainer *t, sdm_phase phase)
 {
     t->phase = phase;
     t->phase_step = 0;
-    t->phase_started = trainer_seconds(t);
+    t->phase_started = trainer_shared_seconds(t);
 }
 
 int trainer_workers(const trainer *t)
@@ -136,8 +143,17 @@ void trainer_warn(const trainer *t, const char *fmt, ...)
 
 bool trainer_cancelled(const trainer *t)
 {
-    return t->hooks.cancelled && t->hooks.cancelled(t->hooks.user);
+    return (t->hooks.cancelled && t->hooks.cancelled(t->hooks.user)) ||
+           sdm_comm_broken(t->hooks.comm);
 }
+
+bool trainer_all_cancelled(const trainer *t)
+{
+    bool cancelled = trainer_cancelled(t);
+    return sdm_comm_broadcast(t->hooks.comm, 0, &cancelled, sizeof cancelled, NULL) || cancelled;
+}
+
+bool trainer_writes(const trainer *t) { return sdm_comm_rank(t->hooks.comm) == 0; }
 
 bool trainer_evaluation_counts(const trainer *t)
 {
@@ -161,7 +177,7 @@ bool trainer_evaluation_due(const trainer *t, double now)
 void trainer_evaluated(trainer *t, double mse, double began)
 {
     t->heldout_mse = mse;
-    t->last_evaluation = trainer_seconds(t);
+    t->last_evaluation = trainer_shared_seconds(t);
     t->evaluation_seconds = t->last_evaluation - began;
     t->evaluated_step = t->step;
 }
@@ -170,7 +186,7 @@ void trainer_evaluated(trainer *t, double mse, double began)
  * not repeat lines. */
 sdm_status trainer_metrics_write(const trainer *t, sdm_error *err)
 {
-    if (!t->folder) return SDM_OK; // a trial
+    if (!t->folder || !trainer_writes(t)) return SDM_OK; // no folder: a trial
     char path[SDM_PATH_TEXT_MAX + 32];
     snprintf(path, sizeof path, "%s/metrics.jsonl", t->folder);
     sdm_outfile *f;
@@ -212,6 +228,17 @@ sdm_status trainer_metric(trainer *t, double rate, sdm_error *err)
     sdm_json_real(&j, "learning_rate", rate);
     // with a budget of steps the file has the same bits in every run: no times
     if (trainer_by_time(t)) sdm_json_real(&j, "seconds", trainer_seconds(t));
+    return metrics_add(t, &j, err);
+}
+
+sdm_status trainer_metric_ranks(trainer *t, sdm_error *err)
+{
+    sdm_json j = {0};
+    if (!t->hooks.comm) return SDM_OK;
+    sdm_json_open(&j, NULL, '{');
+    sdm_json_text(&j, "phase", "ranks");
+    sdm_json_int(&j, "ranks", sdm_comm_size(t->hooks.comm));
+    sdm_json_text(&j, "by", sdm_comm_name(t->hooks.comm));
     return metrics_add(t, &j, err);
 }
 

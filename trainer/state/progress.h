@@ -7,6 +7,9 @@
  * which the maps were computed again does not. */
 double trainer_seconds(const trainer *t);
 
+/* The same on all ranks, for decisions: trainer_seconds() of rank 0. Called by all ranks. */
+double trainer_shared_seconds(const trainer *t);
+
 /* Seconds of train.minutes in which the network is trained and measured: all, or all but a tenth if
    a fine level follows. */
 double trainer_budget_seconds(const trainer *t);
@@ -44,8 +47,15 @@ void trainer_message(const trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
 /* Sends a warning of one line to the warning callback, or to the message callback without one. */
 void trainer_warn(const trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
 
-/* true if the caller wants the run to stop. [any thread] */
+/* true if the caller wants the run to stop, which rank 0 alone knows, or a rank has ended early.
+   [any thread] */
 bool trainer_cancelled(const trainer *t);
+
+/* The same on all ranks. Called by all ranks. */
+bool trainer_all_cancelled(const trainer *t);
+
+/* true: this rank writes the files of the run. */
+bool trainer_writes(const trainer *t);
 
 /* true if the held-out maps must be evaluated at time `now` (trainer_seconds()). With a budget of
    time: after one second of a phase, then at intervals that double up to train.evaluate_seconds, or
@@ -62,6 +72,9 @@ void trainer_evaluated(trainer *t, double mse, double began);
 
 /* Appends a line with the current figures and the learning rate `rate` to metrics.jsonl. */
 sdm_status trainer_metric(trainer *t, double rate, sdm_error *err);
+
+/* Appends a line with the number of ranks; a process that is alone appends none. */
+sdm_status trainer_metric_ranks(trainer *t, sdm_error *err);
 
 /* Appends a line with the verdict, without times unless the budget is a time. */
 sdm_status trainer_metric_verdict(trainer *t, const sdm_verdict *v, sdm_error *err);

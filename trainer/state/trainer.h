@@ -23,8 +23,8 @@ typedef struct trainer_pace {
 typedef struct trainer {
     const sdm_config *config;
     const sdm_instance *shape;
-    const char *folder; /* NULL: a trial, which writes no files */
-    sdm_train_hooks hooks;
+    const char *folder;    /* NULL: a trial, which writes no files */
+    sdm_train_hooks hooks; /* but for rank 0 without functions */
     int n_threads;
     const training_turns *turns; /* of the run; NULL: a trial */
     const train_kind *kind;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "sdm/exact.h"
+#include "sdm/internal/comm.h"
 #include "sdm/internal/config.h"
 #include "sdm/internal/map_store.h"
 #include "sdm/internal/mistakes.h"
@@ -60,6 +61,9 @@ typedef struct sdm_train_hooks {
     /* Maps that need not be made, of this configuration; NULL: none. The result has the same bits.
      */
     const sdm_map_store *store;
+    /* The processes that share the work; all call sdm_train() with the same arguments, and rank 0
+       alone calls the functions above and writes files. NULL: this process is alone. */
+    sdm_comm *comm;
 } sdm_train_hooks;
 
 typedef struct sdm_train_report {
@@ -80,7 +84,8 @@ typedef struct sdm_train_report {
    network.kind: auto may train two kinds, one after the other: model.sdm is first that of the
    first, at the end that of the better one, and so are config.yaml and loss.png. resume: continues
    from the checkpoint in `folder`; SDM_E_CONFIG if the checkpoint's configuration differs in more
-   than budget and output. hooks and report may be NULL. */
+   than budget and output. hooks and report may be NULL. SDM_E_UNSUPPORTED: the ranks
+   differ in program, configuration or processor. */
 sdm_status sdm_train(const sdm_config *config, const sdm_instance *shape, const char *folder,
                      bool resume, const sdm_train_hooks *hooks, sdm_train_report *report,
                      sdm_error *err);

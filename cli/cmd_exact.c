@@ -9,6 +9,7 @@
 #include "inputs/setup.h"
 #include "measure/measures.h"
 #include "report/exact_layers.h"
+#include "report/files.h"
 #include "report/json_values.h"
 #include "report/output.h"
 #include "report/points_table.h"
@@ -174,9 +175,10 @@ static sdm_status run_points(job *j, sdm_error *err)
     if (!s) s = sdm_exact_create(&j->mesh, &opts, &engine, err);
     if (!s) j->report = *sdm_exact_get_report(engine);
     if (!s) s = sdm_exact_points(engine, x, n, &j->points.at, err);
+    if (!s) s = cli_points_write(&j->points, x, j->args, err);
     sdm_exact_free(engine);
     sdm_free(x);
-    return s ? s : cli_points_write(&j->points, j->args, err);
+    return s;
 }
 
 typedef struct progress_state {
@@ -292,20 +294,38 @@ static sdm_status judge_signs(const job *j, sdm_error *err)
         c->below_zero);
 }
 
+/* Volume of the union of the mesh, mm^3, if a surface is written; NaN: none is, or not known. */
+static double shape_volume(const job *j)
+{
+    sdm_part_audit audit;
+    bool surface = false;
+    double volume = NAN;
+    for (size_t i = 0; i < j->args->outputs.n; i++)
+        surface = surface || cli_ends_with_any(j->args->outputs.items[i], CLI_MESH_ENDINGS);
+    if (!surface || sdm_part_audit_make(&j->mesh, true, &audit, NULL)) return NAN;
+    if (audit.mesh.closed && !audit.inside_out) volume = audit.union_volume;
+    sdm_part_audit_dispose(&audit);
+    return volume;
+}
+
 static sdm_status write_outputs(const job *j, sdm_error *err)
 {
-    const cli_map map = {.grid = &j->grid,
-                         .values = j->values,
-                         .blocks = j->blocks.tile ? &j->blocks : NULL,
-                         .shape = j->args->mesh ? j->args->mesh : j->args->shape,
-                         .params = j->params.data ? j->params.data : "",
-                         .source = SDM_SOURCE_EXACT,
-                         .error_mm = j->report.union_error_mm + j->bound_mm,
-                         .origin = j->args->method,
-                         .engine = j->args->narrow > 0 ? NULL : j->engine};
+    cli_map map = {.grid = &j->grid,
+                   .values = j->values,
+                   .blocks = j->blocks.tile ? &j->blocks : NULL,
+                   .shape = j->args->mesh ? j->args->mesh : j->args->shape,
+                   .params = j->params.data ? j->params.data : "",
+                   .source = SDM_SOURCE_EXACT,
+                   .error_mm = j->report.union_error_mm + j->bound_mm,
+                   .volume = shape_volume(j),
+                   .origin = j->args->method,
+                   .engine = j->args->narrow > 0 ? NULL : j->engine};
     sdm_status s = SDM_OK;
-    for (size_t i = 0; i < j->args->outputs.n && !s; i++)
-        s = cli_write_map(j->args->outputs.items[i], &map, j->args, err);
+    for (size_t i = 0; i < j->args->outputs.n && !s; i++) {
+        const char *path = j->args->outputs.items[i];
+        s = cli_write_map(path, &map, j->args, err);
+        if (cli_ends_with_any(path, CLI_MESH_ENDINGS)) map.volume = 0; // compared once
+    }
     return s;
 }
 

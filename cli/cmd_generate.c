@@ -502,11 +502,35 @@ static sdm_status write_points(const job *j, const point_answers *a, cli_points_
         t->at.distance[i] = (double)a->values[i];
     for (size_t i = 0; i < 3 * a->n && !s && t->at.gradient; i++)
         t->at.gradient[i] = (double)a->gradient[i];
-    if (!s) s = cli_points_write(t, j->args, err);
+    if (!s) s = cli_points_write(t, a->x, j->args, err);
     if (!s && a->slopes)
         s = sdm_npy_write(j->args->jacobian, a->slopes, (const size_t[]){a->n, j->info->n_params},
                           2, err);
     return s;
+}
+
+/* Longest edge of a voxel of the model's own grid, mm. */
+static double own_voxel(const job *j)
+{
+    const double *h = j->info->grid.spacing;
+    return fmax(h[0], fmax(h[1], h[2]));
+}
+
+/* What the stated error of the network leaves out between the voxels of its grid, and how to
+ * measure it. */
+static void notice_between(const job *j, const char *measure)
+{
+    const double between = j->info->quality.between_mm, rmse = j->info->accuracy.rmse_mm;
+    if (isnan(between))
+        cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
+                   "interpolation between them adds to it, at creases up to sqrt(3)/2 of their "
+                   "edge, %.2g mm; %s",
+                   rmse, 0.866 * own_voxel(j), measure);
+    else
+        cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
+                   "cubic splines between them add to it, mostly less than linear interpolation of "
+                   "exact maps, which misses the surface by %.2g mm RMS; %s",
+                   rmse, between, measure);
 }
 
 /* Does the work of --points. */
@@ -526,6 +550,8 @@ static sdm_status run_points(job *j, sdm_error *err)
     if (!s && result.clamped) notice_clamped(j, 0);
     if (!s) notice_row(j, 0, &result);
     if (!s) s = write_points(j, &a, &table, err);
+    if (!s && result.source != SDM_SOURCE_EXACT)
+        notice_between(j, "sdmgen exact --points computes exact distances");
     cli_points_dispose(&table);
     sdm_free(a.slopes);
     sdm_free(a.gradient);
@@ -533,30 +559,6 @@ static sdm_status run_points(job *j, sdm_error *err)
     sdm_free(a.lines);
     sdm_free(a.x);
     return s;
-}
-
-/* Longest edge of a voxel of the model's own grid, mm. */
-static double own_voxel(const job *j)
-{
-    const double *h = j->info->grid.spacing;
-    return fmax(h[0], fmax(h[1], h[2]));
-}
-
-/* On another grid, unless the errors there are measured: what the stated error leaves out. */
-static void notice_between(const job *j)
-{
-    if (j->own || j->args->check || j->args->max_error > 0 || j->n_exact == j->n_rows) return;
-    const double between = j->info->quality.between_mm, rmse = j->info->accuracy.rmse_mm;
-    if (isnan(between))
-        cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
-                   "interpolation between them adds to it, at creases up to sqrt(3)/2 of their "
-                   "edge, %.2g mm; --check measures this map",
-                   rmse, 0.866 * own_voxel(j));
-    else
-        cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
-                   "cubic splines between them add to it, mostly less than linear interpolation of "
-                   "exact maps, which misses the surface by %.2g mm RMS; --check measures this map",
-                   rmse, between);
 }
 
 /* Measures the shape, whose parameters --policy clamp may have moved, and prints the measures. */
@@ -580,7 +582,9 @@ static sdm_status run_maps(job *j, sdm_error *err)
         cli_progress_show(&progress, "generate", (double)(i + 1) / (double)j->n_rows, NULL);
     }
     cli_progress_end(&progress, !s);
-    if (!s && !j->args->json) notice_between(j);
+    if (!s && !j->args->json && !j->own && !j->args->check && !(j->args->max_error > 0) &&
+        j->n_exact < j->n_rows)
+        notice_between(j, "--check measures this map");
     if (!s) s = measure(j, err);
     if (!s && j->args->json) s = print_json(j, err);
     return s ? s : write_results(j, err);

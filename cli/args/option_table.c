@@ -255,8 +255,8 @@ const cli_option cli_options[] = {
      "most --tolerance; edt: distance transform, prints the bound on its error"},
     {"points", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(points),
      "distances at the points of a file instead of a map: .csv (x,y,z), .npy ([n][3]) or the "
-     "vertices of .ply .stl .obj .off .vtk .vtp, LPS mm; -o FILE.csv or FILE.npy (float64), one "
-     "row a point"},
+     "vertices of .ply .stl .obj .off .vtk .vtp, LPS mm; -o FILE.csv (x,y,z and the columns) or "
+     "FILE.npy (float64, the columns alone), one row a point"},
     {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_EXACT), AT(columns),
      "columns for --points: distance,gradient,closest,triangle (default distance)"},
     {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_GENERATE), AT(columns),
@@ -347,7 +347,8 @@ const cli_option cli_options[] = {
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(force),
      "start again in a folder that holds a model"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(force),
-     "write the files also of a fit that is not to be trusted (the exit code stays 4)"},
+     "write the files also of a fit that is not to be trusted (the exit code stays 4), and fit "
+     "targets whose size the shape cannot have"},
     {"dry-run", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXPERIMENT), AT(dry_run),
      "print the planned rows and the duration of the trainings, then stop"},
 

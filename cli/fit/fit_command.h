@@ -117,8 +117,9 @@ sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err);
 
 /* Warns if labels or points are more than five times as large as the start shape, or as small, or
  * if an image is too small or too coarse for the shape, and names the unit that would explain it.
- * Errors of making the shape. */
-sdm_status cli_fit_warn_size(const cli_fit *f, sdm_error *err);
+ * SDM_E_ARG, unless --force is given: so it is with the smallest or largest shape of the ranges,
+ * too. Errors of making the shape. */
+sdm_status cli_fit_check_size(const cli_fit *f, sdm_error *err);
 
 /* Images: says which values of the tissues a fit starts from if the command line does not give
  * them, unless the shape is the one for which they are made. */

@@ -2,6 +2,7 @@
 #include "points_file.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,9 +15,9 @@
 
 #define MAX_BYTES ((uint64_t)4 << 30)
 
-/* The columns of x, y and z. */
+/* The columns of a table. */
 typedef struct columns {
-    size_t axis[3]; /* axis of each column */
+    size_t n, place[3]; /* number; places of x, y and z */
 } columns;
 
 /* Cuts the next cell off *line and trims it; NULL after the last one. */
@@ -32,50 +33,61 @@ static char *next_cell(char **line)
     return cell;
 }
 
-/* Takes the order of the columns from the names x, y and z of a header, in any case; other names
- * leave x, y, z. */
-static void read_names(char *const cell[3], columns *c)
+/* Finds the columns x, y and z among the names of a header, which may hold others. */
+static sdm_status read_names(const char *path, size_t number, char *line, columns *c,
+                             sdm_error *err)
 {
-    bool found[3] = {false, false, false};
-    size_t axis[3] = {0, 1, 2};
-    for (size_t k = 0; k < 3; k++) {
-        const char *at = strlen(cell[k]) == 1 ? strchr("xXyYzZ", *cell[k]) : NULL;
-        if (!at) return;
-        axis[k] = (size_t)(at - "xXyYzZ") / 2;
-        found[axis[k]] = true;
+    const char *first[3] = {"", "", ""};
+    int found[3] = {0, 0, 0};
+    size_t n = 0;
+    for (char *cell; (cell = next_cell(&line)); n++) {
+        const char *at = strlen(cell) == 1 ? strchr("xXyYzZ", *cell) : NULL;
+        if (n < 3) first[n] = cell;
+        if (!at) continue;
+        const int axis = (int)(at - "xXyYzZ") / 2;
+        found[axis]++;
+        c->place[axis] = n;
     }
-    if (found[0] && found[1] && found[2]) memcpy(c->axis, axis, sizeof axis);
+    c->n = n;
+    if (found[0] == 1 && found[1] == 1 && found[2] == 1) return SDM_OK;
+    return sdm_fail(err, SDM_E_FORMAT,
+                    "%s:%zu: the header (%.30s,%.30s,%.30s%s) must name one column each x, y and "
+                    "z, in mm; without a header a line is x,y,z",
+                    path, number, first[0], first[1], first[2], n > 3 ? ",..." : "");
 }
 
-/* Reads the three numbers of one line, which is changed. header: a line without any number is
- * accepted; *is_point is then false. */
-static sdm_status read_line(const char *path, size_t number, char *line, bool header, columns *c,
-                            double x[3], bool *is_point, sdm_error *err)
+/* Whether none of the cells of the line is a number. */
+static bool is_header(const char *line)
 {
-    size_t n = 0, n_numbers = 0;
-    char *cells[3] = {NULL, NULL, NULL};
-    const char *wrong = NULL;
-    for (char *cell; (cell = next_cell(&line)); n++) {
+    for (const char *cell = line; cell; cell = strchr(cell, ',')) {
+        char text[64], *end = text;
         double value;
-        const bool good = sdm_parse_real(cell, &value);
-        n_numbers += good;
-        if (!good && !wrong) wrong = cell;
-        if (n >= 3) continue;
-        cells[n] = cell;
-        if (good) x[c->axis[n]] = value;
+        cell += *cell == ',';
+        snprintf(text, sizeof text, "%.*s", (int)strcspn(cell, ","), cell);
+        if (sdm_parse_real(next_cell(&end), &value)) return false;
     }
-    *is_point = n == 3 && n_numbers == 3;
-    if (*is_point) return SDM_OK;
-    if (header && n_numbers == 0) {
-        if (n == 3) read_names(cells, c);
-        return SDM_OK;
-    }
+    return true;
+}
+
+/* Reads the coordinates of one line, which is changed. */
+static sdm_status read_line(const char *path, size_t number, char *line, const columns *c,
+                            double x[3], sdm_error *err)
+{
+    size_t n = 0;
+    const char *wrong = NULL;
+    for (char *cell; (cell = next_cell(&line)); n++)
+        for (size_t a = 0; a < 3; a++)
+            if (n == c->place[a] && !sdm_parse_real(cell, &x[a]) && !wrong) wrong = cell;
     if (wrong)
-        return sdm_fail(err, SDM_E_FORMAT,
-                        "%s:%zu: '%.100s' is not a finite number; a line is x,y,z", path, number,
-                        wrong);
-    return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %zu values, a line needs three: x,y,z (mm)", path,
-                    number, n);
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%.100s' is not a finite number; a line is %s",
+                        path, number, wrong, c->n == 3 ? "x,y,z" : "as the header says");
+    if (n != c->n && c->n == 3)
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %zu values, a line needs three: x,y,z (mm)",
+                        path, number, n);
+    if (n != c->n)
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %zu values, the header names %zu columns", path,
+                        number, n, c->n);
+    return SDM_OK;
 }
 
 static sdm_status read_csv(const char *path, double **x, size_t **places, size_t *n, sdm_error *err)
@@ -89,7 +101,7 @@ static sdm_status read_csv(const char *path, double **x, size_t **places, size_t
     // spreadsheets begin the file with a byte order mark
     char *at = size >= 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? text + 3 : text;
     bool header = true;
-    columns order = {{0, 1, 2}};
+    columns order = {3, {0, 1, 2}};
     while (!s && *at) {
         char *line = at;
         const size_t length = strcspn(line, "\n");
@@ -98,10 +110,13 @@ static sdm_status read_csv(const char *path, double **x, size_t **places, size_t
         number++;
         line += strspn(line, " \t\r");
         if (!*line || *line == '#') continue;
-        bool is_point;
-        s = read_line(path, number, line, header, &order, *x + 3 * *n, &is_point, err);
-        if (is_point && places) (*places)[*n] = number;
-        *n += is_point;
+        if (header && is_header(line))
+            s = read_names(path, number, line, &order, err);
+        else {
+            if (places) (*places)[*n] = number;
+            s = read_line(path, number, line, &order, *x + 3 * *n, err);
+            *n += !s;
+        }
         header = false;
     }
     sdm_free(text);

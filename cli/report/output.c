@@ -1,6 +1,7 @@
 /* Writes maps as level sets, images, surfaces or pictures, as the ending of the file name says. */
 #include "output.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +9,7 @@
 #include "files.h"
 #include "sdm/image.h"
 #include "sdm/internal/near.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/isosurface.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
@@ -15,6 +17,9 @@
 #include "sdm/vdb.h"
 #include "sdm/volume.h"
 #include "terminal.h"
+
+/* Largest part by which the volume of a surface may differ from that of the shape in silence. */
+#define VOLUME_OFF_MAX 0.05
 
 typedef enum file_kind {
     KIND_NONE = 0,
@@ -183,6 +188,19 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
 #endif
 }
 
+/* Warns if the surface encloses another volume than the shape whose map it was made from. */
+static void warn_volume(const char *path, const cli_map *map, const sdm_mesh *surface)
+{
+    sdm_audit audit;
+    if (!(map->volume > 0) || sdm_mesh_audit(surface, &audit, NULL) || !audit.closed) return;
+    const double more = fabs(audit.volume) / map->volume - 1, voxel = sdm_grid_coarsest(map->grid);
+    if (fabs(more) <= VOLUME_OFF_MAX) return;
+    cli_warn("%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
+             "%.3g mm cut its edges and thin parts; --spacing %.2g shows more of them",
+             path, fabs(audit.volume), 100 * fabs(more), more < 0 ? "less" : "more", map->volume,
+             voxel, 0.5 * voxel);
+}
+
 static sdm_status write_surface(const char *path, const cli_map *map, sdm_error *err)
 {
     sdm_mesh surface = {0};
@@ -193,6 +211,7 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
                      "cover it?",
                      path, map->values[0] < 0 ? "inside" : "outside");
     if (!s) s = sdm_mesh_write(path, &surface, err);
+    if (!s) warn_volume(path, map, &surface);
     sdm_mesh_dispose(&surface);
     return s;
 }

@@ -126,7 +126,7 @@ void cli_points_dispose(cli_points_table *t)
     *t = (cli_points_table){0};
 }
 
-/* row = the answers for point i; returns their number. */
+/* row = the answers for point i, at most eight; returns their number. */
 static size_t row_fill(const cli_points_table *t, size_t i, double row[8])
 {
     size_t n = 0;
@@ -142,16 +142,19 @@ static size_t row_fill(const cli_points_table *t, size_t i, double row[8])
     return n;
 }
 
-static sdm_status write_csv(const char *path, const cli_points_table *t, sdm_error *err)
+static sdm_status write_csv(const char *path, const cli_points_table *t, const double *x,
+                            sdm_error *err)
 {
     sdm_outfile *f = NULL;
     sdm_status s = sdm_outfile_open(path, &f, err);
+    if (!s) s = sdm_outfile_printf(f, err, "x,y,z");
     for (int c = 0; c < t->n_columns && !s; c++)
-        s = sdm_outfile_printf(f, err, "%s%s", c ? "," : "", kinds[t->column[c]].header);
+        s = sdm_outfile_printf(f, err, ",%s", kinds[t->column[c]].header);
     for (size_t i = 0; i < t->n && !s; i++) {
-        double row[8];
+        double row[3 + 8];
         char number[32];
-        const size_t n = row_fill(t, i, row);
+        memcpy(row, x + 3 * i, 3 * sizeof *row);
+        const size_t n = 3 + row_fill(t, i, row + 3);
         for (size_t k = 0; k < n && !s; k++)
             s = sdm_outfile_printf(f, err, "%s%s", k ? "," : "\n",
                                    isnan(row[k]) ? "" : sdm_format_real(row[k], number));
@@ -179,12 +182,13 @@ static sdm_status write_npy(const char *path, const cli_points_table *t, sdm_err
     return s;
 }
 
-sdm_status cli_points_write(const cli_points_table *t, const cli_args *args, sdm_error *err)
+sdm_status cli_points_write(const cli_points_table *t, const double *x, const cli_args *args,
+                            sdm_error *err)
 {
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < args->outputs.n && !s; i++) {
         const char *path = args->outputs.items[i];
-        s = cli_ends_with(path, ".csv") ? write_csv(path, t, err) : write_npy(path, t, err);
+        s = cli_ends_with(path, ".csv") ? write_csv(path, t, x, err) : write_npy(path, t, err);
     }
     return s;
 }

@@ -23,6 +23,8 @@ sdm_status cli_points_check_model(const cli_args *args, cli_points_table *t, sdm
 sdm_status cli_points_allocate(cli_points_table *t, size_t n, sdm_error *err);
 void cli_points_dispose(cli_points_table *t);
 
-/* Writes the table to all outputs: .csv with a header line, .npy as float64 [n][columns]. The
- * answer at a point that has none is empty (.csv) or NaN. */
-sdm_status cli_points_write(const cli_points_table *t, const cli_args *args, sdm_error *err);
+/* Writes the table to all outputs: .csv with a header line and the points x[n][3] in the first
+ * columns, .npy as float64 [n][columns]. The answer at a point that has none is empty (.csv) or
+ * NaN. */
+sdm_status cli_points_write(const cli_points_table *t, const double *x, const cli_args *args,
+                            sdm_error *err);

@@ -5,6 +5,9 @@
 #include <stdio.h>
 
 #include "json_values.h"
+#include "sdm/internal/shape_survey.h"
+#include "sdm/internal/units.h"
+#include "sdm/internal/vec3.h"
 #include "terminal.h"
 
 /* Parts in the table and in JSON, and notices about parts. */
@@ -64,6 +67,10 @@ void cli_print_audit(const sdm_part_audit *audit)
            a->min[2], a->max[0], a->max[1], a->max[2]);
     print_parts(audit);
     const bool fine = cli_audit_verdict(audit, "", NULL) == SDM_OK;
+    const double size = sqrt(v3_dist2(a->min, a->max));
+    if (size > 0 && (size < SDM_SURVEY_SIZE_MIN || size > SDM_SURVEY_SIZE_MAX))
+        printf("\nunits: the mesh measures %.3g mm across: is it in %s? lengths are mm\n", size,
+               sdm_unit_near(size < SDM_SURVEY_SIZE_MIN ? 1e3 : 1e-3, NULL));
     if (fine)
         printf("\nfine: the mesh is closed%s%s\n",
                a->inverted ? "; it is inside out, which maps put right" : "",

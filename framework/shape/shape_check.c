@@ -1,4 +1,4 @@
-/* Validation of a plug-in's table before its first use. */
+/* Validation of a plug-in's table before its first use. All mistakes are told at once. */
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -22,6 +22,34 @@ static sdm_status range_check(const char *who, const char *what, const char *nam
     return SDM_OK;
 }
 
+/* Adds the outcome s of one more check to those before: the texts of all mistakes, with `who` once.
+ */
+static sdm_status add_mistake(sdm_status before, sdm_status s, const char *who,
+                              const sdm_error *one, sdm_error *err)
+{
+    if (!s) return before;
+    if (!before) return sdm_fail(err, s, "%s", one->text);
+    const size_t length = strlen(who), skip = strncmp(one->text, who, length) ? 0 : length + 2;
+    const size_t used = err ? strlen(err->text) : 0;
+    if (err) snprintf(err->text + used, sizeof err->text - used, "; %.1000s", one->text + skip);
+    return before;
+}
+
+static sdm_status param_check(const char *who, const sdm_param *params, uint32_t i, sdm_error *err)
+{
+    const sdm_param *p = &params[i];
+    if (!sdm_is_name(p->name))
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter %u has the name '%s': " SDM_NAME_RULE,
+                        who, (unsigned)i + 1, p->name ? p->name : "(none)");
+    for (uint32_t j = 0; j < i; j++)
+        if (params[j].name && strcmp(params[j].name, p->name) == 0)
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: two parameters are named '%s'", who, p->name);
+    if (!p->unit || !p->help)
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter '%s' has no %s (\"\" is fine)", who,
+                        p->name, p->unit ? "help" : "unit");
+    return range_check(who, "parameter", p->name, p->min, p->max, p->def, err);
+}
+
 sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint32_t n,
                                   sdm_error *err)
 {
@@ -31,22 +59,12 @@ sdm_status sdm_shape_check_params(const char *who, const sdm_param *params, uint
     if (n && !params)
         return sdm_fail(err, SDM_E_PLUGIN, "%s: %u parameters, but no table of them", who,
                         (unsigned)n);
+    sdm_status s = SDM_OK;
     for (uint32_t i = 0; i < n; i++) {
-        const sdm_param *p = &params[i];
-        if (!sdm_is_name(p->name))
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter %u has the name '%s': " SDM_NAME_RULE,
-                            who, (unsigned)i + 1, p->name ? p->name : "(none)");
-        for (uint32_t j = 0; j < i; j++)
-            if (strcmp(params[j].name, p->name) == 0)
-                return sdm_fail(err, SDM_E_PLUGIN, "%s: two parameters are named '%s'", who,
-                                p->name);
-        if (!p->unit || !p->help)
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter '%s' has no %s (\"\" is fine)", who,
-                            p->name, p->unit ? "help" : "unit");
-        const sdm_status s = range_check(who, "parameter", p->name, p->min, p->max, p->def, err);
-        if (s) return s;
+        sdm_error one = {0};
+        s = add_mistake(s, param_check(who, params, i, &one), who, &one, err);
     }
-    return SDM_OK;
+    return s;
 }
 
 /* o->choices must be a list of words separated by '|', none of them empty or repeated. */
@@ -71,7 +89,7 @@ static sdm_status choices_check(const char *who, const sdm_option *o, sdm_error 
     }
 }
 
-static sdm_status option_check(const char *who, const sdm_option *o, sdm_error *err)
+static sdm_status values_check(const char *who, const sdm_option *o, sdm_error *err)
 {
     switch (o->type) {
     case SDM_OPTION_INT:
@@ -92,6 +110,22 @@ static sdm_status option_check(const char *who, const sdm_option *o, sdm_error *
                     (int)o->type);
 }
 
+static sdm_status option_check(const char *who, const sdm_option *options, uint32_t i,
+                               sdm_error *err)
+{
+    const sdm_option *o = &options[i];
+    if (!sdm_is_name(o->name))
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: option %u has the name '%s': " SDM_NAME_RULE, who,
+                        (unsigned)i + 1, o->name ? o->name : "(none)");
+    for (uint32_t j = 0; j < i; j++)
+        if (options[j].name && strcmp(options[j].name, o->name) == 0)
+            return sdm_fail(err, SDM_E_PLUGIN, "%s: two options are named '%s'", who, o->name);
+    if (!o->unit || !o->help)
+        return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has no %s (\"\" is fine)", who, o->name,
+                        o->unit ? "help" : "unit");
+    return values_check(who, o, err);
+}
+
 static sdm_status options_check(const char *who, const sdm_option *options, uint32_t n,
                                 sdm_error *err)
 {
@@ -101,21 +135,12 @@ static sdm_status options_check(const char *who, const sdm_option *options, uint
     if (n && !options)
         return sdm_fail(err, SDM_E_PLUGIN, "%s: %u options, but no table of them", who,
                         (unsigned)n);
+    sdm_status s = SDM_OK;
     for (uint32_t i = 0; i < n; i++) {
-        const sdm_option *o = &options[i];
-        if (!sdm_is_name(o->name))
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: option %u has the name '%s': " SDM_NAME_RULE,
-                            who, (unsigned)i + 1, o->name ? o->name : "(none)");
-        for (uint32_t j = 0; j < i; j++)
-            if (strcmp(options[j].name, o->name) == 0)
-                return sdm_fail(err, SDM_E_PLUGIN, "%s: two options are named '%s'", who, o->name);
-        if (!o->unit || !o->help)
-            return sdm_fail(err, SDM_E_PLUGIN, "%s: option '%s' has no %s (\"\" is fine)", who,
-                            o->name, o->unit ? "help" : "unit");
-        const sdm_status s = option_check(who, o, err);
-        if (s) return s;
+        sdm_error one = {0};
+        s = add_mistake(s, option_check(who, options, i, &one), who, &one, err);
     }
-    return SDM_OK;
+    return s;
 }
 
 static sdm_status callbacks_check(const char *who, const sdm_shape *t, sdm_error *err)
@@ -207,12 +232,15 @@ sdm_status sdm_shape_copy_checked(const sdm_shape *table, const char *origin, sd
                         out->name ? out->name : "(none)");
     char who[1200];
     snprintf(who, sizeof who, "%.1000s: shape '%s'", origin, out->name);
-    if (!out->summary) return sdm_fail(err, SDM_E_PLUGIN, "%s: no summary", who);
-    sdm_status s = callbacks_check(who, out, err);
-    if (!s) s = sdm_shape_check_params(who, out->params, out->n_params, err);
-    if (!s && !out->n_params && !out->describe)
-        s = sdm_fail(err, SDM_E_PLUGIN, "%s: no parameters", who);
-    if (!s) s = options_check(who, out->options, out->n_options, err);
-    if (!s) s = mirror_check(who, out, err);
-    return s ? s : measures_check(who, out, err);
+    sdm_error one = {0};
+    sdm_status s = out->summary ? SDM_OK : sdm_fail(err, SDM_E_PLUGIN, "%s: no summary", who);
+    s = add_mistake(s, callbacks_check(who, out, &one), who, &one, err);
+    s = add_mistake(s, sdm_shape_check_params(who, out->params, out->n_params, &one), who, &one,
+                    err);
+    if (!out->n_params && !out->describe)
+        s = add_mistake(s, sdm_fail(&one, SDM_E_PLUGIN, "%s: no parameters", who), who, &one, err);
+    const sdm_status options = options_check(who, out->options, out->n_options, &one);
+    s = add_mistake(s, options, who, &one, err);
+    if (!options) s = add_mistake(s, mirror_check(who, out, &one), who, &one, err);
+    return add_mistake(s, measures_check(who, out, &one), who, &one, err);
 }

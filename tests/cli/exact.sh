@@ -79,7 +79,7 @@ near "$out_size" 64 0
 awk -v max="$(json max_mm)" -v min="$(json min_mm)" 'BEGIN { exit !(min < 0 && max > 0) }' || bad 'the fitted grid misses the torus'
 
 # Every type of output, selected by the ending.
-expect 0 - sdmgen exact --mesh cube.off "${grid[@]}" --quiet -o o.nii -o o.nii.gz -o o.nrrd -o o.mha -o o.ply -o o.stl -o o.obj \
+expect 0 'warning: o.ply: the surface encloses 51 mm\^3, 20 % less than the shape, 64 mm\^3: voxels of 1 mm cut its edges' sdmgen exact --mesh cube.off "${grid[@]}" --quiet -o o.nii -o o.nii.gz -o o.nrrd -o o.mha -o o.ply -o o.stl -o o.obj \
     -o o.off -o o.png -o o.svg -o o.PDF
 present o.nii o.nii.gz o.nrrd o.mha o.ply o.stl o.obj o.off o.png o.svg o.PDF
 [ "$(head -c 4 o.PDF)" = %PDF ] || bad 'o.PDF is no PDF'

@@ -35,10 +35,13 @@ EOF
 printf '\xef\xbb\xbfx,y,z\r\n# a comment\n 3 , 0.25,0.125\r\n\n0.5,0.125,0\n4,5,0.5' >p.csv
 expect 0 - sdmgen exact --mesh cube.off --points p.csv -o d.csv -o d.npy --columns distance,gradient,closest,triangle --quiet
 present d.csv d.npy
-[ "$(sed -n 1p d.csv)" = 'distance,gradient_x,gradient_y,gradient_z,closest_x,closest_y,closest_z,triangle' ] || bad "header $(sed -n 1p d.csv)"
-[ "$(row d.csv 2 1-7)" = '2,1,0,0,1,0.25,0.125' ] || bad "row 1: $(row d.csv 2 1-7)"
-[ "$(row d.csv 3 1-2)" = '-0.5,1' ] || bad "row 2: $(row d.csv 3 1-2)"
-[ "$(row d.csv 4 1,5-7)" = '5,1,1,0.5' ] || bad "row 3: $(row d.csv 4 1,5-7)"
+[ "$(sed -n 1p d.csv)" = 'x,y,z,distance,gradient_x,gradient_y,gradient_z,closest_x,closest_y,closest_z,triangle' ] || bad "header $(sed -n 1p d.csv)"
+[ "$(row d.csv 2 1-10)" = '3,0.25,0.125,2,1,0,0,1,0.25,0.125' ] || bad "row 1: $(row d.csv 2 1-10)"
+[ "$(row d.csv 3 1-5)" = '0.5,0.125,0,-0.5,1' ] || bad "row 2: $(row d.csv 3 1-5)"
+[ "$(row d.csv 4 4,8-10)" = '5,1,1,0.5' ] || bad "row 3: $(row d.csv 4 4,8-10)"
+# What was written is read again: other columns than x, y and z are passed over.
+expect 0 - sdmgen exact --mesh cube.off --points d.csv -o again.csv --quiet
+[ "$(cut -d, -f 1-4 d.csv)" = "$(cat again.csv)" ] || bad "read again: $(xargs <again.csv)"
 [ "$(wc -l <d.csv)" -eq 4 ] || bad "$(wc -l <d.csv) lines"
 head -c 128 d.npy | tr -d '\0' | grep -a -q "'<f8', 'fortran_order': False, 'shape': (3, 8)" || bad "header of d.npy"
 [ "$(od -An -v -t f8 -w64 -j $(($(wc -c <d.npy) - 192)) d.npy | awk '{ printf "%.6f ", $1 }')" = '2.000000 -0.500000 5.000000 ' ] || bad 'values of d.npy'
@@ -46,10 +49,10 @@ head -c 128 d.npy | tr -d '\0' | grep -a -q "'<f8', 'fortran_order': False, 'sha
 # The columns in another order; points from an array and from the vertices of a mesh.
 expect 0 - sdmgen exact --mesh cube.off --points p.csv -o xyz.npy --columns closest --quiet
 expect 0 - sdmgen exact --mesh cube.off --points xyz.npy -o on.csv --columns triangle,distance --quiet
-[ "$(sed -n 1p on.csv)" = 'triangle,distance' ] || bad "header $(sed -n 1p on.csv)"
-sed 1d on.csv | awk -F, '{ if ($2 > 1e-15 || $2 < -1e-15) exit 1 }' || bad "not on the surface: $(xargs <on.csv)"
+[ "$(sed -n 1p on.csv)" = 'x,y,z,triangle,distance' ] || bad "header $(sed -n 1p on.csv)"
+sed 1d on.csv | awk -F, '{ if ($5 > 1e-15 || $5 < -1e-15) exit 1 }' || bad "not on the surface: $(xargs <on.csv)"
 expect 0 - sdmgen exact --mesh cube.off --points cube.off -o on.csv --quiet
-sed 1d on.csv | awk '{ if ($1 > 1e-15 || $1 < -1e-15) exit 1 }' || bad "vertices not on the surface: $(xargs <on.csv)"
+sed 1d on.csv | awk -F, '{ if ($4 > 1e-15 || $4 < -1e-15) exit 1 }' || bad "vertices not on the surface: $(xargs <on.csv)"
 # An array that is not [n][3].
 expect 3 'd.npy: array with 2 dimensions, the second of 8; need \[n\]\[3\]' sdmgen exact --mesh cube.off --points d.npy -o no.csv
 
@@ -64,6 +67,10 @@ printf '1,2,3\n1,2,3,4\n' >bad.csv
 expect 3 'bad.csv:2: 4 values, a line needs three' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
 printf 'x,y,z\n# nothing\n' >bad.csv
 expect 3 'bad.csv: no points' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
+printf 'u,v,w\n1,2,3\n' >bad.csv
+expect 3 'bad.csv:1: the header \(u,v,w\) must name one column each x, y and z' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
+printf 'x,y,z,part\n1,2,3\n' >bad.csv
+expect 3 'bad.csv:2: 3 values, the header names 4 columns' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
 expect 2 "name must end in .csv" sdmgen exact --mesh cube.off --points p.txt -o no.csv
 expect 2 "output 'no.nii': with --points" sdmgen exact --mesh cube.off --points p.csv -o no.nii
 expect 2 'an output is needed' sdmgen exact --mesh cube.off --points p.csv

@@ -39,8 +39,8 @@ expect 1 'missing.csv: ' sdmgen fit $shape points.csv --ras --start-points missi
 # an image in metres
 sdmgen phantom $shape --spacing 0.8 -o image.mha --quiet
 sed 's/^ElementSpacing = .*/ElementSpacing = 0.0008 0.0008 0.0008/' image.mha >metres.mha
-sdmgen fit $shape metres.mha --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
-grep -q 'warning: metres.mha: the image measures 0.0[0-9]* mm across, its voxels 0.0008 mm, the start shape [0-9.]* mm: are they in m? lengths are mm' err ||
+sdmgen fit $shape metres.mha --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err && bad 'an image in metres is accepted'
+grep -q 'error: metres.mha: the image measures 0.0[0-9]* mm across, its voxels 0.0008 mm, the start shape [0-9.]* mm: are they in m? lengths are mm; --force fits nevertheless' err ||
     bad "image in metres: $(cat err)"
 # without values of the tissues a notice says which are taken; labels and images in each other's place
 sdmgen fit $shape image.nii --rotation 0,0,0 --max-iterations 1 >out 2>err
@@ -62,8 +62,10 @@ grep -q 'fine.nii holds over 1000 different values, or fractions: if it is an im
 sed 's/\([0-9.-]\{1,\}\)/\1e-3/g; 1s/.*/x,y,z/' points.csv >metres.csv
 sed 's/\([0-9.-]\{1,\}\)/\1e3/g; 1s/.*/x,y,z/' points.csv >micro.csv
 sdmgen fit $shape metres.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err && bad 'points in metres are accepted'
-grep -q 'warning: metres.csv: the points measure 0.00[0-9]* mm across, the start shape [0-9.]* mm: are they in m? lengths are mm' err || bad "metres: $(cat err)"
-sdmgen fit $shape micro.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
+grep -q 'error: metres.csv: the points measure 0.00[0-9]* mm across, the start shape [0-9.]* mm: are they in m? lengths are mm; --force fits nevertheless' err || bad "metres: $(cat err)"
+sdmgen fit $shape metres.csv --rotation 0,0,0 --max-iterations 1 --quiet --force >out 2>err
+grep -q 'warning: metres.csv: the points measure' err || bad "metres with --force: $(cat err)"
+expect 2 'error: micro.csv: .* are they in um\?' sdmgen fit $shape micro.csv --rotation 0,0,0 --quiet
 grep -q 'are they in um?' err || bad "micrometres: $(cat err)"
 sdmgen fit $shape points.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err
 grep -q 'lengths are mm' err && bad "millimetres: $(cat err)"

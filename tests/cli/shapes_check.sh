@@ -59,6 +59,11 @@ has "^warning +$thin \(at size=.*; parts are too thin in all 21 shapes\)$"
 expect 0 "^sdmgen: warning: $thin" sdmgen config good.yaml grid.spacing=0.5 --plugin "$plugin" -q
 expect 0 "^sdmgen: warning: $thin$" sdmgen exact --shape faulty --plugin "$plugin" --spacing 0.5 -o thin.nrrd -q
 
+# A mesh file in metres: a question about its units.
+printf 'OFF\n4 4 0\n0 0 0\n0.02 0 0\n0 0.02 0\n0 0 0.02\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n' >metres.off
+expect 0 - sdmgen mesh --mesh metres.off --audit
+has '^units: the mesh measures 0\.0[0-9]* mm across: is it in m\? lengths are mm$'
+
 # The other commands say it in one line on stderr (and that the mesh overlaps itself).
 expect 0 "warning: $inside_out" sdmgen mesh --shape faulty -O fault=handle -o x.ply --plugin "$plugin" -q
 expect 4 "error: $inside_out" sdmgen mesh --shape faulty -O fault=handle --audit -o y.ply --plugin "$plugin"

@@ -1,6 +1,6 @@
 /* Derivatives of the template network against central differences of its maps, and its correction
  * by a pod network.
- * Tests: template_corner_slopes.c template_point_slope.c template_slopes.c */
+ * Tests: template_corner_slopes.c template_slope_rows.c template_slopes.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,12 +1,14 @@
 /* Fits to meshes and points: points spread over the surface of a union, outliers, and standard
- * deviations that do not shrink with the number of points on one surface.
- * Tests: point_covariance.c surface_points.c */
+ * deviations that do not shrink with the number of points on one surface, and that know what the
+ * voxels of the maps do at sharp edges.
+ * Tests: map_bias.c point_covariance.c surface_points.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -185,6 +187,49 @@ static void test_deviations_count_independent_points(void **state)
     }
 }
 
+// A brick: flat faces and sharp edges, which the voxels of a map cut off.
+static int brick_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                      const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    sdm_mesh m = {0};
+    add_box(&m, (const double[3]){-0.5 * p[0], -0.5 * p[1], -0.5 * p[2]},
+            (const double[3]){0.5 * p[0], 0.5 * p[1], 0.5 * p[2]});
+    const int failed = host->reserve(host, out, m.n_vert, m.n_tri);
+    if (!failed) memcpy(out->vert, m.vert, 3 * m.n_vert * sizeof *m.vert);
+    if (!failed) memcpy(out->tri, m.tri, 3 * m.n_tri * sizeof *m.tri);
+    sdm_mesh_dispose(&m);
+    return failed;
+}
+
+static void test_deviations_know_the_errors_at_sharp_edges(void **state)
+{
+    (void)state;
+    static const sdm_param params[] = {{"length", "mm", 3, 6, 5, ""},
+                                       {"width", "mm", 2, 5, 4, ""},
+                                       {"height", "mm", 0.8, 3, 1, ""}};
+    static const sdm_shape brick = {.abi = SDM_SHAPE_ABI,
+                                    .size = sizeof(sdm_shape),
+                                    .name = "brick",
+                                    .summary = "brick",
+                                    .params = params,
+                                    .n_params = 3,
+                                    .mesh = brick_mesh};
+    const double truth[3] = {4.87, 3.71, 1.13};
+    sdm_instance *shape = NULL;
+    assert_int_equal(sdm_instance_create(&brick, NULL, 0, NULL, &shape, NULL), SDM_OK);
+    double *x = points_of(shape, truth, 0, 1500);
+    sdm_fit_result r = fit_points(shape, x, 1500);
+    for (size_t k = 0; k < 3; k++) {
+        const double error = fabs(r.params[k] - truth[k]);
+        if (!(error < 3 * r.sd[k] && r.sd[k] < 0.2 * 0.25))
+            fail_msg("parameter %zu is off by %g, sd %g", k, error, r.sd[k]);
+    }
+    sdm_fit_dispose(&r);
+    free(x);
+    sdm_instance_free(shape);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -193,6 +238,7 @@ int main(void)
         cmocka_unit_test(test_mesh_without_area),
         cmocka_unit_test(test_shapes_are_found),
         cmocka_unit_test(test_deviations_count_independent_points),
+        cmocka_unit_test(test_deviations_know_the_errors_at_sharp_edges),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

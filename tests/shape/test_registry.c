@@ -185,6 +185,13 @@ static void test_parameters_are_checked(void **state)
     params[1] = PARAMS[1];
     params[1].unit = NULL;
     registration_refused(&s, "parameter 'shift' has no unit");
+    // all mistakes are told at once
+    params[0].max = params[0].min;
+    s.summary = NULL;
+    registration_refused(&s, "no summary");
+    err_has("; parameter 'size' has the range");
+    err_has("; parameter 'shift' has no unit");
+    s = GOOD;
     s.params = NULL;
     registration_refused(&s, "2 parameters, but no table");
     s.n_params = 0;

@@ -155,10 +155,18 @@ static sdm_status scratch_start(const sdm_features *f, sdm_point_scratch **out, 
     return st;
 }
 
-/* Answers for the block of sorted points key[n], 0 < n <= SDM_POINT_BLOCK, of x[][3]. */
+/* Answers for the block of sorted points key[n], 0 < n <= SDM_POINT_BLOCK, of x[][3]. The first
+   `ahead` of the keys are those of this block and the next one. */
 static void block_find(const sdm_points_job *job, sdm_point_kernel *kernel, sdm_point_scratch *s,
-                       const double *x, const sdm_point_key *key, size_t n, const sdm_exact_at *out)
+                       const double *x, const sdm_point_key *key, size_t n, size_t ahead,
+                       const sdm_exact_at *out)
 {
+    // sorted points and their distances lie anywhere in memory: the processor fetches those of the
+    // next block while it works on this one
+    for (size_t i = n; i < ahead; i++) {
+        __builtin_prefetch(x + 3 * (size_t)key[i].index);
+        if (out->distance) __builtin_prefetch(out->distance + key[i].index, 1);
+    }
     for (size_t i = 0; i < SDM_POINT_BLOCK; i++) {
         const double *p = x + 3 * (size_t)key[i < n ? i : n - 1].index;
         // a point that is not usable is replaced by any other
@@ -219,7 +227,8 @@ static sdm_status chunk_find(const sdm_points_job *job, const double *x, size_t 
             for (size_t b = part * BLOCKS; b < (part + 1) * BLOCKS && b < n_block && !s; b++) {
                 const size_t first = b * SDM_POINT_BLOCK, left = n - first;
                 block_find(job, kernel, scratch, x, key + first,
-                           left < SDM_POINT_BLOCK ? left : SDM_POINT_BLOCK, out);
+                           left < SDM_POINT_BLOCK ? left : SDM_POINT_BLOCK,
+                           left < 2 * SDM_POINT_BLOCK ? left : 2 * SDM_POINT_BLOCK, out);
             }
             if (!s && sdm_cancelled(job->opts))
                 s = sdm_fail(&local, SDM_E_CANCELLED, "points stopped on request");

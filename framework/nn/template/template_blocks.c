@@ -126,13 +126,8 @@ static bool is_behind(const template_work *w, size_t c, const template_block *b,
         memset(slope, 0, sizeof slope);
     }
     for (int a = 0; a < 3; a++) base -= slope[a] * 0.5f * (float)(BLOCK - 1);
-    // The counter is as wide as the floats that are compared: the compiler vectorises the loop.
-    int32_t count = 0;
-    for (size_t v = 0; v < VOXELS; v++)
-        count += base + (slope[0] * w->offset[0][v] +
-                         (slope[1] * w->offset[1][v] + slope[2] * w->offset[2][v])) >
-                 value[v];
-    return count == VOXELS;
+    return sdm_template_kernels()->count_above(base, slope, (const float *const *)w->offset,
+                                               value) == VOXELS;
 }
 
 // The part that is the nearest at the centre of a block.

@@ -2,16 +2,44 @@
    of the formulas in template_corners.c. */
 #include "template_derivative.h"
 
-void sdm_template_station_slopes(const template_work *w, size_t c, point_slope *at)
+// Sets the points of w->row to n stations of part c.
+static void load_stations(const template_work *w, size_t c, size_t first, size_t n)
 {
-    const size_t *n = w->k->stations;
     const sdm_lattice *near = &w->k->parts[c].near;
     const warp_scratch *warp = &w->warp[c];
-    for (size_t i = 0; i < n[0] * n[1] * n[2]; i++) {
-        float u[3];
+    const template_row *r = &w->row;
+    for (size_t x = 0; x < n; x++) {
+        const station *s = &warp->station[first + x];
         for (int a = 0; a < 3; a++)
-            u[a] = (float)((warp->station[i].y[a] - near->origin[a]) / near->spacing);
-        sdm_template_point_slope(w, c, u, warp->metric + 8 * i, &at[i]);
+            r->u[a][x] = (float)((s->y[a] - near->origin[a]) / near->spacing);
+        for (size_t a = 0; a < 6; a++) r->metric[a][x] = warp->metric[8 * (first + x) + a];
+    }
+}
+
+// The element x of rows.
+static point_slope slope_at(const template_row *points, const template_slope_rows *r, size_t x)
+{
+    point_slope out = {.f = r->f[x], .factor = r->factor[x]};
+    for (int a = 0; a < 3; a++) {
+        out.u[a] = points->u[a][x];
+        out.g[a] = r->g[a][x];
+        out.df[a] = r->df[a][x];
+        out.by_u[a] = r->by_u[a][x];
+        out.dr[a] = r->dr[a][x];
+        for (int b = 0; b < 3; b++) out.dg[a][b] = r->dg[a][b][x];
+    }
+    for (int a = 0; a < 6; a++) out.by_metric[a] = r->by_metric[a][x];
+    return out;
+}
+
+void sdm_template_station_slopes(const template_work *w, size_t c, template_slope_rows *rows,
+                                 template_slope_rows *far, point_slope *at)
+{
+    const size_t *n = w->k->stations;
+    for (size_t row = 0; row < n[1] * n[2]; row++) {
+        load_stations(w, c, row * n[0], n[0]);
+        sdm_template_slope_rows(w, c, n[0], rows, far);
+        for (size_t x = 0; x < n[0]; x++) at[row * n[0] + x] = slope_at(&w->row, rows, x);
     }
 }
 

@@ -4,17 +4,22 @@
 
 #include "template_work.h"
 
-/* At a point with the index u[3] and the metric G the distance is f s + r: the template f with the
-   gradient g, the factor s of the metric, the correction r; with their derivatives. */
+/* template_slope_rows.c */
+
+/* Takes memory for rows of points: all rows of *rows, and f, g, df, dg of *far. */
+void sdm_template_take_slope_rows(const template_network *k, void *memory, size_t *at,
+                                  template_slope_rows *rows, template_slope_rows *far);
+
+/* *rows = the derivatives of part c at the points row.u[n] with row.metric[n]; of rigid parts
+   neither the metric is read nor the factor set. *far: memory. */
+void sdm_template_slope_rows(const template_work *w, size_t c, size_t n, template_slope_rows *rows,
+                             template_slope_rows *far);
+
+/* The derivatives at a station: elements of template_slope_rows, and its index u. */
 typedef struct point_slope {
     float u[3], f, g[3], factor;
-    float df[3], dg[3][3], by_u[3], dr[3]; /* of f, g, s, r by u; dg[a]: by u[a] */
-    float by_metric[6];                    /* of s by xx, yy, zz, yz, xz, xy */
+    float df[3], dg[3][3], by_u[3], dr[3], by_metric[6];
 } point_slope;
-
-/* template_point_slope.c */
-void sdm_template_point_slope(const template_work *w, size_t c, const float u[3],
-                              const float metric[6], point_slope *out);
 
 /* A direction in which the stations of a part with a warp move. */
 typedef struct station_motion {
@@ -24,8 +29,9 @@ typedef struct station_motion {
 } station_motion;
 
 /* template_corner_slopes.c. at[stations] = the slopes at the stations of part c, which has a warp,
-   after sdm_template_begin(). */
-void sdm_template_station_slopes(const template_work *w, size_t c, point_slope *at);
+   after sdm_template_begin(). *rows, *far: memory. */
+void sdm_template_station_slopes(const template_work *w, size_t c, template_slope_rows *rows,
+                                 template_slope_rows *far, point_slope *at);
 
 /* corner[corners][4] = the derivative of the corners of the blocks for part c, which has a warp.
    sample[stations][8]: memory for the derivatives of the samples. */

@@ -46,16 +46,9 @@ float sdm_template_far(const template_work *w, size_t c, const template_block *b
     sdm_template_interpolate(w, w->corner + 4 * sdm_template_corner_at(w, c, b), value);
     if (isnan(value[0])) return 0; // every value is a sum with terms of all corners
     if (part->rigid) return 1;
-    const float voxels = voxels_per_mm(w), from = SDM_TEMPLATE_FAR_VOXELS, to = from + 1;
-    // The counter is as wide as the floats that are compared: the compiler vectorises the loop.
-    int32_t near = 0, far = 0;
-    for (size_t v = 0; v < VOXELS; v++) {
-        const float distance = fabsf(value[v]) * voxels;
-        near += distance <= from;
-        far += distance >= to;
-    }
-    if (near) return 0;
-    return far == VOXELS ? 1 : fabsf(value[least_voxel(value)]) * voxels - from;
+    const float from = SDM_TEMPLATE_FAR_VOXELS,
+                least = sdm_template_kernels()->least(value) * voxels_per_mm(w);
+    return least <= from ? 0 : least >= from + 1 ? 1 : least - from;
 }
 
 void sdm_template_blend(float share, const float *far, const float *exact, float *value)

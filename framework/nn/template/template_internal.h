@@ -103,13 +103,21 @@ void sdm_template_spline(float *v, size_t n, size_t stride, size_t width);
 /* Turns points[stations][4] into the coefficients of the cubic B-splines that interpolate them. */
 void sdm_template_prefilter(const template_network *k, float *points);
 
-/* points[stations][4] (not yet coefficients), metric[stations][8] = the derivatives of those of `w`
-   in a direction in which the frame has the derivative dm[9], db[3] and the warp the derivative
-   `control`. */
-void sdm_template_invert_slope(const template_network *k, const sdm_template_part *part,
-                               const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,
-                               const float *control, const double dm[9], const double db[3],
-                               float *points, float *metric);
+/* A direction in which a part with a warp changes. */
+typedef struct warp_motion {
+    double inverse[9];    /* derivative of the inverse of the frame's matrix; */
+    double shift[3];      /* inverse of the frame's matrix times the derivative of b */
+    bool turns;           /* inverse is not 0 */
+    const float *control; /* derivative of the warp's control displacements */
+    /* output: the derivatives of points[stations][4] (not yet coefficients) and
+       metric[stations][8] */
+    float *points, *metric;
+} warp_motion;
+
+/* Fills points and metric of motion[n] for a part in `pose`, after sdm_template_invert(). */
+void sdm_template_invert_slopes(const template_network *k, const sdm_template_part *part,
+                                const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,
+                                size_t n, const warp_motion *motion);
 
 /* template_forward.c, template_slopes.c: entries of the function table sdm_model_kind. */
 size_t sdm_template_scratch_bytes(const sdm_model *m, size_t n, int n_threads);

@@ -32,12 +32,25 @@ typedef struct template_expansion {
     float linear[4];   /* weight of the second of two stations */
 } template_expansion;
 
+/* Rows of a part's distance f s + r at n points and of its derivatives: template f with the
+   gradient g, factor s of the metric, correction r. by_u, df, dg, dr: by the index u; dg[a]: by
+   u[a]. */
+typedef struct template_slope_rows {
+    float *f, *g[3], *df[3], *dg[3][3];
+    float *factor, *by_u[3], *by_metric[6]; /* of s */
+    float *dr[3];
+} template_slope_rows;
+
 typedef struct template_table {
     /* c[n_c][64] = combinations of stations in a block of 16 lines of four voxels: the first three
        by cubic B-splines of points[line][4 stations][4], the others linear in metric[line][2
        stations][8] (n_c = 3 or 9). stride: floats from one line to the next. */
     void (*expand)(const template_expansion *e, const float *points, const float *metric,
                    size_t stride, size_t n_c, float *const *c);
+    /* out[n][4] and then out[n][8] = the points[4][n][4] and the metric[2][n][8] of neighbouring
+       layers of n stations, combined for voxel `phase` between them. */
+    void (*combine)(const template_expansion *e, const float *points, const float *metric, size_t n,
+                    size_t phase, float *out);
     /* f[n] = distance and g[3][n] = gradient of the template at the indices u[3][n] in the lattice
        `near`, interpolated in `l`; indices outside the lattice are clamped. */
     void (*lookup)(const template_level *l, size_t n, const float *const *u, float *f,
@@ -48,6 +61,22 @@ typedef struct template_table {
                       float *out);
     /* out[n] += the map at the indices u[3][n], trilinear. */
     void (*correct)(const template_correction *c, size_t n, const float *const *u, float *out);
+    /* f, g, df, dg of *out: of the template at the indices u[3][n], as for `lookup`. */
+    void (*lookup_slopes)(const template_level *l, size_t n, const float *const *u,
+                          const template_slope_rows *out);
+    /* factor, by_u, by_metric of *r from its g and dg and from metric[6][n]: the factor 1 / sqrt(q)
+       of `normalise`. */
+    void (*factor_slopes)(size_t n, const float *const *metric, const template_slope_rows *r);
+    /* out[3][n] = the derivatives by u of the map that `correct` adds. */
+    void (*correct_slopes)(const template_correction *c, size_t n, const float *const *u,
+                           float *const *out);
+    /* sum[64] = a[0] b[0] + ... + a[n-1] b[n-1], n > 0 rows of 64 each. */
+    void (*sum_products)(size_t n, const float *const *a, const float *const *b, float *sum);
+    /* How many of the 64 sums base + slope . offset[3][64] are larger than value[64]? */
+    int32_t (*count_above)(float base, const float slope[3], const float *const *offset,
+                           const float *value);
+    /* The smallest of |value[64]|, none of which is NAN. */
+    float (*least)(const float *value);
     /* value[4][4][4] = a function in a block of 4 x 4 x 4 voxels, cubic interpolation (Hermite)
        from its value and slopes by blocks at the eight corners, the voxels (0, 0, 0) .. (4, 4, 4):
        corner[x][4], and the same `line` floats further along y and `plane` floats along z. */

@@ -272,7 +272,43 @@ static void lookup(const template_level *l, size_t n, const float *const *u, flo
     }
 }
 
-// The compiler makes vectors of this loop, of sixteen floats with AVX-512.
+static float least(const float *value)
+{
+    const veci magnitude = splat_int(INT32_MAX);
+    vec all = (vec)((veci)load(value) & magnitude);
+    for (size_t v = VW; v < 64; v += VW)
+        all = MIN_VEC((vec)((veci)load(value + v) & magnitude), all);
+    float each[VW], smallest = INFINITY;
+    store(each, all);
+    for (int i = 0; i < VW; i++) smallest = each[i] < smallest ? each[i] : smallest;
+    return smallest;
+}
+
+// The compiler makes vectors of the loops of the next functions, of sixteen floats with AVX-512.
+// The counter is as wide as the floats that are compared.
+
+static void combine(const template_expansion *e, const float *points, const float *metric, size_t n,
+                    size_t phase, float *out)
+{
+    float w[4], *out_metric = out + 4 * n;
+    for (int a = 0; a < 4; a++) w[a] = e->cubic[a][phase];
+    const float t = e->linear[phase], *p = points, *g = metric;
+    for (size_t i = 0; i < 4 * n; i++)
+        out[i] = w[0] * p[i] + w[1] * p[4 * n + i] + w[2] * p[8 * n + i] + w[3] * p[12 * n + i];
+    for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
+}
+
+static int32_t count_above(float base, const float slope[3], const float *const *offset,
+                           const float *value)
+{
+    int32_t count = 0;
+    for (size_t v = 0; v < 64; v++)
+        count +=
+            base + (slope[0] * offset[0][v] + (slope[1] * offset[1][v] + slope[2] * offset[2][v])) >
+            value[v];
+    return count;
+}
+
 static void normalise(size_t n, const float *f, const float *const *g, const float *const *metric,
                       float *out)
 {
@@ -442,9 +478,18 @@ static void displace(const float *control, size_t line, size_t plane, const floa
     sum_line(z, x[0], sum[3]);
 }
 
+#include "template_kernels_slopes.h"
+
 const template_table TABLE = {.expand = expand,
                               .lookup = lookup,
+                              .combine = combine,
+                              .count_above = count_above,
+                              .least = least,
                               .normalise = normalise,
                               .correct = correct,
+                              .lookup_slopes = lookup_slopes,
+                              .factor_slopes = factor_slopes,
+                              .correct_slopes = correct_slopes,
+                              .sum_products = sum_products,
                               .block = block,
                               .displace = displace};

@@ -8,27 +8,15 @@ enum { BLOCK = SDM_TEMPLATE_STEP, VOXELS = SDM_TEMPLATE_BLOCK_VOXELS };
 
 /* Stations. */
 
-// out[n][4] and then out[n][8] = the points[4][n][4] and the metric[2][n][8] of neighbouring layers
-// of n stations, combined for voxel `phase` between them.
-static void combine(const template_expansion *e, const float *points, const float *metric, size_t n,
-                    size_t phase, float *out)
-{
-    float w[4], *out_metric = out + 4 * n;
-    for (int a = 0; a < 4; a++) w[a] = e->cubic[a][phase];
-    const float t = e->linear[phase], *p = points, *g = metric;
-    for (size_t i = 0; i < 4 * n; i++)
-        out[i] = w[0] * p[i] + w[1] * p[4 * n + i] + w[2] * p[8 * n + i] + w[3] * p[12 * n + i];
-    for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
-}
-
 void sdm_template_expand(const template_network *k, const template_block *b, warp_lines *l,
                          size_t n_c, float *const *c)
 {
     const size_t nx = k->stations[0], n = nx * k->stations[1], plane = 12 * n, line = 12 * nx;
+    const template_table *t = sdm_template_kernels();
     if (l->plane_of != b->at[2]) {
         for (size_t z = 0; z < BLOCK; z++)
-            combine(&k->expansion, l->points + 4 * n * b->at[2], l->metric + 8 * n * (b->at[2] + 1),
-                    n, z, l->plane + z * plane);
+            t->combine(&k->expansion, l->points + 4 * n * b->at[2],
+                       l->metric + 8 * n * (b->at[2] + 1), n, z, l->plane + z * plane);
         l->plane_of = b->at[2];
         l->line_of = SIZE_MAX;
     }
@@ -36,23 +24,51 @@ void sdm_template_expand(const template_network *k, const template_block *b, war
         for (size_t z = 0; z < BLOCK; z++) {
             const float *from = l->plane + z * plane;
             for (size_t y = 0; y < BLOCK; y++)
-                combine(&k->expansion, from + 4 * nx * b->at[1],
-                        from + 4 * n + 8 * nx * (b->at[1] + 1), nx, y,
-                        l->line + (BLOCK * z + y) * line);
+                t->combine(&k->expansion, from + 4 * nx * b->at[1],
+                           from + 4 * n + 8 * nx * (b->at[1] + 1), nx, y,
+                           l->line + (BLOCK * z + y) * line);
         }
         l->line_of = b->at[1];
     }
-    sdm_template_kernels()->expand(&k->expansion, l->line + 4 * b->at[0],
-                                   l->line + 4 * nx + 8 * (b->at[0] + 1), line, n_c, c);
+    t->expand(&k->expansion, l->line + 4 * b->at[0], l->line + 4 * nx + 8 * (b->at[0] + 1), line,
+              n_c, c);
 }
 
 /* Lookup. */
 
-// 1 if the index is within the lattice `near`, else 0.
-static int32_t is_near(const float *const *u, const float end[3], size_t i)
+// The end of the lattice `near`.
+typedef struct lattice_end {
+    float at[3];
+} lattice_end;
+
+static lattice_end end_of_near(const template_work *w, size_t c)
 {
-    return (u[0][i] >= 0) & (u[0][i] <= end[0]) & (u[1][i] >= 0) & (u[1][i] <= end[1]) &
-           (u[2][i] >= 0) & (u[2][i] <= end[2]);
+    lattice_end end;
+    for (int a = 0; a < 3; a++) end.at[a] = (float)(w->k->near[c].n[a] - 1);
+    return end;
+}
+
+// 1 if the index is within the lattice `near`, else 0.
+static int32_t is_near(float *const *u, const lattice_end *end, size_t i)
+{
+    return (u[0][i] >= 0) & (u[0][i] <= end->at[0]) & (u[1][i] >= 0) & (u[1][i] <= end->at[1]) &
+           (u[2][i] >= 0) & (u[2][i] <= end->at[2]);
+}
+
+bool sdm_template_is_near(const template_work *w, size_t c, size_t i)
+{
+    const lattice_end end = end_of_near(w, c);
+    return is_near(w->row.u, &end, i);
+}
+
+size_t sdm_template_count_near(const template_work *w, size_t c, size_t n)
+{
+    const lattice_end end = end_of_near(w, c);
+    float *const u[3] = {w->row.u[0], w->row.u[1], w->row.u[2]};
+    // The counter is as wide as the floats that are compared: the compiler vectorises the loop.
+    int32_t count = 0;
+    for (size_t i = 0; i < n; i++) count += is_near(u, &end, i);
+    return (size_t)count;
 }
 
 // Looks up elements from .. to - 1 of row.u. The kernel writes a few elements beyond.
@@ -67,17 +83,14 @@ void sdm_template_lookup(const template_work *w, size_t c, size_t n)
 {
     const template_row *r = &w->row;
     const template_level *near = &w->k->near[c], *far = &w->k->far[c];
-    const float *const u[3] = {r->u[0], r->u[1], r->u[2]};
-    float end[3];
-    for (int a = 0; a < 3; a++) end[a] = (float)(near->n[a] - 1);
-    // The counter is as wide as the floats that are compared: the compiler vectorises the loop.
-    int32_t count = 0;
-    for (size_t i = 0; i < n; i++) count += is_near(u, end, i);
+    float *const u[3] = {r->u[0], r->u[1], r->u[2]};
+    const lattice_end end = end_of_near(w, c);
+    const size_t count = sdm_template_count_near(w, c, n);
     // the run of points within `near`: first .. last - 1
     size_t first = 0, last = n;
-    while (first < n && !is_near(u, end, first)) first++;
-    while (last > first && !is_near(u, end, last - 1)) last--;
-    if ((size_t)count == last - first) {
+    while (first < n && !is_near(u, &end, first)) first++;
+    while (last > first && !is_near(u, &end, last - 1)) last--;
+    if (count == last - first) {
         // from left to right, because each call writes beyond its end
         lookup_range(r, far, 0, first);
         lookup_range(r, near, first, last);
@@ -85,9 +98,9 @@ void sdm_template_lookup(const template_work *w, size_t c, size_t n)
         return;
     }
     lookup_range(r, near, 0, n);
-    sdm_template_kernels()->lookup(far, n, u, r->far_f, r->far_g);
+    sdm_template_kernels()->lookup(far, n, (const float *const *)u, r->far_f, r->far_g);
     for (size_t i = 0; i < n; i++) {
-        if (is_near(u, end, i)) continue;
+        if (is_near(u, &end, i)) continue;
         r->f[i] = r->far_f[i];
         for (int a = 0; a < 3; a++) r->g[a][i] = r->far_g[a][i];
     }
@@ -131,23 +144,37 @@ void sdm_template_row_points(const template_work *w, size_t c, const double firs
     }
 }
 
-static void affine_points(const template_work *w, size_t c, const template_block *b)
+void sdm_template_affine(const template_work *w, const double from[3], const double by[3][3],
+                         const template_block *b, float *const u[3])
+{
+    for (int i = 0; i < 3; i++) {
+        double at = from[i];
+        for (int a = 0; a < 3; a++) at += by[a][i] * (double)(BLOCK * b->at[a]);
+        const float first = (float)at, bx = (float)by[0][i], by_y = (float)by[1][i],
+                    bz = (float)by[2][i];
+        for (size_t v = 0; v < VOXELS; v++)
+            u[i][v] =
+                first + (bx * w->offset[0][v] + (by_y * w->offset[1][v] + bz * w->offset[2][v]));
+    }
+}
+
+void sdm_template_points(template_work *w, size_t c, const template_block *b)
 {
     const part_state *part = &w->part[c];
-    for (int i = 0; i < 3; i++) {
-        float *u = w->row.u[i];
-        double at = part->from[i];
-        for (int a = 0; a < 3; a++) at += part->by[a][i] * (double)(BLOCK * b->at[a]);
-        const float first = (float)at, bx = (float)part->by[0][i], by = (float)part->by[1][i],
-                    bz = (float)part->by[2][i];
-        for (size_t v = 0; v < VOXELS; v++)
-            u[v] = first + (bx * w->offset[0][v] + (by * w->offset[1][v] + bz * w->offset[2][v]));
+    template_row *r = &w->row;
+    w->loaded = SIZE_MAX;
+    if (part->warped) {
+        float *const to[9] = {r->u[0],      r->u[1],      r->u[2],      r->metric[0], r->metric[1],
+                              r->metric[2], r->metric[3], r->metric[4], r->metric[5]};
+        sdm_template_expand(w->k, b, &w->lines[c], 9, to);
+        return;
     }
+    sdm_template_affine(w, part->from, part->by, b, r->u);
     if (part->rigid) return;
     float metric[6];
     sdm_template_metric(w->pose[c].inverse, metric);
     for (int a = 0; a < 6; a++)
-        for (size_t v = 0; v < VOXELS; v++) w->row.metric[a][v] = metric[a];
+        for (size_t v = 0; v < VOXELS; v++) r->metric[a][v] = metric[a];
 }
 
 void sdm_template_run(template_work *w, size_t c, const template_block *b)
@@ -155,16 +182,9 @@ void sdm_template_run(template_work *w, size_t c, const template_block *b)
     template_row *r = &w->row;
     const template_network *k = w->k;
     const template_table *t = sdm_template_kernels();
-    template_place where = TEMPLATE_ACROSS;
+    const template_place where = w->part[c].warped ? TEMPLATE_ACROSS : sdm_template_place(w, c, b);
+    sdm_template_points(w, c, b);
     w->loaded = c;
-    if (w->part[c].warped) {
-        float *const to[9] = {r->u[0],      r->u[1],      r->u[2],      r->metric[0], r->metric[1],
-                              r->metric[2], r->metric[3], r->metric[4], r->metric[5]};
-        sdm_template_expand(k, b, &w->lines[c], 9, to);
-    } else {
-        affine_points(w, c, b);
-        where = sdm_template_place(w, c, b);
-    }
     if (where == TEMPLATE_ACROSS)
         sdm_template_lookup(w, c, VOXELS);
     else

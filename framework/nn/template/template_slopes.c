@@ -3,47 +3,39 @@
 #include <math.h>
 #include <string.h>
 
+#include "sdm/internal/mat3.h"
 #include "template_derivative.h"
 
 enum { BLOCK = SDM_TEMPLATE_STEP, VOXELS = SDM_TEMPLATE_BLOCK_VOXELS };
 
-/* Derivatives of the value of a voxel: by its index u[3], and by the metric. */
-typedef struct value_slope {
-    float u[3], metric[6];
-} value_slope;
-
-// Derivatives of the value of part c in voxel i of w->row, after sdm_template_run().
-static value_slope slope_of_value(const template_work *w, size_t c, size_t i)
-{
-    const template_row *r = &w->row;
-    float u[3], metric[6];
-    for (int a = 0; a < 3; a++) u[a] = r->u[a][i];
-    for (int a = 0; a < 6; a++) metric[a] = r->metric[a][i];
-    point_slope p;
-    sdm_template_point_slope(w, c, u, metric, &p);
-    value_slope out;
-    for (int a = 0; a < 3; a++) out.u[a] = p.factor * p.df[a] + p.f * p.by_u[a] + p.dr[a];
-    for (int a = 0; a < 6; a++) out.metric[a] = p.f * p.by_metric[a];
-    return out;
-}
+/* How a part without a warp moves in a direction: the derivative of the index at a voxel is an
+   affine function of the voxel's index. */
+typedef struct affine_motion {
+    double from[3], by[3][3];
+    float metric[6]; /* derivative of the metric */
+} affine_motion;
 
 /* Scratch memory of the derivatives along D directions. */
 typedef struct slopes_work {
     template_work w;
-    size_t n;               /* D */
-    double *dg;             /* [D][N] */
-    double (*dm)[9];        /* [D][n_parts] */
-    double (*db)[3];        /* [D][n_parts] */
-    float *control;         /* control displacements of the warp of the first part */
-    float *points, *metric; /* [D][stations][4], [D][stations][8] */
-    warp_lines *lines;      /* [warps][D] */
-    point_slope *station;   /* [stations] of one part */
-    float *sample;          /* [stations][8] derivatives of its samples */
-    float *corner;          /* [warps][D][corners][4] */
-    float *row[9];          /* [64] du, d metric */
-    value_slope *slope;     /* [64] */
-    float *value;           /* [64] the map, or a derivative */
-    uint8_t *nearest;       /* [64] part with the smallest value */
+    size_t n;                      /* D */
+    double *dg;                    /* [D][N] */
+    double (*dm)[9];               /* [D][n_parts] */
+    double (*db)[3];               /* [D][n_parts] */
+    affine_motion *affine;         /* [D][n_parts], of parts without a warp */
+    warp_motion *warp;             /* [D] of one part */
+    float *control;                /* [D] control displacements of the warp of one part */
+    size_t control_size;           /* floats of one */
+    float *points, *metric;        /* [D][stations][4], [D][stations][8] */
+    warp_lines *lines;             /* [warps][D] */
+    point_slope *station;          /* [stations] of one part */
+    float *sample;                 /* [stations][8] derivatives of its samples */
+    float *corner;                 /* [warps][D][corners][4] */
+    template_slope_rows rows, far; /* of a block, or of a row of stations */
+    float *slope[9];  /* [64] derivatives of the value by u and metric; 0: another part's */
+    float *row[9];    /* [64] du, d metric */
+    float *value;     /* [64] the map, or a derivative */
+    uint8_t *nearest; /* [64] part with the smallest value */
 } slopes_work;
 
 // Number of corners of blocks.
@@ -61,13 +53,16 @@ static size_t slopes_carve(const sdm_model *m, size_t n, size_t correction_scrat
     s->dg = sdm_template_take(memory, &at, n * k->n_numbers * sizeof *s->dg);
     s->dm = sdm_template_take(memory, &at, n * k->n_parts * sizeof *s->dm);
     s->db = sdm_template_take(memory, &at, n * k->n_parts * sizeof *s->db);
+    s->affine = sdm_template_take(memory, &at, n * k->n_parts * sizeof *s->affine);
     size_t control = 0, stations = k->stations[0] * k->stations[1] * k->stations[2], warps = 0;
     for (size_t c = 0; c < k->n_parts; c++) {
         const size_t count = sdm_lattice_count(&k->parts[c].warp);
         if (k->parts[c].n_modes && count > control) control = count;
         warps += k->parts[c].n_modes > 0;
     }
-    s->control = sdm_template_take(memory, &at, 4 * control * sizeof *s->control);
+    s->control_size = 4 * control;
+    s->control = sdm_template_take(memory, &at, n * s->control_size * sizeof *s->control);
+    s->warp = sdm_template_take(memory, &at, (warps ? n : 0) * sizeof *s->warp);
     s->points = sdm_template_take(memory, &at, warps * n * 4 * stations * sizeof *s->points);
     s->metric = sdm_template_take(memory, &at, warps * n * 8 * stations * sizeof *s->metric);
     s->lines = sdm_template_take(memory, &at, warps * n * sizeof *s->lines);
@@ -82,9 +77,11 @@ static size_t slopes_carve(const sdm_model *m, size_t n, size_t correction_scrat
     s->sample = sdm_template_take(memory, &at, SAMPLE_SIZE * each * sizeof *s->sample);
     s->corner =
         sdm_template_take(memory, &at, warps * n * 4 * count_corners(&s->w) * sizeof *s->corner);
-    for (int i = 0; i < 9; i++)
+    sdm_template_take_slope_rows(k, memory, &at, &s->rows, &s->far);
+    for (int i = 0; i < 9; i++) {
+        s->slope[i] = sdm_template_take(memory, &at, VOXELS * sizeof *s->slope[i]);
         s->row[i] = sdm_template_take(memory, &at, VOXELS * sizeof *s->row[i]);
-    s->slope = sdm_template_take(memory, &at, VOXELS * sizeof *s->slope);
+    }
     s->value = sdm_template_take(memory, &at, VOXELS * sizeof *s->value);
     s->nearest = sdm_template_take(memory, &at, VOXELS);
     return at;
@@ -107,24 +104,61 @@ static template_correction change_of_correction(const slopes_work *s, size_t d)
     return change;
 }
 
-// Derivatives of the stations and corners of part c, which has a warp, along direction d.
-static void warp_slopes(slopes_work *s, size_t c, size_t d)
+// Derivatives of the stations and corners of part c, which has a warp, along all directions.
+static void warp_slopes(slopes_work *s, size_t c)
 {
     const template_work *w = &s->w;
     const template_network *k = w->k;
     const sdm_template_part *part = &k->parts[c];
+    const part_pose *pose = &w->pose[c];
     const size_t stations = k->stations[0] * k->stations[1] * k->stations[2],
-                 at = warp_number(k, c) * s->n + d, pose = d * k->n_parts + c;
-    float *points = s->points + 4 * at * stations, *metric = s->metric + 8 * at * stations;
-    sdm_template_control(part, s->dg + d * k->n_numbers + part->amplitudes, s->control);
-    sdm_template_invert_slope(k, part, &w->pose[c], w->grid, &w->warp[c], s->control, s->dm[pose],
-                              s->db[pose], points, metric);
-    station_motion motion = {.points = points, .metric = metric};
-    if (w->correction && c == 0) motion.change = change_of_correction(s, d);
-    sdm_template_corner_slopes(w, c, s->station, &motion, s->sample,
-                               s->corner + 4 * at * count_corners(w));
-    sdm_template_prefilter(k, points);
-    s->lines[at].plane_of = s->lines[at].line_of = SIZE_MAX;
+                 first = warp_number(k, c) * s->n;
+    sdm_template_station_slopes(w, c, &s->rows, &s->far, s->station);
+    for (size_t d = 0; d < s->n; d++) {
+        float *control = s->control + d * s->control_size;
+        const double *dm = s->dm[d * k->n_parts + c];
+        warp_motion *motion = &s->warp[d];
+        *motion = (warp_motion){.control = control,
+                                .points = s->points + 4 * (first + d) * stations,
+                                .metric = s->metric + 8 * (first + d) * stations};
+        for (int i = 0; i < 9; i++) motion->turns |= dm[i] != 0;
+        sdm_template_inverse_slope(pose, dm, motion->inverse);
+        m3_apply(pose->inverse, s->db[d * k->n_parts + c], motion->shift);
+        sdm_template_control(part, s->dg + d * k->n_numbers + part->amplitudes, control);
+    }
+    sdm_template_invert_slopes(k, part, pose, w->grid, &w->warp[c], s->n, s->warp);
+    for (size_t d = 0; d < s->n; d++) {
+        const warp_motion *motion = &s->warp[d];
+        station_motion change = {.points = motion->points, .metric = motion->metric};
+        if (w->correction && c == 0) change.change = change_of_correction(s, d);
+        sdm_template_corner_slopes(w, c, s->station, &change, s->sample,
+                                   s->corner + 4 * (first + d) * count_corners(w));
+        sdm_template_prefilter(k, motion->points);
+        s->lines[first + d].plane_of = s->lines[first + d].line_of = SIZE_MAX;
+    }
+}
+
+// How part c, which has no warp, moves along direction d.
+static affine_motion motion_of(const slopes_work *s, size_t c, size_t d)
+{
+    const template_network *k = s->w.k;
+    const part_pose *pose = &s->w.pose[c];
+    const sdm_grid *grid = s->w.grid;
+    const double per_mm = 1 / k->parts[c].near.spacing;
+    affine_motion motion;
+    double moved[9], x[3], shift[3];
+    // q = m^-1 (x - b): dq = d(m^-1) (x - b) - m^-1 db
+    sdm_template_inverse_slope(pose, s->dm[d * k->n_parts + c], moved);
+    m3_apply(pose->inverse, s->db[d * k->n_parts + c], shift);
+    for (int i = 0; i < 3; i++) x[i] = grid->origin[i] - pose->b[i];
+    m3_apply(moved, x, motion.from);
+    for (int i = 0; i < 3; i++) motion.from[i] = (motion.from[i] - shift[i]) * per_mm;
+    for (int a = 0; a < 3; a++) {
+        for (int i = 0; i < 3; i++) x[i] = grid->dir[3 * i + a] * grid->spacing[a] * per_mm;
+        m3_apply(moved, x, motion.by[a]);
+    }
+    sdm_template_metric_slope(pose->inverse, moved, motion.metric);
+    return motion;
 }
 
 // Derivatives of frames and warps along direction[D][P], after sdm_template_begin().
@@ -143,67 +177,33 @@ static void slopes_begin(slopes_work *s, const double *direction)
                                   s->db + d * k->n_parts);
     }
     for (size_t c = 0; c < k->n_parts; c++) {
-        if (k->parts[c].n_modes == 0) continue;
-        sdm_template_station_slopes(&s->w, c, s->station);
-        for (size_t d = 0; d < s->n; d++) warp_slopes(s, c, d);
+        if (k->parts[c].n_modes)
+            warp_slopes(s, c);
+        else
+            for (size_t d = 0; d < s->n; d++) s->affine[d * k->n_parts + c] = motion_of(s, c, d);
     }
-}
-
-// s->row = derivatives of u and metric of part c, which has no warp, in the voxels of a block.
-static void affine_slope(const slopes_work *s, size_t c, size_t d, const template_block *block)
-{
-    const template_network *k = s->w.k;
-    const part_pose *pose = &s->w.pose[c];
-    const double *dm = s->dm[d * k->n_parts + c], *db = s->db[d * k->n_parts + c],
-                 *b = pose->inverse;
-    double moved[9];
-    sdm_template_inverse_slope(pose, dm, moved);
-    for (size_t line = 0; line < BLOCK * BLOCK; line++) {
-        double du[2][3]; // at the first two voxels of the line
-        for (int e = 0; e < 2; e++) {
-            const double voxel[3] = {(double)(BLOCK * block->at[0]) + e,
-                                     (double)(BLOCK * block->at[1] + line % BLOCK),
-                                     (double)(BLOCK * block->at[2] + line / BLOCK)};
-            double p[3];
-            sdm_grid_world(s->w.grid, voxel, p);
-            for (int i = 0; i < 3; i++) p[i] -= pose->b[i];
-            for (int i = 0; i < 3; i++) {
-                double sum = 0;
-                for (int j = 0; j < 3; j++) sum += moved[3 * i + j] * p[j] - b[3 * i + j] * db[j];
-                du[e][i] = sum / k->parts[c].near.spacing;
-            }
-        }
-        for (int i = 0; i < 3; i++) {
-            const float from = (float)du[0][i], by = (float)(du[1][i] - du[0][i]);
-            for (size_t x = 0; x < BLOCK; x++) s->row[i][BLOCK * line + x] = from + by * (float)x;
-        }
-    }
-    float metric[6];
-    sdm_template_metric_slope(b, moved, metric);
-    for (int i = 0; i < 6; i++)
-        for (size_t v = 0; v < VOXELS; v++) s->row[3 + i][v] = metric[i];
 }
 
 // s->value = the derivative along direction d in the voxels of a block in which part c is the
-// nearest, as far as it is computed exactly, after sdm_template_run().
+// nearest, as far as it is computed exactly, after prepare_slopes().
 static void exact_slope(slopes_work *s, size_t c, size_t d, const template_block *b)
 {
     template_work *w = &s->w;
     const template_network *k = w->k;
-    if (w->part[c].warped)
+    const template_table *t = sdm_template_kernels();
+    if (w->part[c].warped) {
         sdm_template_expand(k, b, &s->lines[warp_number(k, c) * s->n + d], 9, s->row);
-    else
-        affine_slope(s, c, d, b);
-    for (size_t v = 0; v < VOXELS; v++) {
-        float sum = 0;
-        for (int a = 0; a < 3 && s->nearest[v] == c; a++) sum += s->slope[v].u[a] * s->row[a][v];
-        for (int a = 0; a < 6 && s->nearest[v] == c; a++)
-            sum += s->slope[v].metric[a] * s->row[3 + a][v];
-        s->value[v] = sum;
+    } else {
+        const affine_motion *motion = &s->affine[d * k->n_parts + c];
+        sdm_template_affine(w, motion->from, motion->by, b, s->row);
+        for (int a = 0; a < 6 && !w->part[c].rigid; a++)
+            for (size_t v = 0; v < VOXELS; v++) s->row[3 + a][v] = motion->metric[a];
     }
+    t->sum_products(w->part[c].rigid ? 3 : 9, (const float *const *)s->slope,
+                    (const float *const *)s->row, s->value);
     if (w->correction && c == 0) {
         const template_correction change = change_of_correction(s, d);
-        sdm_template_kernels()->correct(&change, VOXELS, (const float *const *)w->row.u, s->value);
+        t->correct(&change, VOXELS, (const float *const *)w->row.u, s->value);
     }
 }
 
@@ -217,16 +217,49 @@ static void far_slope(const slopes_work *s, size_t c, size_t d, const template_b
     sdm_template_interpolate(w, corner + 4 * sdm_template_corner_at(w, 0, b), slope);
 }
 
-// Evaluates the slopes of part c in the voxels of a block in which it is the nearest.
-static void prepare_slopes(slopes_work *s, size_t c, const template_block *b)
+// s->slope = the derivatives of the value in the voxels of a block in which part c is the nearest;
+// w->row = part c. blended: the values are wanted, too.
+static void prepare_slopes(slopes_work *s, size_t c, const template_block *b, bool blended)
 {
     template_work *w = &s->w;
-    if (w->loaded != c) sdm_template_run(w, c, b);
-    if (w->part[c].rigid)
-        for (int a = 0; a < 6; a++)
-            for (size_t v = 0; v < VOXELS; v++) w->row.metric[a][v] = a < 3;
+    const template_slope_rows *r = &s->rows;
+    if (w->loaded != c) {
+        if (blended)
+            sdm_template_run(w, c, b);
+        else
+            sdm_template_points(w, c, b);
+    }
+    sdm_template_slope_rows(w, c, VOXELS, &s->rows, &s->far);
+    const bool rigid = w->part[c].rigid;
+    for (int a = 0; a < 3; a++)
+        for (size_t v = 0; v < VOXELS; v++)
+            s->slope[a][v] =
+                rigid ? r->df[a][v] + r->dr[a][v]
+                      : r->factor[v] * r->df[a][v] + r->f[v] * r->by_u[a][v] + r->dr[a][v];
+    for (int a = 0; a < 6 && !rigid; a++)
+        for (size_t v = 0; v < VOXELS; v++) s->slope[3 + a][v] = r->f[v] * r->by_metric[a][v];
     for (size_t v = 0; v < VOXELS; v++)
-        if (s->nearest[v] == c) s->slope[v] = slope_of_value(w, c, v);
+        if (s->nearest[v] != c)
+            for (int a = 0; a < (rigid ? 3 : 9); a++) s->slope[a][v] = 0;
+}
+
+// Is part c the nearest in all voxels of a block?
+static bool is_alone(const slopes_work *s, size_t c)
+{
+    unsigned others = 0;
+    for (size_t v = 0; v < VOXELS; v++) others |= s->nearest[v] ^ (unsigned)c;
+    return others == 0;
+}
+
+// Copies s->value to the voxels of a block in which part c is the nearest.
+static void store_slope(const slopes_work *s, size_t c, const template_block *b, float *map)
+{
+    const size_t nx = (size_t)s->w.grid->n[0], ny = (size_t)s->w.grid->n[1];
+    float *to = map + BLOCK * ((b->at[2] * ny + b->at[1]) * nx + b->at[0]);
+    for (size_t z = 0; z < b->n[2]; z++)
+        for (size_t y = 0; y < b->n[1]; y++)
+            for (size_t x = 0, v = BLOCK * (BLOCK * z + y); x < b->n[0]; x++, v++)
+                if (s->nearest[v] == c) to[(z * ny + y) * nx + x] = s->value[v];
 }
 
 // out[D] = the derivatives in the voxels of a block in which part c is the nearest.
@@ -235,9 +268,8 @@ static void block_slopes(slopes_work *s, size_t c, const template_block *b, floa
     template_work *w = &s->w;
     float far[VOXELS], change[VOXELS];
     const float share = w->part[c].warped ? sdm_template_far(w, c, b, far) : 0;
-    if (share < 1) prepare_slopes(s, c, b);
-    const size_t nx = (size_t)w->grid->n[0], ny = (size_t)w->grid->n[1],
-                 first = BLOCK * ((b->at[2] * ny + b->at[1]) * nx + b->at[0]);
+    if (share < 1) prepare_slopes(s, c, b, share > 0);
+    const bool alone = is_alone(s, c);
     for (size_t d = 0; d < s->n; d++) {
         if (share == 1)
             far_slope(s, c, d, b, s->value);
@@ -247,10 +279,10 @@ static void block_slopes(slopes_work *s, size_t c, const template_block *b, floa
             far_slope(s, c, d, b, change);
             sdm_template_blend_slope(w, share, far, w->row.value, change, s->value);
         }
-        for (size_t z = 0; z < b->n[2]; z++)
-            for (size_t y = 0; y < b->n[1]; y++)
-                for (size_t x = 0, v = BLOCK * (BLOCK * z + y); x < b->n[0]; x++, v++)
-                    if (s->nearest[v] == c) out[d][first + (z * ny + y) * nx + x] = s->value[v];
+        if (alone)
+            sdm_template_store(w, b, s->value, out[d]);
+        else
+            store_slope(s, c, b, out[d]);
     }
 }
 

@@ -117,18 +117,30 @@ static size_t first_weights(double u, uint32_t n, float per_mm, float (*weights)
     return i - 1;
 }
 
-// The same as sdm_template_displacement() without second derivatives, faster.
-static void displacement(const sdm_lattice *l, const float *control, const double y[3], double u[3],
-                         double du[9])
+/* Where a point lies among the control points of a warp. */
+typedef struct warp_place {
+    size_t first;           /* float of the first of the 4 x 4 x 4 control points */
+    float weights[3][2][4]; /* along x, y, z, and their derivatives */
+} warp_place;
+
+static inline void find_place(const sdm_lattice *l, const double y[3], warp_place *p)
 {
     const double per_mm = 1 / l->spacing;
-    const size_t line = 4 * (size_t)l->n[0], plane = line * l->n[1];
-    float weights[3][2][4], sum[4][4];
     size_t at[3];
     for (int a = 0; a < 3; a++)
-        at[a] = first_weights((y[a] - l->origin[a]) * per_mm, l->n[a], (float)per_mm, weights[a]);
-    sdm_template_kernels()->displace(control + 4 * at[0] + line * at[1] + plane * at[2], line,
-                                     plane, (const float(*)[2][4])weights, sum);
+        at[a] =
+            first_weights((y[a] - l->origin[a]) * per_mm, l->n[a], (float)per_mm, p->weights[a]);
+    p->first = 4 * (at[0] + l->n[0] * (at[1] + l->n[1] * at[2]));
+}
+
+// The same as sdm_template_displacement() without second derivatives, faster.
+static inline void displacement(const sdm_lattice *l, const float *control, const warp_place *p,
+                                double u[3], double du[9])
+{
+    const size_t line = 4 * (size_t)l->n[0], plane = line * l->n[1];
+    float sum[4][4];
+    sdm_template_kernels()->displace(control + p->first, line, plane,
+                                     (const float(*)[2][4])p->weights, sum);
     for (int i = 0; i < 3; i++) {
         u[i] = (double)sum[0][i];
         for (int a = 0; a < 3; a++) du[3 * i + a] = (double)sum[1 + a][i];
@@ -153,7 +165,9 @@ static void newton(const sdm_lattice *l, const float *control, const double q[3]
     const double stop = 0.005 * l->spacing, longest = 0.5 * l->spacing;
     for (int n = 0; n < ITERATIONS; n++) {
         double u[3], du[9], f[3], d[3];
-        displacement(l, control, y, u, du);
+        warp_place place;
+        find_place(l, y, &place);
+        displacement(l, control, &place, u, du);
         inverse_of_warp(du, inverse);
         for (int i = 0; i < 3; i++) f[i] = q[i] - y[i] - u[i];
         m3_apply(inverse, f, d);
@@ -311,44 +325,71 @@ void sdm_template_invert(const template_network *k, const sdm_template_part *par
         }
 }
 
-void sdm_template_invert_slope(const template_network *k, const sdm_template_part *part,
-                               const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,
-                               const float *control, const double dm[9], const double db[3],
-                               float *points, float *metric)
+/* A station of which the derivatives are asked: the point x of the world, less the frame's b. */
+typedef struct moving_station {
+    double x[3], inverse[9], b[9], metric[9]; /* B and B B^T, see sdm_template_metric() */
+    double bend[3][9];                        /* second derivatives of the warp at y */
+    warp_place place;
+} moving_station;
+
+static void prepare_station(const sdm_template_part *part, const part_pose *pose,
+                            const warp_scratch *w, const station *s, moving_station *out)
 {
-    const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2];
-    const double per_index = 1 / part->near.spacing;
-    double moved[9];
-    sdm_template_inverse_slope(pose, dm, moved);
+    double u[3], du[9], turned[9];
+    memcpy(out->inverse, s->inverse, sizeof s->inverse);
+    m3_product(s->inverse, pose->inverse, out->b);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) turned[3 * i + j] = out->b[3 * j + i];
+    m3_product(out->b, turned, out->metric);
+    sdm_template_displacement(&part->warp, w->control, s->y, u, du, out->bend);
+    find_place(&part->warp, s->y, &out->place);
+}
+
+// The derivatives of a station.
+static void move_station(const sdm_template_part *part, const moving_station *s,
+                         const warp_motion *motion, float points[4], float metric[8])
+{
+    double dq[3] = {0}, u[3], du[9], f[3], dy[3], a[9], am[9];
+    // q = m^-1 (x - b): dq = d(m^-1) (x - b) - m^-1 db
+    if (motion->turns) m3_apply(motion->inverse, s->x, dq);
+    // y + U(y) = q: (I + U') dy = dq - dU(y)
+    displacement(&part->warp, motion->control, &s->place, u, du);
+    for (int c = 0; c < 3; c++) f[c] = dq[c] - motion->shift[c] - u[c];
+    m3_apply(s->inverse, f, dy);
+    for (int c = 0; c < 3; c++) points[c] = (float)(dy[c] * (1 / part->near.spacing));
+    points[3] = 0;
+    // B = J^-1 m^-1, J = I + U': dB = -J^-1 dJ B + J^-1 d(m^-1), dJ = dU' + U'' dy.
+    // The metric G = B B^T changes by H + H^T with H = dB B^T = -J^-1 dJ G + J^-1 d(m^-1) B^T.
+    for (int e = 0; e < 9; e++)
+        du[e] += s->bend[0][e] * dy[0] + s->bend[1][e] * dy[1] + s->bend[2][e] * dy[2];
+    m3_product(s->inverse, du, a);
+    m3_product(a, s->metric, am);
+    if (motion->turns) {
+        m3_product(s->inverse, motion->inverse, a);
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++)
+                am[3 * i + j] -= a[3 * i] * s->b[3 * j] + a[3 * i + 1] * s->b[3 * j + 1] +
+                                 a[3 * i + 2] * s->b[3 * j + 2];
+    }
+    for (int c = 0; c < 6; c++)
+        metric[c] = (float)-(am[3 * ROW[c] + COLUMN[c]] + am[3 * COLUMN[c] + ROW[c]]);
+    metric[6] = metric[7] = 0;
+}
+
+void sdm_template_invert_slopes(const template_network *k, const sdm_template_part *part,
+                                const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,
+                                size_t n, const warp_motion *motion)
+{
     size_t at = 0;
-    for (size_t z = 0; z < nz; z++)
-        for (size_t j = 0; j < ny; j++)
-            for (size_t i = 0; i < nx; i++, at++) {
-                const station *s = &w->station[at];
-                double x[3], dq[3], t[3], u[3], du[9], du0[9], u0[3], ddu[3][9], f[3], dy[3];
-                station_world(grid, i, j, z, x);
-                // q = m^-1 (x - b): dq = d(m^-1) (x - b) - m^-1 db
-                for (int c = 0; c < 3; c++) x[c] -= pose->b[c];
-                m3_apply(moved, x, dq);
-                m3_apply(pose->inverse, db, t);
-                for (int c = 0; c < 3; c++) dq[c] -= t[c];
-                // y + U(y) = q: (I + U') dy = dq - dU(y)
-                sdm_template_displacement(&part->warp, control, s->y, u, du, NULL);
-                sdm_template_displacement(&part->warp, w->control, s->y, u0, du0, ddu);
-                for (int c = 0; c < 3; c++) f[c] = dq[c] - u[c];
-                m3_apply(s->inverse, f, dy);
-                for (int c = 0; c < 3; c++) points[4 * at + (size_t)c] = (float)(dy[c] * per_index);
-                points[4 * at + 3] = 0;
-                // B = J^-1 m^-1, J = I + U': dB = -J^-1 (dU' + U'' dy) B + J^-1 d(m^-1)
-                double b[9], dj[9], a[9], c1[9], c2[9];
-                m3_product(s->inverse, pose->inverse, b);
-                for (int e = 0; e < 9; e++)
-                    dj[e] = du[e] + ddu[0][e] * dy[0] + ddu[1][e] * dy[1] + ddu[2][e] * dy[2];
-                m3_product(s->inverse, dj, a);
-                m3_product(a, b, c1);
-                m3_product(s->inverse, moved, c2);
-                for (int e = 0; e < 9; e++) c2[e] -= c1[e];
-                sdm_template_metric_slope(b, c2, metric + 8 * at);
-                metric[8 * at + 6] = metric[8 * at + 7] = 0;
+    for (size_t z = 0; z < k->stations[2]; z++)
+        for (size_t y = 0; y < k->stations[1]; y++)
+            for (size_t x = 0; x < k->stations[0]; x++, at++) {
+                moving_station s;
+                station_world(grid, x, y, z, s.x);
+                for (int c = 0; c < 3; c++) s.x[c] -= pose->b[c];
+                prepare_station(part, pose, w, &w->station[at], &s);
+                for (size_t d = 0; d < n; d++)
+                    move_station(part, &s, &motion[d], motion[d].points + 4 * at,
+                                 motion[d].metric + 8 * at);
             }
 }

@@ -19,12 +19,17 @@ void sdm_template_take_lines(const template_network *k, void *memory, size_t *at
     l->line = sdm_template_take(memory, at, BLOCK * BLOCK * 12 * nx * sizeof *l->line);
 }
 
-static void take_row(const template_network *k, void *memory, size_t *at, template_row *r)
+size_t sdm_template_row_bytes(const template_network *k)
 {
     // the kernels use room for whole vectors
-    const size_t n = k->stations[0] > SDM_TEMPLATE_BLOCK_VOXELS ? k->stations[0]
-                                                                : SDM_TEMPLATE_BLOCK_VOXELS,
-                 bytes = (n + 3 * SDM_TEMPLATE_LANES) * sizeof(float);
+    const size_t n =
+        k->stations[0] > SDM_TEMPLATE_BLOCK_VOXELS ? k->stations[0] : SDM_TEMPLATE_BLOCK_VOXELS;
+    return (n + 3 * SDM_TEMPLATE_LANES) * sizeof(float);
+}
+
+static void take_row(const template_network *k, void *memory, size_t *at, template_row *r)
+{
+    const size_t bytes = sdm_template_row_bytes(k);
     float **const fields[] = {
         &r->u[0],      &r->u[1],      &r->u[2],      &r->metric[0], &r->metric[1], &r->metric[2],
         &r->metric[3], &r->metric[4], &r->metric[5], &r->f,         &r->g[0],      &r->g[1],

@@ -78,6 +78,9 @@ typedef struct template_work {
 /* Takes the next `bytes` of memory (NULL: only counts), 64-byte aligned, and advances *at. */
 void *sdm_template_take(void *memory, size_t *at, size_t bytes);
 
+/* Bytes of a row of voxels of a block, or of stations. */
+size_t sdm_template_row_bytes(const template_network *k);
+
 /* The same for the arrays plane and line of *l. */
 void sdm_template_take_lines(const template_network *k, void *memory, size_t *at, warp_lines *l);
 
@@ -102,6 +105,10 @@ void sdm_template_expand(const template_network *k, const template_block *b, war
 void sdm_template_row_points(const template_work *w, size_t c, const double first[3], size_t n,
                              float by[3][3]);
 
+/* Does the index i of row.u lie within the lattice `near` of part c? How many of row.u[n] do? */
+bool sdm_template_is_near(const template_work *w, size_t c, size_t i);
+size_t sdm_template_count_near(const template_work *w, size_t c, size_t n);
+
 /* Distance and gradient of the template of part c at row.u[n], in row.f and row.g: from the lattice
    `near`, and from `far` for points outside of it. */
 void sdm_template_lookup(const template_work *w, size_t c, size_t n);
@@ -110,6 +117,14 @@ void sdm_template_lookup(const template_work *w, size_t c, size_t n);
    or neither. */
 typedef enum template_place { TEMPLATE_WITHIN, TEMPLATE_BEYOND, TEMPLATE_ACROSS } template_place;
 template_place sdm_template_place(const template_work *w, size_t c, const template_block *b);
+
+/* u[3][64] = an affine function of the voxel's index in the voxels of a block: from[3] at voxel
+   (0, 0, 0), by[a] along axis a. */
+void sdm_template_affine(const template_work *w, const double from[3], const double by[3][3],
+                         const template_block *b, float *const u[3]);
+
+/* u and metric (not of rigid parts) of w->row = where part c is asked in a block. */
+void sdm_template_points(template_work *w, size_t c, const template_block *b);
 
 /* Evaluates part c in a block: fills u, metric (not of rigid parts), f, g and value of w->row. */
 void sdm_template_run(template_work *w, size_t c, const template_block *b);

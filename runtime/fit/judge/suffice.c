@@ -133,9 +133,12 @@ void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, double bl
     sdm_fit_judge_add(v, SDM_FIT_CHECK_VOXELS, !isfinite(coarse.edge), SDM_FIT_DOUBTFUL, voxel,
                       fmin(coarse.edge, voxel),
                       "the voxels of the maps are coarse beside %s: estimates are less exact, and "
-                      "standard deviations too small; exact maps with voxels of %.2g mm "
+                      "standard deviations %s; exact maps with voxels of %.2g mm "
                       "(sdm_fit_source.grid) show it",
-                      coarse.detail, coarse.edge);
+                      coarse.detail,
+                      p->target->kind == SDM_FIT_POINTS ? "larger, by an estimate of the error"
+                                                        : "too small",
+                      coarse.edge);
 }
 
 void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)

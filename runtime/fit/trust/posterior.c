@@ -9,6 +9,7 @@
 #include "fit/solver/open_motions.h"
 #include "fit/solver/prior.h"
 #include "fit/solver/solve.h"
+#include "map_bias.h"
 #include "score_covariance.h"
 #include "sdm/memory.h"
 
@@ -116,9 +117,11 @@ static double model_error(const fit_problem *p)
     return sqrt(labels * labels + map * map + network * network);
 }
 
-// covariance, sd and correlation from the sandwich; spread[n][n]: scratch memory
+// covariance, sd and correlation from the sandwich; bias[n][n]: what the voxels of the maps add to
+// the covariance; spread[n][n]: scratch memory
 static void covariance_fill(const fit_problem *p, const fit_score_covariance *scatter,
-                            const double *influence, double *spread, sdm_fit_result *out)
+                            const double *influence, const double *bias, double *spread,
+                            sdm_fit_result *out)
 {
     const size_t n = p->information.n_unknowns, size = p->n_params + 6;
     const bool points = p->target->kind == SDM_FIT_POINTS;
@@ -142,7 +145,7 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
     // covariance, sd, correlation
     for (size_t i = 0; i < size; i++)
         for (size_t j = 0; j <= i; j++) {
-            const double c = sandwich(n, influence, spread, i, j);
+            const double c = sandwich(n, influence, spread, i, j) + bias[i * n + j];
             out->covariance[i * size + j] = out->covariance[j * size + i] = c;
         }
     sdm_fit_open_motions_spread(p, out->covariance);
@@ -196,13 +199,15 @@ sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_erro
     const double model_mm = out->model_error_mm > 0 ? MODEL_STEPS * coarsest_voxel(p) : 0;
     fit_score_covariance scatter = {0};
     double *work = NULL;
-    sdm_status s = SDM_ALLOC(&work, 4 * n * n, "matrices of the fit", err);
+    sdm_status s = SDM_ALLOC(&work, 5 * n * n, "matrices of the fit", err);
     if (s) return s;
-    double *influence = work + 3 * n * n;
+    double *influence = work + 3 * n * n, *bias = work + 4 * n * n;
     const bool known = influence_compute(p, true, influence, work);
     s = sdm_fit_score_covariance_create(p, model_mm, known ? influence : NULL, &scatter, err);
     out->noise_factor = scatter.noise_factor;
-    if (!s && known) covariance_fill(p, &scatter, influence, work, out);
+    if (!s && known && p->target->kind == SDM_FIT_POINTS)
+        s = sdm_fit_map_bias(p, influence, bias, err);
+    if (!s && known) covariance_fill(p, &scatter, influence, bias, work, out);
     if (!s && !known)
         s = sdm_fail(err, SDM_E_QUALITY,
                      "the image does not determine the shape: its information is singular");

@@ -88,13 +88,6 @@ static sdm_status check_arguments(cli_fit *f, sdm_error *err)
     return s ? s : cli_fit_check_files(args, err);
 }
 
-sdm_status cli_fit_run(cli_fit *f, sdm_error *err)
-{
-    f->doubt = (sdm_error){0};
-    f->doubt.status = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
-    return !f->doubt.status || f->doubt.status == SDM_E_QUALITY ? cli_fit_mirror(f, err) : SDM_OK;
-}
-
 /* Runs the fit. Returns SDM_OK also for a fit that is not trustworthy (f->doubt): its result is
  * shown before the command fails. */
 static sdm_status fit_shape(cli_fit *f, sdm_error *err)

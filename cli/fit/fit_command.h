@@ -63,7 +63,7 @@ typedef struct cli_fit {
     sdm_instance *other_shape; /* the shape of the side that `shape` is not; NULL: not needed yet */
     bool other_side;           /* `shape` is not that of the command line but its mirror image */
 
-    /* fit_find.c: --find */
+    /* fit_candidates.c: --find */
     cli_candidate *candidates;      /* [n_candidates] accepted ones first */
     size_t n_candidates, candidate; /* candidate: number of the one that is fitted, from 1 */
 

@@ -129,3 +129,10 @@ sdm_status cli_fit_mirror(cli_fit *f, sdm_error *err)
     if (!isnan(f->better)) add_finding(f);
     return SDM_OK;
 }
+
+sdm_status cli_fit_run(cli_fit *f, sdm_error *err)
+{
+    f->doubt = (sdm_error){0};
+    f->doubt.status = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
+    return !f->doubt.status || f->doubt.status == SDM_E_QUALITY ? cli_fit_mirror(f, err) : SDM_OK;
+}

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # sdmgen fit --find: a shape far from the middle of the image is found without a start; an image of
 # another shape is refused; options that contradict the search.
-# Tests: fit_find.c
+# Tests: fit_candidates.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 

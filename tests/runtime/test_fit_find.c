@@ -1,6 +1,6 @@
 /* The search of a whole volume for a shape: two tori among balls, rods and noise are found first,
  * with their poses; a volume without tori gives low scores; the same bits for any number of
- * threads. Tests: fit_find.c likeness.c pattern.c turned_pattern.c coarse_scan.c turns.c */
+ * threads. Tests: fit_find.c likeness.c pattern.c turned_pattern.c coarse_scan.c turn_set.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -8,7 +8,7 @@
 #include "sdm/internal/mat3.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
-#include "turns.h"
+#include "turn_set.h"
 
 // number of places of a run
 enum { RUN = 16 };

@@ -8,7 +8,7 @@
 
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
-#include "fit/start/turns.h"
+#include "turn_set.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/internal/vec3.h"
 

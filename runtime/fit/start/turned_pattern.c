@@ -5,7 +5,7 @@
 
 #include "sdm/internal/mat3.h"
 #include "sdm/memory.h"
-#include "turns.h"
+#include "turn_set.h"
 
 sdm_status sdm_fit_turned_make(const fit_pattern *p, const fit_likeness *l, size_t n_turns,
                                size_t stride, fit_turned *out, sdm_error *err)

@@ -1,5 +1,5 @@
 /* Rotations that cover an axis or the sphere evenly. */
-#include "turns.h"
+#include "turn_set.h"
 
 #include <math.h>
 

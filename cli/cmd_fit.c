@@ -50,11 +50,13 @@ static void show_progress(void *user, const sdm_fit_progress *p)
         show_search(w, p);
         return;
     }
-    char text[100];
-    const size_t n = p->iteration - w->before,
+    char text[140] = "";
+    if (w->f->candidate)
+        snprintf(text, sizeof text, "candidate %zu of %zu, ", w->f->candidate, w->f->n_candidates);
+    const size_t used = strlen(text), n = p->iteration - w->before,
                  most = p->phase == SDM_FIT_POLISH ? o->max_polish_iterations : o->max_iterations;
-    snprintf(text, sizeof text, "iteration %zu of at most %zu, last step %.1e", n, 2 * most,
-             p->step);
+    snprintf(text + used, sizeof text - used, "iteration %zu of at most %zu, last step %.1e", n,
+             2 * most, p->step);
     cli_progress_show(&w->bar,
                       p->phase == SDM_FIT_POLISH ? "polish"
                       : p->phase == SDM_FIT_MAIN ? "fit"
@@ -95,9 +97,8 @@ static sdm_status fit_shape(cli_fit *f, sdm_error *err)
     f->opts.cancelled = cli_interrupted;
     f->opts.user = &w;
     cli_progress_start(&w.bar);
-    f->doubt.status = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
-    sdm_status s = SDM_OK;
-    if (!f->doubt.status || f->doubt.status == SDM_E_QUALITY) s = cli_fit_mirror(f, err);
+    if (f->args->fit.find) cli_progress_show(&w.bar, "search", 0, "the whole image");
+    sdm_status s = f->args->fit.find ? cli_fit_find(f, err) : cli_fit_run(f, err);
     cli_progress_end(&w.bar, !s && (!f->doubt.status || f->doubt.status == SDM_E_QUALITY));
     f->found = f->result.objective && f->result.params;
     for (size_t i = 0; i < f->result.verdict.n_findings; i++)
@@ -109,7 +110,7 @@ static sdm_status fit_shape(cli_fit *f, sdm_error *err)
 static void print_notices(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
-    if (*f->side && f->given_shape)
+    if (*f->side && f->other_side && !f->n_candidates)
         cli_notice("%s=%s fits better than its mirror image, by %.3g (log-likelihood); -O %s=... "
                    "states the side",
                    f->mirror, f->side, f->better, f->mirror);

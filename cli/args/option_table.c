@@ -486,6 +486,11 @@ const cli_option cli_options[] = {
      "number of rotations tried about the shape's z axis (default 12 with --start-axis, else 1)"},
     {"turns-sphere", 0, CLI_INT, "N", NULL, 1, 4096, ON(CLI_FIT), AT(fit.turns_sphere),
      "number of rotations tried about all axes (default 60 without a start rotation)"},
+    {"find", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(fit.find),
+     "no start: search the whole image for the shape, fit and judge the best places, tell all of "
+     "them, and take the best fit that is accepted"},
+    {"candidates", 0, CLI_INT, "N", NULL, 1, 100, ON(CLI_FIT), AT(fit.candidates),
+     "number of places that --find fits and judges (default 4)"},
     {"region", 0, CLI_REAL6, "X,Y,Z,X,Y,Z", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.region),
      "two opposite corners of a box: voxels outside are ignored"},
     {"margin", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.margin),

@@ -107,11 +107,11 @@ typedef struct cli_phantom_args {
 
 /* Options of `fit` alone; numbers are NaN when their option is missing. */
 typedef struct cli_fit_args {
-    bool exact, polish, ras;
+    bool exact, polish, ras, find;
     cli_list labels, reference_labels, keep;
     const char *reference, *label_out, *start_points, *image_model, *mirror;
     double start_centre[3], start_axis[3], region[6];
-    int64_t turns, turns_sphere, max_iterations; /* 0: option missing */
+    int64_t turns, turns_sphere, max_iterations, candidates; /* 0: option missing */
     double inside[2], outside[2], air[2];
     double blur, l_ref, point_sd, margin, cavity, tissue_field, label_close, least_inside,
         tolerance, beside;

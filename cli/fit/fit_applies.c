@@ -36,7 +36,8 @@ sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err)
         const char *option;
         unsigned kinds;
         bool given;
-    } rows[] = {{"--region", VOLUMES, !isnan(a->region[0])},
+    } rows[] = {{"--find", VOLUMES, a->find},
+                {"--region", VOLUMES, !isnan(a->region[0])},
                 {"--margin", VOLUMES, !isnan(a->margin)},
                 {"--least-inside", VOLUMES, !isnan(a->least_inside)},
                 {"--image-model labels", VOLUMES, labelled},

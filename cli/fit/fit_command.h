@@ -18,6 +18,17 @@ typedef struct cli_overlap {
     double mean_mm, q95_mm, hausdorff_mm; /* distances between the surfaces, in both directions */
 } cli_overlap;
 
+/* A place that --find has found, and the fit from there. */
+typedef struct cli_candidate {
+    double place[3]; /* middle of the shape at the start, LPS mm */
+    double score;    /* see sdm_fit_candidate */
+    bool other_side; /* as of cli_fit, after the fit; `side` and `better`, too */
+    char side[64];
+    double better;
+    sdm_fit_result result;
+    sdm_error doubt;
+} cli_candidate;
+
 /* The state of one fit. Zero-initialise all members but args; cli_fit_dispose() frees. */
 typedef struct cli_fit {
     const cli_args *args;
@@ -49,7 +60,12 @@ typedef struct cli_fit {
     const char *mirror;        /* option that mirrors the shape; NULL: none is tried */
     char side[64];             /* its value in the result; "" where the shape is a model's */
     double better;             /* by how much the result is better; see sdm_fit_compare() */
-    sdm_instance *given_shape; /* the shape of the side that was not taken */
+    sdm_instance *other_shape; /* the shape of the side that `shape` is not; NULL: not needed yet */
+    bool other_side;           /* `shape` is not that of the command line but its mirror image */
+
+    /* fit_candidates.c: --find */
+    cli_candidate *candidates;      /* [n_candidates] accepted ones first */
+    size_t n_candidates, candidate; /* candidate: number of the one that is fitted, from 1 */
 
     /* fit_compare.c: labels to compare the fitted shape with */
     sdm_grid reference_grid;
@@ -140,6 +156,23 @@ sdm_status cli_fit_compare(cli_fit *f, sdm_error *err);
  * better side if the command line leaves it open; otherwise adds the comparison to the verdict, and
  * f->doubt where the mirror image is better or as good. */
 sdm_status cli_fit_mirror(cli_fit *f, sdm_error *err);
+
+/* True where the shape has a mirror image and neither the command line nor a model fixes the side;
+ * sets f->mirror. */
+bool cli_fit_side_is_open(cli_fit *f);
+
+/* Replaces f->shape by its mirror image, or the mirror image by f->shape. */
+sdm_status cli_fit_swap_side(cli_fit *f, sdm_error *err);
+
+/* sdm_fit(), then cli_fit_mirror(). A fit that is not trustworthy is no error: f->doubt. */
+sdm_status cli_fit_run(cli_fit *f, sdm_error *err);
+
+/* --find: searches the image, fits the candidates, and takes the best fit that is accepted or, if
+ * none is, the best one, with f->doubt. */
+sdm_status cli_fit_find(cli_fit *f, sdm_error *err);
+void cli_fit_print_candidates(const cli_fit *f);
+void cli_fit_json_candidates(const cli_fit *f, sdm_json *json);
+void cli_fit_candidates_dispose(cli_fit *f);
 
 /* Writes the file of --returnparameterfile. */
 sdm_status cli_fit_write_results(const cli_fit *f, sdm_error *err);

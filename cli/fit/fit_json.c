@@ -139,6 +139,7 @@ void cli_fit_json(const cli_fit *f, sdm_json *j)
     sdm_json_bool(j, "trusted", !f->doubt.status);
     if (f->doubt.status) sdm_json_text(j, "doubt", f->doubt.text);
     cli_fit_json_verdict(f, j);
+    cli_fit_json_candidates(f, j);
     sdm_json_bool(j, "converged", r->converged);
     sdm_json_text(j, "reason", r->reason);
     add_unknowns(j, f);

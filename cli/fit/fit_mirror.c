@@ -38,8 +38,8 @@ static void side_name(const cli_fit *f, bool other, char *buf, size_t size)
              second ? bar + 1 : choices);
 }
 
-/* Replaces the shape by its mirror image, and the result by that of a fit of this one. */
-static sdm_status take_other_side(cli_fit *f, sdm_error *err)
+/* The shape of the other side, which f->other_shape becomes. */
+static sdm_status create_other_side(cli_fit *f, sdm_error *err)
 {
     char side[64], option[160];
     const char *items[CLI_OPTIONS_MAX];
@@ -52,11 +52,33 @@ static sdm_status take_other_side(cli_fit *f, sdm_error *err)
     for (size_t i = 0; i < given->n; i++) items[i] = given->items[i];
     items[given->n] = option;
     const cli_list options = {items, given->n + 1};
-    sdm_instance *other = NULL;
-    const sdm_status s = cli_create_shape(f->registry, f->args->shape, &options, &other, err);
+    return cli_create_shape(f->registry, f->args->shape, &options, &f->other_shape, err);
+}
+
+sdm_status cli_fit_swap_side(cli_fit *f, sdm_error *err)
+{
+    const sdm_status s = f->other_shape ? SDM_OK : create_other_side(f, err);
     if (s) return s;
-    f->given_shape = f->shape; // the names of the parameters belong to it
+    sdm_instance *other = f->other_shape;
+    f->other_shape = f->shape;
     f->source.shape = f->shape = other;
+    f->other_side = !f->other_side;
+    return SDM_OK;
+}
+
+bool cli_fit_side_is_open(cli_fit *f)
+{
+    const sdm_shape *shape = find_shape(f);
+    if (!shape || !shape->mirror) return false;
+    f->mirror = shape->mirror;
+    return !side_is_given(f);
+}
+
+/* Replaces the shape by its mirror image, and the result by that of a fit of this one. */
+static sdm_status take_other_side(cli_fit *f, sdm_error *err)
+{
+    const sdm_status s = cli_fit_swap_side(f, err);
+    if (s) return s;
     sdm_fit_dispose(&f->result);
     f->doubt = (sdm_error){0};
     f->doubt.status = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
@@ -106,4 +128,11 @@ sdm_status cli_fit_mirror(cli_fit *f, sdm_error *err)
     if (f->shape) side_name(f, false, f->side, sizeof f->side);
     if (!isnan(f->better)) add_finding(f);
     return SDM_OK;
+}
+
+sdm_status cli_fit_run(cli_fit *f, sdm_error *err)
+{
+    f->doubt = (sdm_error){0};
+    f->doubt.status = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
+    return !f->doubt.status || f->doubt.status == SDM_E_QUALITY ? cli_fit_mirror(f, err) : SDM_OK;
 }

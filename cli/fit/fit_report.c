@@ -101,6 +101,7 @@ void cli_fit_print(const cli_fit *f)
     print_overlap(f);
     print_target(f);
     cli_fit_print_verdict(f);
+    cli_fit_print_candidates(f);
     printf("%s after %zu iterations (%s)\n", r->converged ? "converged" : "NOT CONVERGED",
            r->n_iterations, r->reason);
     printf("  maps         %zu by the network, %zu by the exact engine\n", r->n_network,

@@ -51,6 +51,7 @@ void cli_fit_dispose(cli_fit *f)
 {
     sdm_mesh_dispose(&f->surface);
     sdm_free(f->map);
+    cli_fit_candidates_dispose(f);
     sdm_fit_dispose(&f->result);
     if (!f->reference_is_target) sdm_free(f->reference);
     sdm_free(f->points);
@@ -60,6 +61,6 @@ void cli_fit_dispose(cli_fit *f)
     sdm_free(f->params);
     sdm_model_free(f->model);
     sdm_instance_free(f->shape);
-    sdm_instance_free(f->given_shape);
+    sdm_instance_free(f->other_shape);
     sdm_registry_free(f->registry);
 }

@@ -80,6 +80,32 @@ static sdm_status pose_from_points(const cli_fit *f, sdm_pose *pose, sdm_error *
     return s;
 }
 
+/* --find makes the start: refuses options that state one. */
+static sdm_status check_find(const cli_fit *f, sdm_error *err)
+{
+    const cli_fit_args *a = &f->args->fit;
+    const cli_pose_args *p = &f->args->pose;
+    if (a->candidates && !a->find)
+        return sdm_fail(err, SDM_E_ARG, "fit: --candidates belongs to --find");
+    const struct {
+        const char *option;
+        bool given;
+    } rows[] = {{"--rotation", !isnan(p->rotation[0])},
+                {"--translation", !isnan(p->translation[0])},
+                {"--start-centre", !isnan(a->start_centre[0])},
+                {"--start-axis", !isnan(a->start_axis[0])},
+                {"--start-points", a->start_points != NULL},
+                {"--turns", a->turns > 0},
+                {"--turns-sphere", a->turns_sphere > 0},
+                {"--keep pose", f->opts.keep_pose}};
+    for (size_t i = 0; a->find && i < sizeof rows / sizeof *rows; i++)
+        if (rows[i].given)
+            return sdm_fail(err, SDM_E_ARG,
+                            "fit: --find searches for the start: leave %s out, or --find",
+                            rows[i].option);
+    return SDM_OK;
+}
+
 /* Refuses options that contradict each other. */
 static sdm_status check_start_options(const cli_fit *f, sdm_error *err)
 {
@@ -166,9 +192,10 @@ sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err)
                has_centre = !isnan(f->args->fit.start_centre[0]);
     const bool has_points = f->args->fit.start_points;
     double centre[3];
-    sdm_status s = check_start_options(f, err);
+    sdm_status s = check_find(f, err);
+    if (!s) s = check_start_options(f, err);
     if (!s) s = sdm_fit_centre(&f->source, f->start, f->pivot, err);
-    if (s) return s;
+    if (s || f->args->fit.find) return s;
     read_turns(f, has_points || has_translation || !isnan(p->rotation[0]));
     if (has_points) return pose_from_points(f, &f->opts.start_pose, err);
     if (has_translation) {

@@ -210,6 +210,8 @@ sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const
 sdm_status sdm_fit_pose_from_points(const double *shape, const double *world, size_t n, sdm_pose *out, sdm_error *err);
 sdm_status sdm_fit_pose_from_axis(const double point[3], const double centre[3], const double axis[3], sdm_pose *out, sdm_error *err);
 sdm_status sdm_fit_centre(const sdm_fit_source *source, const double *params, double centre[3], sdm_error *err);
+typedef struct sdm_fit_candidate { size_t source; sdm_pose pose; double score; } sdm_fit_candidate;
+sdm_status sdm_fit_find(const sdm_fit_source *sources, size_t n_sources, const sdm_fit_target *target, const sdm_fit_opts *opts, size_t most, sdm_fit_candidate *out, size_t *n, sdm_error *err);
 sdm_status sdm_map_gradient(const sdm_grid *grid, const float *values, int n_threads, float *gradient, sdm_error *err);
 sdm_status sdm_map_volume(const sdm_grid *grid, const float *values, int n_threads, double *volume, sdm_error *err);
 typedef struct sdm_tissue { double mean, sd; } sdm_tissue;

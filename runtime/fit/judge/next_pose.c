@@ -10,6 +10,7 @@
 #include "fit/solver/objective.h"
 #include "fit/solver/open_motions.h"
 #include "fit/start/start_search.h"
+#include "fit/start/turn_set.h"
 #include "rival.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
@@ -119,7 +120,7 @@ static void turned(const own_fit *own, size_t i, fit_state *to)
         m3_product(back, cube, half);
         m3_product(half, v, q);
     } else {
-        sdm_fit_turn_rotation(SDM_FIT_TURNS_SPHERE, i - N_CUBE, N_EVEN, q);
+        sdm_fit_turn(SDM_FIT_TURNS_SPHERE, i - N_CUBE, N_EVEN, q);
     }
     *to = own->state;
     m3_product(own->state.rotation, q, to->rotation);

@@ -8,8 +8,8 @@
 
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
+#include "turn_set.h"
 #include "sdm/internal/mat3.h"
-#include "sdm/internal/rotation.h"
 #include "sdm/internal/vec3.h"
 
 // sd of the wide point spread: WIDER times the given one, but at most WIDEST_SHARE times the
@@ -29,29 +29,12 @@
 #define TURNS_KEPT 4
 #define SAME_TURN 0.35
 
-#define PI 3.14159265358979324
-
-void sdm_fit_turn_rotation(sdm_fit_turns turns, size_t i, size_t n, double rotation[9])
-{
-    sdm_pose pose = {{0, 0, 0}, {0, 0, 0}};
-    if (turns == SDM_FIT_TURNS_AXIS) pose.rotation[2] = 2 * PI * (double)i / (double)n;
-    if (turns == SDM_FIT_TURNS_SPHERE && i > 0) { // turn 0 is the identity
-        const double phi = 1.4142135623730951, psi = 1.533751168755204288118041,
-                     s = (double)i + 0.5;
-        const double t = s / (double)n, d = 2 * PI * s, r = sqrt(t), big = sqrt(1 - t);
-        const double q[4] = {big * cos(d / psi), r * sin(d / phi), r * cos(d / phi),
-                             big * sin(d / psi)};
-        sdm_rotation_of_quaternion(q, pose.rotation);
-    }
-    sdm_pose_matrix(&pose, rotation);
-}
-
 // the start with turn i: R = R_start Q, and t such that the pivot stays in place
 static void turn_start(const fit_problem *p, size_t i, const fit_state *start, fit_state *out)
 {
     const sdm_fit_opts *o = p->opts;
     double q[9], at[3], moved[3];
-    sdm_fit_turn_rotation(o->turns, i, o->n_turns, q);
+    sdm_fit_turn(o->turns, i, o->n_turns, q);
     *out = *start;
     m3_product(start->rotation, q, out->rotation);
     sdm_fit_to_world(start, o->pivot, at);
@@ -117,13 +100,6 @@ typedef struct found_turns {
     fit_state state[TURNS_KEPT];
 } found_turns;
 
-static double angle_between(const double a[9], const double b[9])
-{
-    double trace = 0;
-    for (int i = 0; i < 9; i++) trace += a[i] * b[i];
-    return acos(fmax(fmin(0.5 * (trace - 1), 1), -1));
-}
-
 static void turns_move(found_turns *f, size_t from, size_t to)
 {
     f->turn[to] = f->turn[from];
@@ -137,7 +113,8 @@ static void turns_insert(found_turns *f, size_t turn, double objective, const fi
 {
     if (!(objective > -INFINITY)) return;
     size_t same = 0;
-    while (same < f->n && !(angle_between(f->state[same].rotation, state->rotation) < SAME_TURN))
+    while (same < f->n &&
+           !(sdm_fit_angle_between(f->state[same].rotation, state->rotation) < SAME_TURN))
         same++;
     if (same < f->n) {
         if (objective <= f->objective[same]) return;

@@ -15,10 +15,6 @@
    problem->runner_up. */
 sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err);
 
-/* rotation = turn i of n: about z, or evenly over all rotations by super-Fibonacci spirals (Alexa
- * 2022). */
-void sdm_fit_turn_rotation(sdm_fit_turns turns, size_t i, size_t n, double rotation[9]);
-
 /* Chooses samples from a ball that holds the shape at problem->state in every turn, with a stride
    that leaves about `wanted` of them. */
 sdm_status sdm_fit_samples_near(fit_problem *p, double wanted, sdm_error *err);

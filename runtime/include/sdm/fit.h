@@ -558,6 +558,36 @@ SDM_API sdm_status sdm_fit_pose_from_axis(const double point[3], const double ce
 SDM_API sdm_status sdm_fit_centre(const sdm_fit_source *source, const double *params,
                                   double centre[3], sdm_error *err);
 
+/* A place where an image may show a shape. */
+typedef struct sdm_fit_candidate {
+    /* index of the source whose shape it is */
+    size_t source;
+    /* pose of this shape at its start parameters, from which a fit finds it */
+    sdm_pose pose;
+    /* share of the voxels within the shape that look like the inside, less the share of those
+       around it; -1 .. 1. 1: all within and none around */
+    double score;
+} sdm_fit_candidate;
+
+/* Searches a whole image or label map for shapes, without any start: out[*n] = the places that look
+   most like one of the shapes, the best first, at most `most` (1 .. 1000), at least half the reach
+   of the shape apart. The sources, of the same parameters, are alternatives: the left and the right
+   form of an organ. The parameters are those of opts->start_params (NULL: the defaults of the first
+   source), the values of the inside and the outside those of opts->appearance; opts->use_box limits
+   the places.
+
+   The score is a matched filter (North 1943) on the probability that a voxel is of the inside's
+   material: within the shape against a layer around it. Every rotation is tried at every place
+   with voxels of a third of the reach of the shape; all rotations of a finer set then at the best
+   places, with finer voxels; the best ones climb to the nearest maximum of the score. A candidate
+   is a start for sdm_fit() and no more than that: noise and other organs give candidates, too.
+   *n = 0: no place looks like the shape. Errors: SDM_E_ARG: arguments, points as a target, voxels
+   larger than the shape; errors of making the map. The same bits for any number of threads. [any
+   thread] */
+SDM_API sdm_status sdm_fit_find(const sdm_fit_source *sources, size_t n_sources,
+                                const sdm_fit_target *target, const sdm_fit_opts *opts, size_t most,
+                                sdm_fit_candidate *out, size_t *n, sdm_error *err);
+
 #ifdef __cplusplus
 }
 #endif

@@ -76,20 +76,19 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
 {
     sdm_text metrics = {0};
     trainer *r = &e->run;
-    *r = (trainer){
-        .config = config,
-        .shape = t->shape,
-        .kind = trainer_kind_find(e->kind),
-        .hooks = {.cancelled = t->hooks.cancelled,
-                  .store = t->hooks.store,
-                  .comm = t->hooks.comm,
-                  .user = t->hooks.user},
-        .n_threads = t->n_threads,
-        .started = sdm_clock(),
-        .loss = NAN,
-        .heldout_mse = NAN,
-        .evaluated_step = -1,
-        .metrics = &metrics};
+    *r = (trainer){.config = config,
+                   .shape = t->shape,
+                   .kind = trainer_kind_find(e->kind),
+                   .hooks = {.cancelled = t->hooks.cancelled,
+                             .store = t->hooks.store,
+                             .comm = t->hooks.comm,
+                             .user = t->hooks.user},
+                   .n_threads = t->n_threads,
+                   .started = sdm_clock(),
+                   .loss = NAN,
+                   .heldout_mse = NAN,
+                   .evaluated_step = -1,
+                   .metrics = &metrics};
     const fill_hooks hooks = {.cancelled = trial_cancelled, .user = r};
     sdm_error reason = {0};
     sdm_status s = trainer_set_up(r, &reason);

@@ -5,8 +5,8 @@
 
 #include "fit/data/map_fields.h"
 #include "fit/start/coarse_scan.h"
-#include "fit/start/turned_pattern.h"
 #include "fit/start/turn_set.h"
+#include "fit/start/turned_pattern.h"
 #include "fit_check.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/internal/rotation.h"

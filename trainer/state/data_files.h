@@ -13,6 +13,7 @@ void trainer_data_file_names(const trainer *t, char (*names)[TRAINER_DATA_FILE_M
                              const char **file);
 
 /* Writes the copies of the files with a checksum in t->file_sums; one that is there already stays.
-   One without a checksum is not copied, which is no error: an option of a plug-in may name a folder,
-   for example. SDM_E_IO, SDM_E_NOMEM; SDM_E_FORMAT: a file does not have its checksum any more. */
+   One without a checksum is not copied, which is no error: an option of a plug-in may name a
+   folder, for example. SDM_E_IO, SDM_E_NOMEM; SDM_E_FORMAT: a file does not have its checksum any
+   more. */
 sdm_status trainer_data_files_copy(const trainer *t, sdm_error *err);

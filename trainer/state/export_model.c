@@ -190,8 +190,9 @@ sdm_status trainer_export_config(const trainer *t, sdm_outfile **out, sdm_error 
     return s;
 }
 
-/* file: names of the data files, see trainer_option_texts(). Fills params[P], *options and *info with the description of shape, grid and training for the
- * model file. The pointers in *info refer to the other arguments. */
+/* Fills params[P], *options and *info with the description of shape, grid and training for the
+ * model file. The pointers in *info refer to the other arguments. file: names of the data files,
+ * see trainer_option_texts(). */
 static void describe_model(const trainer *t, const sdm_text *config, const char *const *file,
                            option_texts *options, sdm_model_param *params, sdm_model_info *info)
 {

@@ -8,9 +8,9 @@
 
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
-#include "turn_set.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/internal/vec3.h"
+#include "turn_set.h"
 
 // sd of the wide point spread: WIDER times the given one, but at most WIDEST_SHARE times the
 // shape's reach

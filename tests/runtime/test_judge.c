@@ -1,7 +1,7 @@
 /* The verdict of a fit: robust noise, right fits that pass, wrong ones that are refused with a
  * reason, the mirror image.
- * Tests: blob.c finding.c judgement.c mirror.c misfit.c next_pose.c noise.c residuals.c rival.c
- * suffice.c */
+ * Tests: blob.c coverage.c finding.c judgement.c mirror.c misfit.c next_pose.c noise.c residuals.c
+ * rival.c suffice.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -308,6 +308,68 @@ static void test_strays_are_refused_if_many(void **state)
     sdm_instance_free(round);
 }
 
+/* Points of the ellipsoid TRUTH with noise, without those beyond `cut` mm along x from its centre,
+   and `n_more` points: in a box around it, or on a plane beside it. */
+static double *points_with_others(double cut, size_t n_more, bool plane, size_t *n)
+{
+    sdm_instance *round = shape_of("ellipsoid");
+    sdm_mesh m = {0};
+    assert_int_equal(sdm_instance_mesh(round, TRUTH, &m, NULL), SDM_OK);
+    double *x = malloc(3 * (m.n_vert + n_more) * sizeof *x);
+    if (!x) abort();
+    *n = 0;
+    for (size_t i = 0; i < m.n_vert; i++) {
+        if (m.vert[3 * i] > cut) continue;
+        sdm_pose_apply(&POSE, m.vert + 3 * i, x + 3 * *n);
+        for (size_t a = 0; a < 3; a++) x[3 * *n + a] += 0.02 * sdm_rng_normal(4, i, a);
+        ++*n;
+    }
+    for (size_t i = 0; i < n_more; i++, ++*n) {
+        double y[3];
+        for (size_t a = 0; a < 3; a++) y[a] = 8 * sdm_rng_uniform(5, i, a) - 4;
+        if (plane) y[2] = 4 + 0.02 * sdm_rng_normal(6, i, 0);
+        sdm_pose_apply(&POSE, y, x + 3 * *n);
+    }
+    sdm_mesh_dispose(&m);
+    sdm_instance_free(round);
+    return x;
+}
+
+// Strays in a box pass, a plane beside the shape does not; a shape without points at one end is
+// told, and refused if there are many strays besides.
+static void test_surfaces_without_each_other_are_told(void **state)
+{
+    (void)state;
+    static const struct {
+        double cut;
+        size_t n_more;
+        bool plane;
+        sdm_fit_grade patch, covered;
+    } cases[] = {{INFINITY, 300, false, SDM_FIT_PASSED, SDM_FIT_PASSED},
+                 {INFINITY, 300, true, SDM_FIT_FAILED, SDM_FIT_PASSED},
+                 {0.5, 0, false, SDM_FIT_PASSED, SDM_FIT_DOUBTFUL},
+                 {0.5, 200, false, SDM_FIT_PASSED, SDM_FIT_FAILED}};
+    sdm_instance *round = shape_of("ellipsoid");
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        size_t n;
+        double *x = points_with_others(cases[k].cut, cases[k].n_more, cases[k].plane, &n);
+        const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = x, .n_points = n};
+        sdm_fit_result r;
+        sdm_error err = {0};
+        const sdm_status s = fit_of(round, &t, 0, &r, &err);
+        const sdm_fit_finding *patch = finding(&r, SDM_FIT_CHECK_PATCH),
+                              *covered = finding(&r, SDM_FIT_CHECK_COVERED);
+        if (patch->grade != cases[k].patch || covered->grade != cases[k].covered)
+            fail_msg("case %zu, %zu points: patch %.3g, covered %.3g, %s", k, n, patch->figure,
+                     covered->figure, err.text);
+        const bool refused = cases[k].patch == SDM_FIT_FAILED || cases[k].covered == SDM_FIT_FAILED;
+        assert_int_equal(s, refused ? SDM_E_QUALITY : SDM_OK);
+        sdm_fit_dispose(&r);
+        free(x);
+    }
+    sdm_instance_free(round);
+}
+
 // Fits the ellipsoid to the n given points.
 static sdm_status fit_to(const double *x, size_t n, sdm_fit_result *r, sdm_error *err)
 {
@@ -509,6 +571,7 @@ int main(void)
         cmocka_unit_test(test_wrong_shapes_are_refused),
         cmocka_unit_test(test_points_of_another_shape_are_refused),
         cmocka_unit_test(test_strays_are_refused_if_many),
+        cmocka_unit_test(test_surfaces_without_each_other_are_told),
         cmocka_unit_test(test_few_points_are_refused),
         cmocka_unit_test(test_points_in_metres_are_refused),
         cmocka_unit_test(test_a_second_pose_is_refused),

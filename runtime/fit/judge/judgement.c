@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "blob.h"
+#include "coverage.h"
 #include "finding.h"
 #include "rival.h"
 #include "sdm/internal/shared.h"
@@ -271,6 +272,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
         v->chi_square = misfit.noise_chi_square;
     }
     if (!s && p->target->kind == SDM_FIT_POINTS) s = sdm_fit_check_points(p, &residuals, v, err);
+    if (!s && p->target->kind == SDM_FIT_POINTS) s = sdm_fit_check_coverage(p, v, err);
     if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
     if (!s) sdm_fit_check_voxels(p, coarse, sdm_fit_is_image(p) ? r->blur : 0, v);
     if (!s) sdm_fit_check_determined(p, r, v);

@@ -1,0 +1,198 @@
+/* Compares the places of points with those of the fitted surface.
+
+   A robust fit leaves out points that lie far from its surface. Strays are scattered; points of
+   another surface are neighbours in a thin layer, as dense as those on the shape. And where the
+   shape has grown past its data, its surface has no points. Both are found by the distances to the
+   nearest points, with those among the points on the shape as the measure. */
+#include "coverage.h"
+
+#include <math.h>
+
+#include "finding.h"
+#include "noise.h"
+#include "sdm/internal/heap.h"
+#include "sdm/internal/vec3.h"
+
+// points and places of the surface that are compared; of more, every second, third ... one
+#define MOST 2000
+// neighbours that define the spacing of points, and that show whether points form a layer
+#define FEW 4
+#define MANY 10
+// a stray belongs to a patch if its neighbours are nearer than this multiple of the spacing (and
+// not the same point) and the product of the variances along the axes of their ellipsoid is this
+// small beside that of a ball: points in a box stay below in a few per cent of the cases
+#define DENSE 3.0
+#define SAME 0.05
+#define FLAT 0.15
+// a place of the surface has no points if none is nearer than this multiple of the spacing: with
+// points drawn evenly, 6 are expected nearer, and there is none at 2 of 1000 places
+#define REACH 1.25
+// shares that pass. A surface that is not covered shows a part of the shape, or the shape has grown
+// past its data: so it is with a small patch, or with many strays
+#define PATCH_MAX 0.05
+#define PATCH_MAX_UNCOVERED 0.01
+#define UNCOVERED_MAX 0.05
+#define STRAYS_MAX_UNCOVERED 0.1
+
+typedef struct cloud {
+    double (*x)[3];
+    size_t n;
+} cloud;
+
+/* Squared distances from x to the k nearest points of a cloud, ascending, and their numbers; the
+   point number `self` is left out. */
+static void find_nearest(const cloud *c, const double x[3], size_t self, size_t k, double *d2,
+                         size_t *number)
+{
+    for (size_t i = 0; i < k; i++) d2[i] = INFINITY, number[i] = SIZE_MAX;
+    for (size_t i = 0; i < c->n; i++) {
+        const double d = i == self ? INFINITY : v3_dist2(x, c->x[i]);
+        size_t at = k;
+        for (; at > 0 && d < d2[at - 1]; at--)
+            if (at < k) d2[at] = d2[at - 1], number[at] = number[at - 1];
+        if (at < k) d2[at] = d, number[at] = i;
+    }
+}
+
+/* Median distance of the points of a cloud from their FEW-th nearest one. */
+static sdm_status find_spacing(const cloud *c, double *spacing, sdm_error *err)
+{
+    double *list = NULL, d2[FEW];
+    size_t number[FEW];
+    const sdm_status s = SDM_ALLOC(&list, c->n, "points of the fit", err);
+    for (size_t i = 0; i < c->n && !s; i++) {
+        find_nearest(c, c->x[i], i, FEW, d2, number);
+        list[i] = sqrt(d2[FEW - 1]);
+    }
+    *spacing = s ? 0 : sdm_fit_median(list, c->n);
+    sdm_free(list);
+    return s;
+}
+
+/* 27 det / trace^3 of the covariance of points: 1 for a ball, 0 for a plane or a line. */
+static double roundness(const cloud *c, const size_t *number, size_t n)
+{
+    double mean[3] = {0}, m[6] = {0};
+    for (size_t i = 0; i < n; i++)
+        for (int a = 0; a < 3; a++) mean[a] += c->x[number[i]][a] / (double)n;
+    for (size_t i = 0; i < n; i++) {
+        double r[3];
+        for (int a = 0; a < 3; a++) r[a] = c->x[number[i]][a] - mean[a];
+        for (int a = 0; a < 3; a++) {
+            m[a] += r[a] * r[a];
+            m[3 + a] += r[(a + 1) % 3] * r[(a + 2) % 3];
+        }
+    }
+    const double trace = m[0] + m[1] + m[2], det = m[0] * (m[1] * m[2] - m[3] * m[3]) -
+                                                   m[5] * (m[5] * m[2] - m[3] * m[4]) +
+                                                   m[4] * (m[5] * m[3] - m[1] * m[4]);
+    return trace > 0 ? 27 * det / (trace * trace * trace) : 1;
+}
+
+/* Number of strays in patches. */
+static size_t count_patch(const cloud *strays, double spacing)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < strays->n && strays->n > MANY; i++) {
+        double d2[MANY];
+        size_t number[MANY + 1];
+        find_nearest(strays, strays->x[i], i, MANY, d2, number);
+        number[MANY] = i;
+        const double few = sqrt(d2[FEW - 1]);
+        n += few < DENSE * spacing && few > SAME * spacing &&
+             roundness(strays, number, MANY + 1) < FLAT;
+    }
+    return n;
+}
+
+/* Splits points into those on the surface and strays, at most MOST in all. */
+static void split_points(const fit_problem *p, cloud *on, cloud *strays)
+{
+    const size_t step = (p->samples.n + MOST - 1) / MOST;
+    for (size_t i = 0; i < p->samples.n; i += step) {
+        cloud *c = sdm_fit_point_belongs(&p->observation, p->samples.field[i]) < 0.5 ? strays : on;
+        for (size_t a = 0; a < 3; a++) c->x[c->n][a] = p->samples.world[3 * i + a];
+        c->n++;
+    }
+}
+
+/* Places on the fitted surface in the world, one for a voxel that it passes, at most MOST. */
+static sdm_status surface_places(const fit_problem *p, cloud *out, sdm_error *err)
+{
+    const sdm_grid *g = &p->maps.grid;
+    const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]};
+    const double *d = p->maps.distance, half = 0.5 * fit_longest_edge(g);
+    size_t all = 0, number = 0;
+    for (size_t v = 0; v < p->maps.n_voxels; v++) all += fabs(d[v]) <= half;
+    const size_t each = (all + MOST - 1) / MOST;
+    const sdm_status s = SDM_ALLOC(&out->x, MOST + 1, "places of the surface", err);
+    for (int64_t k = 1; k + 1 < g->n[2] && !s; k++)
+        for (int64_t j = 1; j + 1 < g->n[1]; j++)
+            for (int64_t i = 1; i + 1 < g->n[0]; i++) {
+                const int64_t v = k * step[2] + j * step[1] + i;
+                double index[3] = {(double)i, (double)j, (double)k}, slope[3], square = 0, y[3];
+                if (!(fabs(d[v]) <= half) || number++ % each) continue;
+                for (int a = 0; a < 3; a++) {
+                    slope[a] = (d[v + step[a]] - d[v - step[a]]) / (2 * g->spacing[a]);
+                    square += slope[a] * slope[a];
+                }
+                for (int a = 0; a < 3 && square > 0; a++)
+                    index[a] -= d[v] * slope[a] / (square * g->spacing[a]);
+                sdm_grid_world(g, index, y);
+                sdm_fit_to_world(&p->state, y, out->x[out->n++]);
+            }
+    return s;
+}
+
+/* Share of the places of the surface without points within REACH times the spacing. Strays count:
+   they may lie on the surface of another shape that touches this one. */
+static double share_uncovered(const cloud *surface, const cloud *on, const cloud *strays,
+                              double reach)
+{
+    size_t bare = 0, number;
+    for (size_t i = 0; i < surface->n; i++) {
+        double d2[2];
+        find_nearest(on, surface->x[i], SIZE_MAX, 1, &d2[0], &number);
+        find_nearest(strays, surface->x[i], SIZE_MAX, 1, &d2[1], &number);
+        bare += fmin(d2[0], d2[1]) > reach * reach;
+    }
+    return surface->n ? (double)bare / (double)surface->n : 0;
+}
+
+sdm_status sdm_fit_check_coverage(const fit_problem *p, sdm_fit_verdict *v, sdm_error *err)
+{
+    cloud on = {0}, strays = {0}, surface = {0};
+    double spacing = 0;
+    sdm_status s = SDM_ALLOC(&on.x, MOST + 1, "points of the fit", err);
+    if (!s) s = SDM_ALLOC(&strays.x, MOST + 1, "points of the fit", err);
+    if (!s) split_points(p, &on, &strays);
+    if (!s && on.n > MANY) s = find_spacing(&on, &spacing, err);
+    if (!s && on.n > MANY) s = surface_places(p, &surface, err);
+    if (!s && spacing > 0) {
+        const double most = fmax(p->opts->tolerance, PATCH_MAX), sd = p->state.point_sd,
+                     patch = (double)count_patch(&strays, spacing) / (double)(on.n + strays.n),
+                     bare = share_uncovered(&surface, &on, &strays, REACH * spacing + 3 * sd),
+                     stray = (double)strays.n / (double)(on.n + strays.n);
+        const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
+        const bool both = bare > UNCOVERED_MAX && patch > fmin(PATCH_MAX_UNCOVERED, most);
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_PATCH, patch <= most && !both, SDM_FIT_FAILED, patch,
+                          both ? PATCH_MAX_UNCOVERED : most,
+                          "%.0f %% of the points form a surface that the fitted shape does not "
+                          "have: another shape, or a fit that stopped at a wrong one; give a "
+                          "better start, or take other things out of the data "
+                          "(sdm_fit_opts.tolerance allows more)",
+                          100 * patch);
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_COVERED, bare <= UNCOVERED_MAX,
+                          grown ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, bare, UNCOVERED_MAX,
+                          "%.0f %% of the fitted surface has no points near it, and %.0f %% of the "
+                          "points lie on no surface of the shape: %s",
+                          100 * bare, 100 * stray,
+                          grown ? "a fit that stopped at a wrong shape; give a better start, or "
+                                  "take the strays out (sdm_fit_opts.tolerance allows more)"
+                                : "the data show a part of the shape only, or it is too large");
+    }
+    sdm_free(on.x);
+    sdm_free(strays.x);
+    sdm_free(surface.x);
+    return s;
+}

@@ -1,0 +1,8 @@
+/* Whether points and the fitted surface lie where the other one is: points that form a surface
+   which the shape does not have, and parts of its surface without points. */
+#pragma once
+
+#include "fit/solver/problem.h"
+
+/* Adds the findings "patch" and "covered" of a fit to points. SDM_E_NOMEM. */
+sdm_status sdm_fit_check_coverage(const fit_problem *p, sdm_fit_verdict *v, sdm_error *err);

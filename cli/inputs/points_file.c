@@ -51,9 +51,10 @@ static sdm_status read_names(const char *path, size_t number, char *line, column
     c->n = n;
     if (found[0] == 1 && found[1] == 1 && found[2] == 1) return SDM_OK;
     return sdm_fail(err, SDM_E_FORMAT,
-                    "%s:%zu: the header (%.30s,%.30s,%.30s%s) must name one column each x, y and "
+                    "%s:%zu: the header (%.30s%s%.30s%s%.30s%s) must name one column each x, y and "
                     "z, in mm; without a header a line is x,y,z",
-                    path, number, first[0], first[1], first[2], n > 3 ? ",..." : "");
+                    path, number, first[0], n > 1 ? "," : "", first[1], n > 2 ? "," : "", first[2],
+                    n > 3 ? ",..." : "");
 }
 
 /* Whether none of the cells of the line is a number. */

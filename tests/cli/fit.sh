@@ -240,7 +240,7 @@ expect 3 'two.csv: 2 points, need 3' sdmgen fit $fit two.csv -o no.stl
 printf '' >nothing.csv
 expect 3 'nothing.csv: no points' sdmgen fit $fit nothing.csv -o no.stl
 printf 'x,y\n0,0\n1,0\n2,2\n' >flat.csv
-expect 3 'flat.csv:2: 2 values, a line needs three: x,y,z' sdmgen fit $fit flat.csv -o no.stl
+expect 3 'flat.csv:1: the header \(x,y\) must name one column each x, y and z, in mm; without a header a line is x,y,z' sdmgen fit $fit flat.csv -o no.stl
 printf 'shape_x,shape_y,shape_z,x,y,z\n0,0,0,1,1,1\n0,0,0,2,2,2\n' >same.csv
 expect 3 'same.csv: ' sdmgen fit $fit ct.nii.gz --start-points same.csv -o no.stl
 expect 1 'nowhere.nii' sdmgen fit $fit nowhere.nii -o no.stl

@@ -10,7 +10,7 @@ sdmgen mesh $shape -o mesh.ply --quiet >out
 targets=('image.nii' 'image.nii --image-model labels' 'labels.nii --label 1' 'labels.nii --label 1 --image-model labels' 'points.csv' 'mesh.ply')
 declare -A value=([--region]=-9,-9,-9,9,9,9 [--margin]=1 [--least-inside]=0.5 [--image-model labels]= [--inside]=40,170 [--outside]=1300,270
     [--air]=-880,150 [--cavity]=3 [--tissue-places]=1 [--blur]=0.4 [--keep blur]= [--l-ref]=0.2 [--keep appearance]= [--point-sd]=0.1
-    [--beside]=0.5)
+    [--beside]=0.5 [--find]=)
 
 # Every cell of the table. The fit ends at a missing file of start points, after its options were checked.
 rows=0
@@ -21,7 +21,10 @@ while IFS='|' read -r _ options yes_no; do
         rows=$((rows + 1))
         [ -n "${value[$option]+there}" ] || bad "no value for $option"
         for i in "${!targets[@]}"; do
-            if [ "${cells[i]}" = yes ]; then
+            if [ "${cells[i]} $option" = 'yes --find' ]; then
+                expect 2 '^sdmgen: error: fit: --find searches for the start: leave --start-points out' \
+                    sdmgen fit $shape ${targets[i]} --find --start-points missing.csv
+            elif [ "${cells[i]}" = yes ]; then
                 expect 1 'missing.csv: ' sdmgen fit $shape ${targets[i]} $option ${value[$option]} --start-points missing.csv
             else
                 expect 2 "^sdmgen: error: fit: $option does nothing in a fit to [a-z]+( with --image-model labels)?; of the options .* apply: --" \

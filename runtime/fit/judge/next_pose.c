@@ -235,17 +235,15 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     sdm_free(own.distance);
     p->opts = given;
     if (s || isnan(gain)) return s;
-    // errors of the maps weigh more in fits to points: there only a pose that is clearly better
-    // refuses the fit
-    const bool passed = gain > SDM_FIT_PREFERRED,
-               failed = p->target->kind == SDM_FIT_POINTS ? gain < -SDM_FIT_PREFERRED : !passed;
+    const bool passed = gain > SDM_FIT_PREFERRED, points = p->target->kind == SDM_FIT_POINTS;
     char text[200];
     snprintf(text, sizeof text,
              "the shape in another pose explains the data %s (log-likelihood of the fit less that "
              "of the other: %.2g): give a nearer start, or more turns",
              gain < 0 ? "better" : "as well", gain);
+    // errors of coarse maps at sharp edges weigh more in fits to points than such a gain
     sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, passed,
-                      failed ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, gain, SDM_FIT_PREFERRED, "%s",
+                      points ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED, gain, SDM_FIT_PREFERRED, "%s",
                       text);
-    return failed ? sdm_fail(err, SDM_E_QUALITY, "%s", text) : SDM_OK;
+    return passed || points ? SDM_OK : sdm_fail(err, SDM_E_QUALITY, "%s", text);
 }

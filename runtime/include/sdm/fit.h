@@ -314,8 +314,7 @@ typedef enum sdm_fit_check_kind {
        maximum. In units of log-likelihood of independent samples, as sdm_fit_compare(). Poses in
        which the surface is nearly the same (Dice coefficient above 0.9) do not count. Left out
        where every such rotation leads back to the fit, where the pose is kept, where a check
-       failed, and where points lie too far apart to be tested. Points: failed only if the other
-       pose is better by more than the limit, else doubtful */
+       failed, and where points lie too far apart to be tested. Points: doubtful at most */
     SDM_FIT_CHECK_NEXT_POSE,
     /* points: share of those that lie on no surface of the shape but form one, neighbours in a thin
        layer; at most 0.05 or sdm_fit_opts.tolerance, and 0.01 where SDM_FIT_CHECK_COVERED does not

@@ -62,9 +62,12 @@ void cli_eval_params(const sdm_model *m, uint64_t seed, size_t index, double *p)
     cli_maker_params(&maker, seed, index, p);
 }
 
-static void compare_values(const float *network, const float *exact, size_t n, float near_mm,
+static void compare_values(const float *network, const float *exact, const sdm_grid *g,
                            cli_eval_sample *out)
 {
+    const size_t n = sdm_grid_count(g);
+    const float near_mm = (float)sdm_grid_near(g),
+                voxel = (float)fmin(fmin(g->spacing[0], g->spacing[1]), g->spacing[2]);
     double sum2 = 0, sum = 0, worst = 0, near = 0;
     size_t n_near = 0, both = 0, in_network = 0, in_exact = 0;
     for (size_t i = 0; i < n; i++) {
@@ -76,9 +79,10 @@ static void compare_values(const float *network, const float *exact, size_t n, f
             near += e * e;
             n_near++;
         }
+        const bool inside = sdm_inside_beside(exact[i], network[i], voxel);
         in_network += network[i] < 0;
-        in_exact += exact[i] < 0;
-        both += network[i] < 0 && exact[i] < 0;
+        in_exact += inside;
+        both += network[i] < 0 && inside;
     }
     out->mse_mm2 = sum2 / (double)n;
     out->mae_mm = sum / (double)n;
@@ -129,7 +133,7 @@ static sdm_status compare_surfaces(const sdm_grid *g, const float *network, cons
 sdm_status cli_compare_maps(const sdm_grid *g, const float *values, const float *exact,
                             bool surfaces, cli_eval_sample *out, sdm_error *err)
 {
-    compare_values(values, exact, sdm_grid_count(g), (float)sdm_grid_near(g), out);
+    compare_values(values, exact, g, out);
     return surfaces ? compare_surfaces(g, values, exact, out, err) : SDM_OK;
 }
 

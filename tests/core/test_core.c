@@ -20,6 +20,7 @@
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/near.h"
 #include "sdm/internal/rng.h"
 #include "sdm/internal/text.h"
 #include "sdm/internal/threads.h"
@@ -359,6 +360,18 @@ static void a_child_has_one_thread(void **state)
     assert_int_equal(sdm_threads(3), before);
 }
 
+static void voxels_on_the_surface_have_either_side(void **state)
+{
+    (void)state;
+    static const float exact[] = {0, 1e-7f, -1e-7f, 4e-4f, -4e-4f};
+    for (size_t i = 0; i < sizeof exact / sizeof *exact; i++) {
+        assert_true(sdm_inside_beside(exact[i], -0.01f, 0.5f));
+        assert_false(sdm_inside_beside(exact[i], 0.01f, 0.5f));
+    }
+    assert_true(sdm_inside_beside(-0.002f, 0.01f, 0.5f));
+    assert_false(sdm_inside_beside(0.002f, -0.01f, 0.5f));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -374,6 +387,7 @@ int main(void)
         cmocka_unit_test(thread_counts_are_limited),
         cmocka_unit_test(a_child_has_one_thread),
         cmocka_unit_test(grids_convert_coordinates),
+        cmocka_unit_test(voxels_on_the_surface_have_either_side),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -80,8 +80,9 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
             else
                 far[truth[v] < 0] += e * e, n_far[truth[v] < 0]++;
             if (fabs((double)truth[v]) <= voxel) at_surface += e * e, n_at_surface++;
-            inside += (size_t)(truth[v] < 0) + (size_t)(values[v] < 0);
-            both += truth[v] < 0 && values[v] < 0;
+            const bool known = sdm_inside_beside(truth[v], values[v], (float)voxel);
+            inside += (size_t)known + (size_t)(values[v] < 0);
+            both += known && values[v] < 0;
         }
         const double overlap = inside ? 2 * (double)both / (double)inside : 1;
         dice += overlap;

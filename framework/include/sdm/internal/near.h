@@ -2,6 +2,7 @@
 #pragma once
 
 #include <math.h>
+#include <stdbool.h>
 
 #include "sdm/grid.h"
 
@@ -13,6 +14,14 @@
 static inline double sdm_grid_near(const sdm_grid *g)
 {
     return 2 * fmin(g->spacing[0], fmin(g->spacing[1], g->spacing[2]));
+}
+
+/* Is a voxel inside by its exact distance, where a map has the value `map`? A voxel centre that
+ * lies on the surface up to a thousandth of a voxel (flat faces often lie on planes of voxels) is
+ * on either side: it counts as on that of the map. */
+static inline bool sdm_inside_beside(float exact, float map, float voxel)
+{
+    return (fabsf(exact) <= 1e-3f * voxel ? map : exact) < 0;
 }
 
 /* The second contour of pictures, beside that of the surface: at this distance (mm), five voxels.

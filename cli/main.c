@@ -13,10 +13,13 @@
 
 #include "args/help.h"
 #include "commands.h"
-#include "inputs/cpp_end.h"
 #include "report/crash_guard.h"
 #include "report/terminal.h"
+#include "sdm/internal/file.h"
 #include "sdm/internal/isolation.h"
+#ifdef SDM_HAVE_VDB
+#include "sdm/internal/vdb_memory.h"
+#endif
 #include "slicer/slicer.h"
 
 /* The functions of the commands, by index into cli_commands. */
@@ -101,13 +104,25 @@ static void open_standard_files(void)
             _exit(CLI_EXIT_FAILED);
 }
 
+#ifdef SDM_HAVE_VDB
+/* The end of the program where OpenVDB has no memory. */
+static void end_without_memory(void)
+{
+    static const char line[] = "sdmgen: error: out of memory in OpenVDB\n";
+    const ssize_t put = write(STDERR_FILENO, line, sizeof line - 1);
+    (void)put;
+    sdm_outfile_remove_temps();
+    _exit(CLI_EXIT_FAILED);
+}
+#endif
+
 int main(int argc, char **argv)
 {
     if (argc > 1 && !strcmp(argv[1], SDM_ISOLATION_COMMAND))
         return sdm_isolation_worker(argc - 1, argv + 1);
     open_standard_files();
 #ifdef SDM_HAVE_VDB
-    cli_end_by_message();
+    sdm_vdb_on_memory_end(end_without_memory);
 #endif
     keep_memory();
     if (argc == 2 && !strcmp(argv[1], "--version")) {

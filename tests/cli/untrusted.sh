@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Inputs of unknown origin: texts that command a terminal, links in place of voxels, images that declare more than they hold, models that are
 # not the expected ones, limits of memory.
-# Tests: main.c model_open.c model_shape.c setup.c stream.c terminal.c headroom.c cpp_end.cc
+# Tests: main.c model_open.c model_shape.c setup.c stream.c terminal.c headroom.c memory_end.cc
 . "$(dirname "$0")/common.sh"
 golden=$source_folder/tests/golden
 

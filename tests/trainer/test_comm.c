@@ -56,6 +56,8 @@ static bool exchange(sdm_comm *c)
     good = good && !sdm_comm_broadcast(c, 2, data, UNITS * UNIT, NULL);
     for (size_t i = 0; i < UNITS * UNIT; i++) good = good && data[i] == 2;
     sdm_free(data);
+    size_t least = 7 + (size_t)(rank == 1 ? 0 : 5 + rank);
+    good = good && !sdm_comm_least(c, &least, NULL) && least == 7;
     return good;
 }
 
@@ -135,6 +137,9 @@ static void one_process_needs_no_others(void **state)
     assert_int_equal(sdm_comm_agree(NULL, SDM_E_IO, NULL), SDM_E_IO);
     assert_int_equal(x, 5);
     assert_false(sdm_comm_agreed(NULL));
+    size_t least = 3;
+    assert_int_equal(sdm_comm_least(NULL, &least, NULL), SDM_OK);
+    assert_int_equal(least, 3);
 }
 
 int main(void)

@@ -44,6 +44,19 @@ sdm_status sdm_comm_gather_shares(sdm_comm *c, void *data, size_t n, size_t byte
     return s;
 }
 
+sdm_status sdm_comm_least(sdm_comm *c, size_t *value, sdm_error *err)
+{
+    size_t least = *value;
+    sdm_status s = SDM_OK;
+    for (int r = 0; r < sdm_comm_size(c) && !s; r++) {
+        size_t other = *value;
+        s = sdm_comm_broadcast(c, r, &other, sizeof other, err);
+        if (other < least) least = other;
+    }
+    *value = least;
+    return s;
+}
+
 sdm_status sdm_comm_agree(sdm_comm *c, sdm_status s, sdm_error *err)
 {
     int *all = NULL, root = 0;

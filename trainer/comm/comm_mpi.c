@@ -51,15 +51,9 @@ static void find_file(const mpi *m, char *path, size_t size)
  * instruction sets. */
 static sdm_status level_processors(sdm_comm *c, sdm_error *err)
 {
-    int least = sdm_processor_level();
-    const int mine = least;
-    sdm_status s = SDM_OK;
-    for (int r = 0; r < c->size && !s; r++) {
-        int level = mine;
-        s = sdm_comm_broadcast(c, r, &level, sizeof level, err);
-        least = level < least ? level : least;
-    }
-    sdm_processor_select(least);
+    size_t level = (size_t)sdm_processor_level();
+    const sdm_status s = sdm_comm_least(c, &level, err);
+    sdm_processor_select((int)level);
     return s;
 }
 
@@ -73,7 +67,7 @@ sdm_status sdm_comm_mpi(sdm_comm **out, sdm_error *err)
     find_file(m, path, sizeof path);
     // its own plug-ins need the symbols of Open MPI
     void *object = dlopen(path, RTLD_NOW | RTLD_GLOBAL);
-    // ISO C has no conversion from a pointer to data
+    // dlsym() returns a pointer to data, which ISO C does not convert to one to a function
     union {
         void *address;
         comm_module_entry *call;

@@ -145,12 +145,9 @@ static sdm_status fill_round(filling *f, size_t begin, size_t end, sdm_error *er
 /* d->inside becomes true if it is so on any rank. */
 static sdm_status share_inside(dataset *d, sdm_error *err)
 {
-    sdm_status s = SDM_OK;
-    for (int r = 0; r < sdm_comm_size(d->comm) && !s; r++) {
-        bool inside = d->inside;
-        s = sdm_comm_broadcast(d->comm, r, &inside, sizeof inside, err);
-        d->inside = d->inside || inside;
-    }
+    size_t outside = !d->inside;
+    const sdm_status s = sdm_comm_least(d->comm, &outside, err);
+    d->inside = !outside;
     return s;
 }
 

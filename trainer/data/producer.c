@@ -124,18 +124,6 @@ void trainer_producer_allow(producer *p, size_t n_planned)
     pthread_mutex_unlock(&p->lock);
 }
 
-/* The smallest value of n of all ranks. */
-static size_t shared_minimum(sdm_comm *comm, size_t n)
-{
-    size_t least = n;
-    for (int r = 0; r < sdm_comm_size(comm); r++) {
-        size_t other = n;
-        sdm_comm_broadcast(comm, r, &other, sizeof other, NULL);
-        if (other < least) least = other;
-    }
-    return least;
-}
-
 size_t trainer_producer_ready(producer *p)
 {
     pthread_mutex_lock(&p->lock);
@@ -144,7 +132,9 @@ size_t trainer_producer_ready(producer *p)
                           p->done[(p->base + n) % WINDOW]))
         n++;
     pthread_mutex_unlock(&p->lock);
-    return shared_minimum(p->d->comm, n < p->end - p->base ? n : p->end - p->base);
+    if (n > p->end - p->base) n = p->end - p->base;
+    (void)sdm_comm_least(p->d->comm, &n, NULL);
+    return n;
 }
 
 /* Waits until this rank has made sample number p->base, and puts it into its slot. */

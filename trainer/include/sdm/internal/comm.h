@@ -49,6 +49,9 @@ sdm_status sdm_comm_gather(sdm_comm *c, void *data, const size_t *at, sdm_error 
 /* The same for n units of `bytes` each, of which every rank has those of sdm_comm_first(). */
 sdm_status sdm_comm_gather_shares(sdm_comm *c, void *data, size_t n, size_t bytes, sdm_error *err);
 
+/* *value becomes the smallest one of all ranks. */
+sdm_status sdm_comm_least(sdm_comm *c, size_t *value, sdm_error *err);
+
 /* Returns the status and the message of the lowest rank with an error, on all ranks; SDM_OK if no
    rank has one. s, *err: those of this rank; err may be NULL. */
 sdm_status sdm_comm_agree(sdm_comm *c, sdm_status s, sdm_error *err);

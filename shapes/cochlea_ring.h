@@ -22,8 +22,8 @@ typedef struct cochlea_rings {
     double *direction;
 } cochlea_rings;
 
-/* Rings for a mesh of mean edge length `edge`, mm, placed for the unknowns x. Returns 0, or -1 when
-   memory ends. sdm_cochlea_rings_free() frees them. */
+/* *rings = the rings of vertices of the tube with the parameters x, as many as make the mean edge
+   of the mesh `edge` mm long. Returns 0; -1: no memory. sdm_cochlea_rings_free() frees them. */
 int sdm_cochlea_rings_make(const cochlea_model *m, const double *x, double edge,
                            cochlea_rings *rings);
 void sdm_cochlea_rings_free(cochlea_rings *rings);

@@ -21,7 +21,8 @@ typedef struct cli_map {
     sdm_source source;  /* network or exact engine */
     bool clamped;       /* parameters were clamped to the trained range */
     double error_mm;    /* of a network: its RMSE; else the bound on the error */
-    double volume;      /* of the shape, mm^3, against which surfaces are compared; 0: not known */
+    double volume; /* of the shape, mm^3: a surface that encloses much less or more is warned of; 0:
+                      not known */
     const char *origin; /* "model CHECKSUM", or the method without a network: "exact", "edt" ... */
     sdm_reason reason;  /* why the exact engine replaced the network */
     const sdm_check *check; /* errors of the network's map; NULL: not checked */

@@ -120,7 +120,8 @@ static sdm_status measure_row(const bench_points *b, int row, const sdm_exact *e
     return SDM_OK;
 }
 
-/* Another program, at OTHERS points; NAN: no figures, the note is the reason. */
+/* The figures of another program at OTHERS points; us is NAN where it has none, and the note says
+ * why. */
 typedef struct other {
     const char *name; /* of *peers */
     char note[256];

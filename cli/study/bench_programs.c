@@ -1,4 +1,5 @@
-/* Finds and starts peers, and reads the times in their answers. */
+/* Other programs that a benchmark compares with (peers): finds them in a folder, starts them, and
+ * reads the times that they print. */
 #include "bench_programs.h"
 
 #include <dirent.h>

@@ -12,14 +12,10 @@
 
 #include <cmocka.h>
 
-#include "sdm/internal/processor.h"
 #include "sdm/internal/rng.h"
-#include "template/template_kernels.h"
+#include "template_tables.h"
 
 enum { LENGTH = 40, ROWS = 10 };
-
-static const template_table *tables[3];
-static size_t n_tables;
 
 static double uniform(uint64_t stream, uint64_t i, double low, double high)
 {
@@ -405,12 +401,7 @@ static void displace_is_the_sum_with_the_same_bits(void **state)
 
 int main(void)
 {
-    tables[n_tables++] = &sdm_template_generic;
-#if defined(__x86_64__)
-    const int level = sdm_processor_level();
-    if (level >= SDM_PROCESSOR_AVX2) tables[n_tables++] = &sdm_template_avx2;
-    if (level >= SDM_PROCESSOR_AVX512) tables[n_tables++] = &sdm_template_avx512;
-#endif
+    find_tables();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lookup_is_the_formula_with_the_same_bits),
         cmocka_unit_test(lookup_reproduces_quadratic_functions),

@@ -12,15 +12,11 @@
 
 #include <cmocka.h>
 
-#include "sdm/internal/processor.h"
 #include "sdm/internal/rng.h"
-#include "template/template_kernels.h"
+#include "template_tables.h"
 
 // N points; rows have room for whole vectors.
 enum { N = 37, ROOM = 64, NX = 6, NY = 5, NZ = 7, SLOPE_ROWS = 29 };
-
-static const template_table *tables[3];
-static size_t n_tables;
 
 static float uniform(uint64_t stream, uint64_t i, double low, double high)
 {
@@ -282,12 +278,7 @@ static void layers_are_combined(void **state)
 
 int main(void)
 {
-    tables[n_tables++] = &sdm_template_generic;
-#if defined(__x86_64__)
-    const int level = sdm_processor_level();
-    if (level >= SDM_PROCESSOR_AVX2) tables[n_tables++] = &sdm_template_avx2;
-    if (level >= SDM_PROCESSOR_AVX512) tables[n_tables++] = &sdm_template_avx512;
-#endif
+    find_tables();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lookup_has_these_slopes),
         cmocka_unit_test(correction_has_these_slopes),

@@ -46,14 +46,20 @@ static sdm_grid cube(double half, double voxel)
     return sdm_grid_centred((int64_t[3]){n, n, n}, voxel, POSE.translation);
 }
 
+// Exact maps of a shape.
+static sdm_fit_source source_of(const sdm_instance *shape)
+{
+    return (sdm_fit_source){
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){34, 34, 34}, 0.35, (double[3]){0, 0, 0})};
+}
+
 // Fits a shape from its defaults in the pose POSE.
 static sdm_status fit_of(const sdm_instance *shape, const sdm_fit_target *t, double tolerance,
                          sdm_fit_result *r, sdm_error *err)
 {
     sdm_fit_opts o = sdm_fit_defaults();
-    const sdm_fit_source source = {
-        .shape = shape,
-        .grid = sdm_grid_centred((int64_t[3]){34, 34, 34}, 0.35, (double[3]){0, 0, 0})};
+    const sdm_fit_source source = source_of(shape);
     o.start_pose = POSE;
     o.polish_eps = 1e-4;
     o.appearance.n_outside = 1;
@@ -175,9 +181,7 @@ static void test_a_thin_shape_in_noise_is_refused(void **state)
     if (!v) abort();
     for (size_t i = 0; i < n; i++) v[i] = (float)(1300 + 270 * sdm_rng_normal(9, 0, i));
     const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = v};
-    const sdm_fit_source source = {
-        .shape = capsule,
-        .grid = sdm_grid_centred((int64_t[3]){34, 34, 34}, 0.35, (double[3]){0, 0, 0})};
+    const sdm_fit_source source = source_of(capsule);
     sdm_fit_opts o = sdm_fit_defaults();
     const double thin[2] = {0.5, 4};
     o.start_pose = POSE;
@@ -427,9 +431,7 @@ static void test_a_second_pose_is_refused(void **state)
     assert_int_equal(sdm_phantom_make(capsule, NULL, &other, &phantom, &g, w, NULL, NULL), SDM_OK);
     for (size_t i = 0; i < n; i++) v[i] = w[i] < v[i] ? w[i] : v[i];
     const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = g, .values = v};
-    const sdm_fit_source source = {
-        .shape = capsule,
-        .grid = sdm_grid_centred((int64_t[3]){34, 34, 34}, 0.35, (double[3]){0, 0, 0})};
+    const sdm_fit_source source = source_of(capsule);
     o.start_pose = POSE;
     o.polish_eps = 1e-4;
     o.appearance.n_outside = 1;

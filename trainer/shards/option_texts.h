@@ -4,8 +4,8 @@
 #include "sdm/internal/config.h"
 #include "sdm/registry.h"
 
-/* Every option of the shape. An option that is a file is followed by an entry NAME.crc64 with its
-   checksum. */
+/* Names and values of all options of a shape, as a model file states them. An option whose value is
+   a file is followed by an entry NAME.crc64, the checksum of the file. */
 typedef struct option_texts {
     const char *names[2 * SDM_MAX_OPTIONS], *values[2 * SDM_MAX_OPTIONS];
     bool is_path[2 * SDM_MAX_OPTIONS];            // a file whose checksum is the next entry

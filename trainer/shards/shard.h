@@ -9,7 +9,7 @@ typedef struct shard_form {
     size_t n_params, n_voxels;
 } shard_form;
 
-/* A shard, without its maps. */
+/* A shard, one file of a dataset, as far as it is in memory: its maps stay in the file. */
 typedef struct shard {
     shard_place place;
     char version[32]; /* of the program that made it */

@@ -99,7 +99,7 @@ void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, bool spli
                   double **packed, double **spare)
 {
     const double less = splines ? SPLINE_VARIANCE : 0;
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
     const size_t row = n_fields * (size_t)g->n[0], step[3] = {n_fields, row, row * (size_t)g->n[1]};
     for (int axis = 0; axis < 3; axis++) {
         double tap[RADIUS_MAX + 1];
@@ -129,7 +129,7 @@ void sdm_fit_blur(const sdm_grid *g, size_t n_fields, double variance, bool spli
 void sdm_fit_laplacian(const sdm_grid *g, size_t n_fields, double scale, int n_threads,
                        double *packed)
 {
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
     const size_t step[3] = {n_fields, n_fields * (size_t)g->n[0],
                             n_fields * (size_t)(g->n[0] * g->n[1])};
 #pragma omp parallel for schedule(static) num_threads(n_threads)

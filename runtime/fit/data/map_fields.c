@@ -172,7 +172,7 @@ void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives)
 {
     const int64_t rows = m->grid.n[1] * m->grid.n[2];
     const int n_threads = sdm_threads(m->n_threads);
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
     m->n_fields = field_count(m, derivatives);
 #pragma omp parallel for schedule(static) num_threads(n_threads)
     for (int64_t row = 0; row < rows; row++) {

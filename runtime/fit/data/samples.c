@@ -191,7 +191,7 @@ sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
     // field of every sample
     const fit_field f = sdm_fit_maps_field(maps);
     const int n_threads = sdm_threads(maps->n_threads);
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = samples->n * slice / FIT_SLICES; i < samples->n * (slice + 1) / FIT_SLICES;

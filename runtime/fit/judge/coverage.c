@@ -11,6 +11,7 @@
 #include "finding.h"
 #include "noise.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/mat3.h"
 #include "sdm/internal/vec3.h"
 
 // points and places of the surface that are compared; of more, every second, third ... one
@@ -72,20 +73,16 @@ static sdm_status find_spacing(const cloud *c, double *spacing, sdm_error *err)
 /* 27 det / trace^3 of the covariance of points: 1 for a ball, 0 for a plane or a line. */
 static double roundness(const cloud *c, const size_t *number, size_t n)
 {
-    double mean[3] = {0}, m[6] = {0};
+    double mean[3] = {0}, covariance[9] = {0}, adjugate[9];
     for (size_t i = 0; i < n; i++)
         for (int a = 0; a < 3; a++) mean[a] += c->x[number[i]][a] / (double)n;
     for (size_t i = 0; i < n; i++) {
         double r[3];
         for (int a = 0; a < 3; a++) r[a] = c->x[number[i]][a] - mean[a];
-        for (int a = 0; a < 3; a++) {
-            m[a] += r[a] * r[a];
-            m[3 + a] += r[(a + 1) % 3] * r[(a + 2) % 3];
-        }
+        for (int k = 0; k < 9; k++) covariance[k] += r[k / 3] * r[k % 3];
     }
-    const double trace = m[0] + m[1] + m[2], det = m[0] * (m[1] * m[2] - m[3] * m[3]) -
-                                                   m[5] * (m[5] * m[2] - m[3] * m[4]) +
-                                                   m[4] * (m[5] * m[3] - m[1] * m[4]);
+    const double trace = covariance[0] + covariance[4] + covariance[8],
+                 det = m3_adjugate(covariance, adjugate);
     return trace > 0 ? 27 * det / (trace * trace * trace) : 1;
 }
 

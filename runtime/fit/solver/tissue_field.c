@@ -99,7 +99,7 @@ static void em_step(fit_problem *p, cells *c)
     fit_samples *s = &p->samples;
     const size_t n = c->n_tissues, size = sdm_grid_count(&c->grid) * n;
     const int n_threads = sdm_threads(p->opts->n_threads);
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
 #pragma omp parallel for schedule(static) num_threads(n_threads)
     for (size_t i = 0; i < s->n; i++)
         sdm_fit_outside_shares(&p->observation, (double)s->value[i], fit_sample_weights(s, i),

@@ -138,7 +138,8 @@ static void search_at(fit_problem *p, size_t round, size_t i, size_t n)
     if (i == 0) p->search_best = NULL;
 }
 
-// remembers a turn that was not chosen, if it is better than the present runner-up
+// the fit from a start that was not chosen becomes the runner-up if it explains the data better
+// than the present one
 static void runner_up_set(fit_problem *p, double objective, const fit_state *state)
 {
     if (!(objective > -INFINITY) || (p->has_runner_up && objective <= p->runner_up_objective))

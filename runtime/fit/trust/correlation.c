@@ -47,7 +47,7 @@ sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, 
     uint32_t *list = NULL;
     size_t n;
     const sdm_status s = sdm_fit_neighbours_pick(v, effort * LAG_VOXELS, &list, &n, err);
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
     *width = FIT_LAG_MAX;
     memset(c, 0, (FIT_LAG_ZERO + 1) * sizeof *c);
     for (int k = 0; k <= *width && !s; k++) {
@@ -139,7 +139,7 @@ static void bias_neighbour_sums(const fit_neighbours *v, const double *tapered, 
                                 int n_threads, fit_bias *t)
 {
     const size_t n = v->n_unknowns;
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
 #pragma omp parallel for schedule(dynamic, 16) num_threads(n_threads)
     for (size_t s = 0; s < t->n; s++) {
         double *around = t->around + s * n;

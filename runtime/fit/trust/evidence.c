@@ -80,7 +80,7 @@ sdm_status sdm_fit_shapeless_log_likelihood(const fit_problem *p, double *log_li
     for (size_t i = 0; i < obs.n_tissues; i++) obs.tissue[i].weight *= 0.5;
     for (int i = 0; i < ITERATIONS; i++) mixture_em_step(&obs, &p->samples, list, n, 1e-3 * step);
     const int n_threads = sdm_threads(p->opts->n_threads);
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = p->samples.n * slice / FIT_SLICES;

@@ -44,7 +44,7 @@ static void score_change(const fit_problem *p, const fit_field *coarse, double *
     const fit_samples *s = &p->samples;
     const size_t n = p->information.n_unknowns;
     const int n_threads = sdm_threads(p->opts->n_threads);
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
     memset(parts, 0, FIT_SLICES * n * sizeof *parts);
     memset(score, 0, n * sizeof *score);
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)

@@ -96,7 +96,7 @@ static void pairs_count(const fit_problem *p, const subset *t, double width, pai
 {
     pairs part[FIT_SLICES] = {{{0}, {0}}};
     const int n_threads = sdm_threads(p->opts->n_threads);
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = t->n * slice / FIT_SLICES; i < t->n * (slice + 1) / FIT_SLICES; i++)
@@ -162,7 +162,7 @@ static sdm_status products_add(const fit_problem *p, const subset *t, const doub
     const sdm_status s = SDM_ALLOC(&parts, FIT_SLICES * size, "covariance of the score", err);
     if (s) return s;
     const int n_threads = sdm_threads(p->opts->n_threads);
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = t->n * slice / FIT_SLICES; i < t->n * (slice + 1) / FIT_SLICES; i++) {

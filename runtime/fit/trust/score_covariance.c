@@ -37,7 +37,7 @@ static sdm_status products_add(const fit_neighbours *v, const double *c, double 
     double *parts = NULL;
     const sdm_status s = SDM_ALLOC(&parts, FIT_SLICES * n * n, "covariance of the score", err);
     if (s) return s;
-    (void)n_threads; // without OpenMP
+    (void)n_threads; // unused without OpenMP
     // subsample of the voxels that the sum over n uses
     const float threshold =
         sdm_fit_neighbours_threshold(v, effort * PAIRS / (pow(2.0 * width + 1, 3) / 2 + 1));

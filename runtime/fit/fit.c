@@ -20,6 +20,7 @@
 #include "fit/solver/prior.h"
 #include "fit/solver/tissue_field.h"
 #include "fit/solver/tissues.h"
+#include "fit/start/even_points.h"
 #include "fit/start/start_search.h"
 #include "fit/trust/convergence.h"
 #include "fit/trust/evidence.h"
@@ -50,6 +51,8 @@
 // number of flat steps (of negligible predicted gain) in a row that ends the iterations with a
 // network's maps
 #define FLAT_MAX 6
+// a second fit to points replaces the first one if it gains this much log-likelihood
+#define GAIN_EVEN 1.0
 // share of outliers among points at the start
 #define OUTLIERS_FIRST 0.1
 // Largest number of times that the priors are reweighted. Without a limit a prior that contradicts
@@ -345,6 +348,49 @@ static sdm_status points_start(fit_problem *p, sdm_error *err)
     return SDM_OK;
 }
 
+/* The last iterations of a fit, as in fit_problem. */
+typedef struct recent_iterations {
+    double position[FIT_RECENT][FIT_PARAMS_MAX + 6], step[FIT_RECENT][FIT_PARAMS_MAX + 6];
+    size_t n;
+} recent_iterations;
+
+static void recent_keep(const fit_problem *p, recent_iterations *to)
+{
+    memcpy(to->position, p->recent_position, sizeof to->position);
+    memcpy(to->step, p->recent_step, sizeof to->step);
+    to->n = p->n_recent;
+}
+
+static void recent_restore(fit_problem *p, const recent_iterations *from)
+{
+    memcpy(p->recent_position, from->position, sizeof from->position);
+    memcpy(p->recent_step, from->step, sizeof from->step);
+    p->n_recent = from->n;
+}
+
+/* Points, after the fit: maximises again from the shape on whose surface they lie most evenly, and
+ * keeps the better of both states. */
+static sdm_status maximise_from_even(fit_problem *p, fit_newton_opts *newton, fit_newton_end *end,
+                                     sdm_error *err)
+{
+    const fit_state state = p->state;
+    const fit_newton_end first = *end;
+    const double objective = sdm_fit_objective(p);
+    recent_iterations recent;
+    recent_keep(p, &recent);
+    bool moved;
+    sdm_status s = sdm_fit_even_points(p, &moved, err);
+    newton->max_iterations = p->opts->max_iterations;
+    if (!s && moved) s = points_start(p, err);
+    if (!s && moved) s = maximise_with_maps(p, newton, end, err);
+    if (!s && moved && sdm_fit_objective(p) > objective + GAIN_EVEN) return SDM_OK;
+    if (s && s != SDM_E_QUALITY) return s;
+    p->state = state;
+    *end = first;
+    recent_restore(p, &recent);
+    return sdm_fit_evaluate(p, err);
+}
+
 static sdm_status start_find(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const double from = sdm_clock();
@@ -368,6 +414,8 @@ static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     fit_newton_end end = {0};
     // main phase
     sdm_status s = maximise_with_maps(p, &newton, &end, err);
+    if (!s && p->target->kind == SDM_FIT_POINTS && !o->keep_params)
+        s = maximise_from_even(p, &newton, &end, err);
     const char *what = p->source->model ? "fit" : "fit with exact maps";
     // polish: the appearance restarts, because it may have modelled the network's errors as a
     // tissue

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "fit/data/map_area.h"
 #include "prior.h"
 
 // sd of the logistic distribution of scale 1, pi / sqrt(3)
@@ -15,6 +16,18 @@ double sdm_fit_field_blur(const fit_problem *p)
 {
     const bool labels = !p->maps.share && p->target->kind != SDM_FIT_POINTS;
     return labels ? p->state.l_ref * LOGISTIC_SD : p->maps.share ? p->state.blur : 0;
+}
+
+// adds the log density -log(area) of points that are spread evenly over the surface; its second
+// derivatives are left out
+static void add_even_density(fit_problem *p)
+{
+    double area, gradient[FIT_PARAMS_MAX];
+    sdm_fit_maps_area(&p->maps, &area, gradient);
+    if (!(area > 0)) return;
+    p->information.log_likelihood -= p->n_even * log(area);
+    for (size_t k = 0; k < p->n_params; k++)
+        p->information.gradient[k] -= p->n_even * gradient[k] / area;
 }
 
 sdm_status sdm_fit_evaluate(fit_problem *p, sdm_error *err)
@@ -41,9 +54,9 @@ sdm_status sdm_fit_evaluate(fit_problem *p, sdm_error *err)
     // field, log-likelihood and derivatives at the samples
     sdm_fit_observation_prepare(p->opts, p->target->kind, state, &p->observation);
     s = sdm_fit_samples_evaluate(&p->samples, &p->maps, &p->observation, state, err);
-    if (!s)
-        sdm_fit_information_compute(&p->information, &p->samples, &p->observation,
-                                    p->opts->n_threads);
+    if (s) return s;
+    sdm_fit_information_compute(&p->information, &p->samples, &p->observation, p->opts->n_threads);
+    if (p->n_even > 0) add_even_density(p);
     return s;
 }
 

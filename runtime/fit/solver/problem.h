@@ -79,6 +79,9 @@ typedef struct fit_problem {
     bool absent[FIT_TISSUES_MAX];
     /* false: weights of the outside tissues are the same everywhere, whatever the options say */
     bool use_tissue_field;
+    /* points: number of those that count as spread evenly over the surface, see even_points.h; 0:
+     * they may lie anywhere on it */
+    double n_even;
     /* log-likelihood and its derivatives at `state`, and memory for those at a trial state */
     fit_information information, trial;
 

@@ -180,6 +180,7 @@ static sdm_status problem_start(fit_problem *p, sdm_fit_result *out, sdm_error *
     sdm_status s = params_start(p, &out->start_clamped, err);
     if (!s) s = sdm_fit_maps_create(p->source, share, o, &p->maps, err);
     if (s) return s;
+    p->maps.points = p->target->kind == SDM_FIT_POINTS;
     if (share && o->keep_blur && o->blur < p->maps.min_blur)
         return sdm_fail(err, SDM_E_ARG,
                         "a blur of %g mm is kept, but maps with voxels of %g mm carry one of %g mm "
@@ -202,6 +203,7 @@ static sdm_status problem_start(fit_problem *p, sdm_fit_result *out, sdm_error *
     s = sdm_fit_information_create(fit_columns(p->n_params) + tissues, &p->information, err);
     if (!s) s = sdm_fit_information_create(fit_columns(p->n_params) + tissues, &p->trial, err);
     if (!s) s = sdm_fit_maps_make(&p->maps, p->state.params, true, err);
+    if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
     if (!s) s = sdm_fit_extent(&p->maps, &p->extent, err);
     memcpy(p->maps_params, p->state.params, sizeof p->maps_params);
     p->maps_blur = NAN;
@@ -481,7 +483,8 @@ static void report_work(const fit_problem *p, double from, sdm_fit_result *out)
 static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
 {
     double factor;
-    sdm_status s = sdm_fit_judge(p, r, &factor, err);
+    sdm_status s = sdm_fit_maps_voxels(&p->maps, err);
+    if (!s) s = sdm_fit_judge(p, r, &factor, err);
     if (s && s != SDM_E_QUALITY) return s;
     sdm_fit_name_restless(p, r, s ? err : NULL);
     if (!s) s = sdm_fit_judge_next_pose(p, factor, &r->verdict, err);

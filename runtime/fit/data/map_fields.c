@@ -61,6 +61,7 @@ sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const s
 
 void sdm_fit_maps_dispose(fit_maps *m)
 {
+    sdm_fit_surface_dispose(&m->surface);
     sdm_free(m->values);
     sdm_free(m->jacobian);
     sdm_free(m->distance);
@@ -82,6 +83,9 @@ static sdm_status map_make_exact(fit_maps *m, const double *params, bool derivat
     const sdm_exact_opts o = {
         .n_threads = m->n_threads, .cancelled = m->cancelled, .user = m->user};
     const sdm_instance *shape = m->source->shape;
+    m->has_voxels = false;
+    if (fit_maps_direct(m))
+        return sdm_fit_surface_make(shape, params, derivatives, &o, &m->surface, err);
     if (derivatives)
         return sdm_exact_shape_jacobian(shape, params, &o, &m->grid, m->values, m->jacobian, NULL,
                                         err);
@@ -110,7 +114,25 @@ sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives
     *(exact ? &m->n_exact : &m->n_network) += 1;
     *(exact ? &m->seconds_exact : &m->seconds_network) += sdm_clock() - from;
     m->n_outside += outside;
+    for (size_t v = 0; v < m->n_voxels && !s && !fit_maps_direct(m); v++)
+        m->distance[v] = (double)m->values[v];
+    return s;
+}
+
+sdm_status sdm_fit_maps_voxels(fit_maps *m, sdm_error *err)
+{
+    const fit_surface *surface = &m->surface;
+    if (!fit_maps_direct(m) || m->has_voxels) return SDM_OK;
+    const double from = sdm_clock();
+    const sdm_exact_layers layers = {.values = m->values};
+    const sdm_status s =
+        surface->velocity
+            ? sdm_exact_map_derivative(surface->engine, &m->grid, surface->velocity, m->n_params,
+                                       &layers, m->jacobian, err)
+            : sdm_exact_map(surface->engine, &m->grid, m->values, err);
     for (size_t v = 0; v < m->n_voxels && !s; v++) m->distance[v] = (double)m->values[v];
+    m->has_voxels = !s;
+    m->seconds_exact += sdm_clock() - from;
     return s;
 }
 

@@ -5,7 +5,7 @@
 #include <math.h>
 
 #include "interpolate.h"
-#include "unknowns.h"
+#include "shape_surface.h"
 
 typedef struct fit_maps {
     const sdm_fit_source *source;
@@ -18,6 +18,8 @@ typedef struct fit_maps {
     bool share;
     /* true: always use the exact engine; false: the network, where the policy allows it */
     bool exact;
+    /* true: the samples are points, see fit_maps_direct() */
+    bool points;
     /* mm: narrowest point spread that the spacing of the grid can represent, half a voxel */
     double min_blur;
     /* as in sdm_fit_opts */
@@ -28,6 +30,9 @@ typedef struct fit_maps {
     float *values, *jacobian;
     /* [n_voxels] the latest map in double precision, mm */
     double *distance;
+    /* direct: the surface of the shape, and whether the arrays above hold its map */
+    fit_surface surface;
+    bool has_voxels;
     /* [n_voxels][n_fields] the field, its derivatives by the parameters and (share) by the blur, as
      * fit_field.packed; `spare` is scratch memory of the same size */
     double *packed, *spare;
@@ -44,14 +49,23 @@ static inline double fit_longest_edge(const sdm_grid *g)
     return fmax(g->spacing[0], fmax(g->spacing[1], g->spacing[2]));
 }
 
+/* Whether the distances of samples are those from the surface itself, without voxels: of points,
+ * with the exact engine. */
+static inline bool fit_maps_direct(const fit_maps *m) { return m->points && m->exact; }
+
 /* Allocates memory for maps on the grid of the source; on error *out is empty. */
 sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const sdm_fit_opts *opts,
                                fit_maps *out, sdm_error *err);
 void sdm_fit_maps_dispose(fit_maps *m);
 
 /* Computes values, distance and, if `derivatives`, jacobian at params[n_params]; `packed` is not
- * updated. Returns SDM_E_CANCELLED or an error of the engines. */
+ * updated. Direct: makes the surface only, see sdm_fit_maps_voxels(). Returns SDM_E_CANCELLED or an
+ * error of the engines. */
 sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives, sdm_error *err);
+
+/* Direct: makes the map of the latest surface, if it is not made yet; call it before reading values,
+ * distance or jacobian. Otherwise does nothing. */
+sdm_status sdm_fit_maps_voxels(fit_maps *m, sdm_error *err);
 
 /* Fills `packed` from the latest map, convolved with a Gaussian of sd `blur` (mm); without
    `derivatives` only its first field. Shares: blur >= min_blur. Distances: blur >= 0. `derivatives`

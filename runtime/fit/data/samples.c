@@ -29,6 +29,15 @@ double sdm_fit_field_at(const fit_field *f, const fit_state *s, const double x[3
     return sdm_fit_interpolate(f, y);
 }
 
+double sdm_fit_maps_at(const fit_maps *maps, const fit_state *s, const double x[3])
+{
+    const fit_field f = sdm_fit_maps_field(maps);
+    double y[3];
+    if (!fit_maps_direct(maps)) return sdm_fit_field_at(&f, s, x);
+    sdm_fit_to_shape(s, x, y);
+    return sdm_exact_point(maps->surface.engine, y, NULL, NULL, NULL);
+}
+
 // whether the region contains x (world, mm)
 static bool region_contains(const sdm_fit_opts *o, const fit_region *r, const double x[3])
 {
@@ -157,16 +166,13 @@ void sdm_fit_samples_dispose(fit_samples *s)
     *s = (fit_samples){0};
 }
 
-// One row of the Jacobian: derivatives of the field at x. With y = R^T (x - t), rotating the shape
+// One row of the Jacobian: derivatives of the field at x of the world, with its gradient in the
+// shape's frame and its derivatives by parameters and blur. With y = R^T (x - t), rotating the shape
 // by a small w about the world's axes moves y by -R^T (w x (x - t)).
-static void jacobian_row(const fit_maps *maps, const fit_field *f, const fit_state *state,
-                         const double x[3], float *columns)
+static void jacobian_row(const fit_maps *maps, const fit_state *state, const double x[3],
+                         const double gradient[3], const double *rest, float *columns)
 {
-    // gradient of the field in the shape's frame, then in the world
-    double y[3], gradient[3], g[3];
-    double rest[FIT_FIELDS_MAX];
-    sdm_fit_to_shape(state, x, y);
-    (void)sdm_fit_interpolate_all(f, y, gradient, rest);
+    double g[3]; // in the world
     for (int k = 0; k < 3; k++)
         g[k] = state->rotation[3 * k] * gradient[0] + state->rotation[3 * k + 1] * gradient[1] +
                state->rotation[3 * k + 2] * gradient[2];
@@ -184,10 +190,64 @@ static void jacobian_row(const fit_maps *maps, const fit_field *f, const fit_sta
     columns[fit_at_blur(n)] = maps->share ? (float)rest[n] : 0;
 }
 
+// numbers the samples of the band and allocates their rows, a quarter more than needed
+static sdm_status rows_number(fit_samples *samples, const fit_maps *maps,
+                              const fit_observation *obs, sdm_error *err)
+{
+    samples->n_band = 0;
+    for (size_t i = 0; i < samples->n; i++)
+        samples->row[i] = sdm_fit_in_band(obs, samples->field[i]) ? samples->n_band++ : SIZE_MAX;
+    samples->n_columns = fit_columns(maps->n_params);
+    if (samples->n_band <= samples->band_capacity) return SDM_OK;
+    const size_t room = samples->n_band + samples->n_band / 4;
+    size_t count;
+    sdm_status s = sdm_mul(room, samples->n_columns, &count, err);
+    sdm_free(samples->jacobian);
+    samples->jacobian = NULL;
+    samples->band_capacity = 0;
+    if (!s) s = SDM_ALLOC(&samples->jacobian, count, "derivatives at the voxels", err);
+    if (!s) samples->band_capacity = room;
+    return s;
+}
+
+// the distances from the surface, and their derivatives
+static sdm_status evaluate_direct(fit_samples *samples, const fit_maps *maps,
+                                  const fit_observation *obs, const fit_state *state,
+                                  sdm_error *err)
+{
+    const size_t n = samples->n;
+    double *memory = NULL;
+    uint32_t *triangle = NULL;
+    sdm_status s = SDM_ALLOC(&memory, 9 * n, "distances of the points", err);
+    if (!s) s = SDM_ALLOC(&triangle, n, "distances of the points", err);
+    if (!s) {
+        double *x = memory;
+        const sdm_exact_at at = {.distance = samples->field,
+                                 .gradient = memory + 3 * n,
+                                 .closest = memory + 6 * n,
+                                 .triangle = triangle};
+        for (size_t i = 0; i < n; i++) sdm_fit_to_shape(state, samples->world + 3 * i, x + 3 * i);
+        s = sdm_exact_points(maps->surface.engine, x, n, &at, err);
+        if (!s) s = rows_number(samples, maps, obs, err);
+        for (size_t i = 0; i < n && !s; i++) {
+            double by[FIT_PARAMS_MAX];
+            if (samples->row[i] == SIZE_MAX) continue;
+            sdm_fit_surface_derivatives(&maps->surface, triangle[i], at.closest + 3 * i,
+                                        at.gradient + 3 * i, by);
+            jacobian_row(maps, state, samples->world + 3 * i, at.gradient + 3 * i, by,
+                         samples->jacobian + samples->row[i] * samples->n_columns);
+        }
+    }
+    sdm_free(memory);
+    sdm_free(triangle);
+    return s;
+}
+
 sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
                                     const fit_observation *obs, const fit_state *state,
                                     sdm_error *err)
 {
+    if (fit_maps_direct(maps)) return evaluate_direct(samples, maps, obs, state, err);
     // field of every sample
     const fit_field f = sdm_fit_maps_field(maps);
     const int n_threads = sdm_threads(maps->n_threads);
@@ -197,30 +257,19 @@ sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
         for (size_t i = samples->n * slice / FIT_SLICES; i < samples->n * (slice + 1) / FIT_SLICES;
              i++)
             samples->field[i] = sdm_fit_field_at(&f, state, samples->world + 3 * i);
-    // rows of the Jacobian for the samples of the band
-    samples->n_band = 0;
-    for (size_t i = 0; i < samples->n; i++)
-        samples->row[i] = sdm_fit_in_band(obs, samples->field[i]) ? samples->n_band++ : SIZE_MAX;
-    samples->n_columns = fit_columns(maps->n_params);
-    // memory for the rows, a quarter more than needed
-    if (samples->n_band > samples->band_capacity) {
-        const size_t room = samples->n_band + samples->n_band / 4;
-        size_t count;
-        sdm_status s = sdm_mul(room, samples->n_columns, &count, err);
-        sdm_free(samples->jacobian);
-        samples->jacobian = NULL;
-        samples->band_capacity = 0;
-        if (!s) s = SDM_ALLOC(&samples->jacobian, count, "derivatives at the voxels", err);
-        if (s) return s;
-        samples->band_capacity = room;
-    }
     // derivatives, one row for each sample of the band
+    const sdm_status s = rows_number(samples, maps, obs, err);
+    if (s) return s;
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = samples->n * slice / FIT_SLICES; i < samples->n * (slice + 1) / FIT_SLICES;
-             i++)
-            if (samples->row[i] != SIZE_MAX)
-                jacobian_row(maps, &f, state, samples->world + 3 * i,
-                             samples->jacobian + samples->row[i] * samples->n_columns);
+             i++) {
+            double y[3], gradient[3], rest[FIT_FIELDS_MAX];
+            if (samples->row[i] == SIZE_MAX) continue;
+            sdm_fit_to_shape(state, samples->world + 3 * i, y);
+            (void)sdm_fit_interpolate_all(&f, y, gradient, rest);
+            jacobian_row(maps, state, samples->world + 3 * i, gradient, rest,
+                         samples->jacobian + samples->row[i] * samples->n_columns);
+        }
     return SDM_OK;
 }

@@ -65,9 +65,11 @@ static inline const float *fit_sample_weights(const fit_samples *s, size_t i)
 /* First field at x of the world (mm), with the shape at the pose of s. */
 double sdm_fit_field_at(const fit_field *f, const fit_state *s, const double x[3]);
 
-/* Sets the members field, row and jacobian of *samples for every sample from maps->packed, which
- * must hold derivatives.
- */
+/* The same of the latest maps: of maps->packed or, direct, of the surface. */
+double sdm_fit_maps_at(const fit_maps *maps, const fit_state *s, const double x[3]);
+
+/* Sets the members field, row and jacobian of *samples for every sample from maps->packed or,
+ * direct, from the surface; either must have been made with derivatives. */
 sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
                                     const fit_observation *obs, const fit_state *state,
                                     sdm_error *err);

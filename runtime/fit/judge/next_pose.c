@@ -133,14 +133,13 @@ static void turned(const own_fit *own, size_t i, fit_state *to)
 // log-likelihood of a part of the samples with the map of the fit at another pose
 static double rank(const fit_problem *p, const fit_state *state)
 {
-    const fit_field f = sdm_fit_maps_field(&p->maps);
     const size_t step = p->samples.n / SAMPLES_RANKED + 1;
     double sum = 0;
     fit_likelihood l;
     for (size_t i = 0; i < p->samples.n; i += step) {
         sdm_fit_likelihood(&p->observation, (double)p->samples.value[i],
                            fit_sample_weights(&p->samples, i),
-                           sdm_fit_field_at(&f, state, p->samples.world + 3 * i), false, &l);
+                           sdm_fit_maps_at(&p->maps, state, p->samples.world + 3 * i), false, &l);
         sum += l.log_likelihood;
     }
     return sum;
@@ -183,6 +182,7 @@ static sdm_status challenge(fit_problem *p, const own_fit *own, const start *fro
 {
     p->state = from->state;
     sdm_status s = climb(p, from->keep_params, STEPS, err);
+    if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
     *other = !s && likeness(own, p->maps.distance, &p->state) <= ALIKE;
     if (s == SDM_E_QUALITY) return SDM_OK; // a state that cannot be fitted is no rival
     return s ? s : sdm_fit_stand(p, own->factor, standing, err);
@@ -227,6 +227,7 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     p->opts = &quiet;
     p->use_tissue_field = false;
     sdm_status s = sdm_fit_samples_near(p, SAMPLES, err);
+    if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
     if (!s) s = own_create(p, &own, err);
     // of every `stride`-th voxel fewer count as one; where the shape does not explain the image,
     // the likelihood is less certain (Wedderburn 1974)

@@ -110,6 +110,7 @@ static double detail_share(const fit_maps *m)
 fit_coarseness sdm_fit_coarseness(const fit_problem *p)
 {
     fit_coarseness c = {INFINITY, ""};
+    if (fit_maps_direct(&p->maps)) return c;
     const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
                  details = detail_share(&p->maps);
     if (details > DETAILS_MAX) // at edges: the share grows with the voxel

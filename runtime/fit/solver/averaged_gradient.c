@@ -12,23 +12,35 @@
 // largest half width, as a share of the parameter's range
 #define WIDTH_MAX 0.05
 
+// mean square motion of the surface per unit of parameter k, over voxels within one voxel of it
+static double motion_on_map(const fit_maps *m, size_t k)
+{
+    double sum = 0, n = 0;
+    for (size_t v = 0; v < m->n_voxels; v++) {
+        if (fabs(m->distance[v]) > fit_longest_edge(&m->grid)) continue;
+        sum += (double)m->jacobian[k * m->n_voxels + v] * (double)m->jacobian[k * m->n_voxels + v];
+        n++;
+    }
+    return n > 0 ? sum / n : 0;
+}
+
+// the same over the points
+static double motion_at_points(const fit_samples *s, size_t k)
+{
+    double sum = 0;
+    for (size_t i = 0; i < s->n_band; i++)
+        sum += (double)s->jacobian[i * s->n_columns + k] * (double)s->jacobian[i * s->n_columns + k];
+    return s->n_band ? sum / (double)s->n_band : 0;
+}
+
 void sdm_fit_averaging_widths(const fit_problem *p, double *half_width)
 {
-    const fit_maps *m = &p->maps;
-    const double *h = m->grid.spacing, step = fmax(h[0], fmax(h[1], h[2]));
+    const double step = fit_longest_edge(&p->maps.grid);
     for (size_t k = 0; k < p->n_params; k++) {
-        // rms motion of the surface per unit of the parameter, over voxels within one voxel of the
-        // surface
-        double sum = 0, n = 0;
-        for (size_t v = 0; v < m->n_voxels; v++) {
-            if (fabs(m->distance[v]) > step) continue;
-            sum +=
-                (double)m->jacobian[k * m->n_voxels + v] * (double)m->jacobian[k * m->n_voxels + v];
-            n++;
-        }
-        const double range = p->high[k] - p->low[k];
-        half_width[k] =
-            fmin(n > 0 && sum > 0 ? MOTION * step / sqrt(sum / n) : range, WIDTH_MAX * range);
+        const double square = fit_maps_direct(&p->maps) ? motion_at_points(&p->samples, k)
+                                                        : motion_on_map(&p->maps, k),
+                     range = p->high[k] - p->low[k];
+        half_width[k] = fmin(square > 0 ? MOTION * step / sqrt(square) : range, WIDTH_MAX * range);
     }
 }
 

@@ -113,14 +113,13 @@ double sdm_fit_samples_log_likelihood(const fit_samples *samples, const fit_maps
                                       const fit_observation *obs, const fit_state *state)
 {
     const size_t n = samples->n;
-    const fit_field f = sdm_fit_maps_field(maps);
     double part[FIT_SLICES] = {0}, sum = 0;
     const int n_threads = sdm_threads(maps->n_threads);
     (void)n_threads; // unused without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = n * slice / FIT_SLICES; i < n * (slice + 1) / FIT_SLICES; i++) {
-            const double field = sdm_fit_field_at(&f, state, samples->world + 3 * i);
+            const double field = sdm_fit_maps_at(maps, state, samples->world + 3 * i);
             fit_likelihood r;
             sdm_fit_likelihood(obs, (double)samples->value[i], fit_sample_weights(samples, i),
                                field, false, &r);

@@ -27,7 +27,7 @@ void sdm_fit_information_dispose(fit_information *s);
 void sdm_fit_information_compute(fit_information *s, const fit_samples *samples,
                                  const fit_observation *obs, int n_threads);
 
-/* Returns the log-likelihood alone, with the field of maps->packed at the pose of `state`. The
+/* Returns the log-likelihood alone, with the field of the latest maps at the pose of `state`. The
  * field values stored in the samples do not change. */
 double sdm_fit_samples_log_likelihood(const fit_samples *samples, const fit_maps *maps,
                                       const fit_observation *obs, const fit_state *state);

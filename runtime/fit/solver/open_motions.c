@@ -81,12 +81,11 @@ static double slope_squared(const fit_problem *p, size_t sample)
 
 double sdm_fit_surface_motion(const fit_problem *p, const fit_state *to)
 {
-    const fit_field f = sdm_fit_maps_field(&p->maps);
     double square = 0, slope = 0;
     for (size_t i = 0; i < p->samples.n; i++) {
         if (p->samples.row[i] == SIZE_MAX) continue;
         const double change =
-            sdm_fit_field_at(&f, to, p->samples.world + 3 * i) - p->samples.field[i];
+            sdm_fit_maps_at(&p->maps, to, p->samples.world + 3 * i) - p->samples.field[i];
         square += change * change;
         slope += slope_squared(p, i);
     }

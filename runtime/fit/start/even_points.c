@@ -5,10 +5,13 @@
 
 #include "fit/solver/newton.h"
 
-// the deviation of the points is widened by this factor, so that points on walls hold the ends less
-#define WIDER 3.0
-// largest number of iterations
-#define STEPS 25
+// the deviation of the points starts at this share of the reach of the shape and shrinks by this
+// factor, down to this multiple of the estimate
+#define WIDEST 0.1
+#define SHRINK 0.6
+#define NARROWEST 3.0
+// largest number of iterations with each deviation
+#define STEPS 4
 // smallest change of a parameter that counts, as a share of its range
 #define STEP_LEAST 0.01
 
@@ -26,8 +29,12 @@ sdm_status sdm_fit_even_points(fit_problem *p, bool *moved, sdm_error *err)
     p->n_even = 0;
     for (size_t i = 0; i < p->samples.n; i++)
         p->n_even += sdm_fit_point_belongs(&p->observation, p->samples.field[i]);
-    p->state.point_sd *= WIDER;
-    const sdm_status s = sdm_fit_newton(p, &newton, &end, err);
+    sdm_status s = SDM_OK;
+    for (double sd = fmax(WIDEST * p->extent.reach, NARROWEST * from.point_sd);
+         sd >= NARROWEST * from.point_sd && !s; sd *= SHRINK) {
+        p->state.point_sd = sd;
+        s = sdm_fit_newton(p, &newton, &end, err);
+    }
     p->n_even = 0;
     p->state.point_sd = from.point_sd;
     for (size_t k = 0; k < p->n_params; k++) {

@@ -44,14 +44,13 @@ static double undo_first_order(const fit_problem *p, size_t k, double m[6], doub
 static void undo_step(const fit_problem *p, double m[6])
 {
     const fit_samples *s = &p->samples;
-    const fit_field f = sdm_fit_maps_field(&p->maps);
     double a[36] = {0}, step[6] = {0}, factor[36], scale[6];
     fit_state to;
     sdm_fit_move_along(&p->state, m, 1, &to);
     for (size_t i = 0; i < s->n; i++) {
         if (s->row[i] == SIZE_MAX) continue;
         const float *by = s->jacobian + s->row[i] * s->n_columns + fit_at_rotation(p->n_params);
-        const double off = s->field[i] - sdm_fit_field_at(&f, &to, s->world + 3 * i);
+        const double off = s->field[i] - sdm_fit_maps_at(&p->maps, &to, s->world + 3 * i);
         for (size_t x = 0; x < 6; x++) {
             step[x] += off * (double)by[x];
             for (size_t y = 0; y < 6; y++) a[6 * x + y] += (double)by[x] * (double)by[y];
@@ -75,7 +74,7 @@ static sdm_status try_finite(fit_problem *p, size_t k, double m[6], bool *rigid,
     p->maps_params[0] = p->maps_blur = NAN;
     const sdm_status s = sdm_fit_maps_make(&p->maps, params, false, err);
     if (s) return s;
-    sdm_fit_maps_pack(&p->maps, sdm_fit_field_blur(p), false);
+    if (!fit_maps_direct(&p->maps)) sdm_fit_maps_pack(&p->maps, sdm_fit_field_blur(p), false);
     for (int i = 0; i < 6; i++) m[i] *= change;
     for (int round = 0; round < ROUNDS; round++) undo_step(p, m);
     sdm_fit_move_along(&p->state, m, 1, &to);

@@ -112,6 +112,7 @@ static double model_error(const fit_problem *p)
     const bool points = p->target->kind == SDM_FIT_POINTS;
     const double network = sdm_fit_network_error(p);
     if (!p->given_labels && !points) return network;
+    if (fit_maps_direct(&p->maps)) return 0;
     const double labels = points ? 0 : LABEL_ERROR * fit_longest_edge(&p->target->grid),
                  map =
                      (points ? POINT_MAP_ERROR : LABEL_MAP_ERROR) * fit_longest_edge(&p->maps.grid);
@@ -207,7 +208,8 @@ sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_erro
     const bool known = influence_compute(p, true, influence, work);
     s = sdm_fit_score_covariance_create(p, model_mm, known ? influence : NULL, &scatter, err);
     out->noise_factor = scatter.noise_factor;
-    if (!s && known && p->target->kind == SDM_FIT_POINTS)
+    memset(bias, 0, n * n * sizeof *bias);
+    if (!s && known && p->target->kind == SDM_FIT_POINTS && !fit_maps_direct(&p->maps))
         s = sdm_fit_map_bias(p, influence, bias, err);
     if (!s && known) covariance_fill(p, &scatter, influence, bias, work, out);
     if (!s && !known)

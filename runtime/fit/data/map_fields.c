@@ -121,15 +121,14 @@ sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives
 
 sdm_status sdm_fit_maps_voxels(fit_maps *m, sdm_error *err)
 {
-    const fit_surface *surface = &m->surface;
+    const fit_shape_surface *surface = &m->surface;
     if (!fit_maps_direct(m) || m->has_voxels) return SDM_OK;
     const double from = sdm_clock();
     const sdm_exact_layers layers = {.values = m->values};
     const sdm_status s =
-        surface->velocity
-            ? sdm_exact_map_derivative(surface->engine, &m->grid, surface->velocity, m->n_params,
-                                       &layers, m->jacobian, err)
-            : sdm_exact_map(surface->engine, &m->grid, m->values, err);
+        surface->velocity ? sdm_exact_map_derivative(surface->engine, &m->grid, surface->velocity,
+                                                     m->n_params, &layers, m->jacobian, err)
+                          : sdm_exact_map(surface->engine, &m->grid, m->values, err);
     for (size_t v = 0; v < m->n_voxels && !s; v++) m->distance[v] = (double)m->values[v];
     m->has_voxels = !s;
     m->seconds_exact += sdm_clock() - from;

@@ -31,7 +31,7 @@ typedef struct fit_maps {
     /* [n_voxels] the latest map in double precision, mm */
     double *distance;
     /* direct: the surface of the shape, and whether the arrays above hold its map */
-    fit_surface surface;
+    fit_shape_surface surface;
     bool has_voxels;
     /* [n_voxels][n_fields] the field, its derivatives by the parameters and (share) by the blur, as
      * fit_field.packed; `spare` is scratch memory of the same size */
@@ -63,8 +63,8 @@ void sdm_fit_maps_dispose(fit_maps *m);
  * error of the engines. */
 sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives, sdm_error *err);
 
-/* Direct: makes the map of the latest surface, if it is not made yet; call it before reading values,
- * distance or jacobian. Otherwise does nothing. */
+/* Direct: makes the map of the latest surface, if it is not made yet; call it before reading
+ * values, distance or jacobian. Otherwise does nothing. */
 sdm_status sdm_fit_maps_voxels(fit_maps *m, sdm_error *err);
 
 /* Fills `packed` from the latest map, convolved with a Gaussian of sd `blur` (mm); without

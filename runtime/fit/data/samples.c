@@ -167,8 +167,8 @@ void sdm_fit_samples_dispose(fit_samples *s)
 }
 
 // One row of the Jacobian: derivatives of the field at x of the world, with its gradient in the
-// shape's frame and its derivatives by parameters and blur. With y = R^T (x - t), rotating the shape
-// by a small w about the world's axes moves y by -R^T (w x (x - t)).
+// shape's frame and its derivatives by parameters and blur. With y = R^T (x - t), rotating the
+// shape by a small w about the world's axes moves y by -R^T (w x (x - t)).
 static void jacobian_row(const fit_maps *maps, const fit_state *state, const double x[3],
                          const double gradient[3], const double *rest, float *columns)
 {

@@ -8,28 +8,30 @@
 #include "sdm/internal/vec3.h"
 #include "sdm/runtime.h"
 
-void sdm_fit_surface_dispose(fit_surface *s)
+void sdm_fit_surface_dispose(fit_shape_surface *s)
 {
     sdm_exact_free(s->engine);
     sdm_mesh_dispose(&s->mesh);
     sdm_free(s->velocity);
-    *s = (fit_surface){0};
+    *s = (fit_shape_surface){0};
 }
 
 sdm_status sdm_fit_surface_make(const sdm_instance *shape, const double *params, bool derivatives,
-                                const sdm_exact_opts *opts, fit_surface *out, sdm_error *err)
+                                const sdm_exact_opts *opts, fit_shape_surface *surface,
+                                sdm_error *err)
 {
     size_t count;
-    sdm_fit_surface_dispose(out);
-    (void)sdm_instance_params(shape, &out->n_params);
-    sdm_status s = sdm_instance_mesh(shape, params, &out->mesh, err);
+    sdm_fit_surface_dispose(surface);
+    (void)sdm_instance_params(shape, &surface->n_params);
+    sdm_status s = sdm_instance_mesh(shape, params, &surface->mesh, err);
     if (!s && derivatives) {
-        s = sdm_mul(3 * out->mesh.n_vert, out->n_params, &count, err);
-        if (!s) s = SDM_ALLOC(&out->velocity, count, "velocities of the vertices", err);
-        if (!s) s = sdm_instance_velocity(shape, params, out->mesh.n_vert, out->velocity, err);
+        s = sdm_mul(3 * surface->mesh.n_vert, surface->n_params, &count, err);
+        if (!s) s = SDM_ALLOC(&surface->velocity, count, "velocities of the vertices", err);
+        if (!s)
+            s = sdm_instance_velocity(shape, params, surface->mesh.n_vert, surface->velocity, err);
     }
-    if (!s) s = sdm_exact_create(&out->mesh, opts, &out->engine, err);
-    if (s) sdm_fit_surface_dispose(out);
+    if (!s) s = sdm_exact_create(&surface->mesh, opts, &surface->engine, err);
+    if (s) sdm_fit_surface_dispose(surface);
     return s;
 }
 
@@ -41,15 +43,15 @@ static void barycentric(const double *a, const double *b, const double *c, const
     v3_sub(b, a, ab);
     v3_sub(c, a, ac);
     v3_sub(x, a, ax);
-    const double bb = v3_dot(ab, ab), bc = v3_dot(ab, ac), cc = v3_dot(ac, ac),
-                 xb = v3_dot(ax, ab), xc = v3_dot(ax, ac), det = bb * cc - bc * bc;
+    const double bb = v3_dot(ab, ab), bc = v3_dot(ab, ac), cc = v3_dot(ac, ac), xb = v3_dot(ax, ab),
+                 xc = v3_dot(ax, ac), det = bb * cc - bc * bc;
     weight[1] = det > 0 ? (cc * xb - bc * xc) / det : bb > 0 ? xb / bb : 0;
     weight[2] = det > 0 ? (bb * xc - bc * xb) / det : 0;
     weight[0] = 1 - weight[1] - weight[2];
 }
 
-void sdm_fit_surface_derivatives(const fit_surface *s, uint32_t triangle, const double closest[3],
-                                 const double gradient[3], double *by)
+void sdm_fit_surface_derivatives(const fit_shape_surface *s, uint32_t triangle,
+                                 const double closest[3], const double gradient[3], double *by)
 {
     const uint32_t *t = s->mesh.tri + 3 * (size_t)sdm_exact_source(s->engine)[triangle];
     double weight[3];
@@ -74,7 +76,7 @@ static double area_normal(const double *vert, const uint32_t *t, double normal[3
     return v3_norm(normal);
 }
 
-void sdm_fit_surface_area(const fit_surface *s, double *area, double *gradient)
+void sdm_fit_surface_area(const fit_shape_surface *s, double *area, double *gradient)
 {
     const sdm_mesh *used = sdm_exact_surface(s->engine);
     const uint32_t *source = sdm_exact_source(s->engine);

@@ -128,7 +128,7 @@ void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, double bl
                           sdm_fit_verdict *v)
 {
     const double voxel = fit_longest_edge(&p->maps.grid);
-    if (p->opts->keep_params) return;
+    if (p->opts->keep_params || fit_maps_direct(&p->maps)) return;
     if (blur > 0 && voxel > VOXEL_OVER_BLUR_MAX * blur && blur < coarse.edge)
         coarse = (fit_coarseness){blur, "the point spread of the image"};
     sdm_fit_judge_add(v, SDM_FIT_CHECK_VOXELS, !isfinite(coarse.edge), SDM_FIT_DOUBTFUL, voxel,

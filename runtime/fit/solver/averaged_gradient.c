@@ -29,7 +29,8 @@ static double motion_at_points(const fit_samples *s, size_t k)
 {
     double sum = 0;
     for (size_t i = 0; i < s->n_band; i++)
-        sum += (double)s->jacobian[i * s->n_columns + k] * (double)s->jacobian[i * s->n_columns + k];
+        sum +=
+            (double)s->jacobian[i * s->n_columns + k] * (double)s->jacobian[i * s->n_columns + k];
     return s->n_band ? sum / (double)s->n_band : 0;
 }
 

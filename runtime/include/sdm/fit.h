@@ -65,7 +65,10 @@ typedef enum sdm_fit_kind {
        model takes them as shares of voxels (partial volume), or as labels with the logistic prior
      */
     SDM_FIT_LABEL = 1,
-    /* points[n_points][3] lie on the surface, in the world, mm; outliers are tolerated */
+    /* points[n_points][3] lie on the surface, in the world, mm; outliers are tolerated. With the
+       exact engine their distances are those from the surface of the shape, with a network those
+       on its map. The fit is made from the given start, then from the shape on whose surface the
+       points lie most evenly; the better one is kept */
     SDM_FIT_POINTS = 2
 } sdm_fit_kind;
 
@@ -432,8 +435,8 @@ typedef struct sdm_fit_result {
     double noise_factor;
     /* error near the surface of the maps of the last phase, mm: that of the network on held-out
        data, 0 for exact maps; with a label map and partial volume, also that of the voxels of the
-       labels (0.12 of one) and of the maps (0.03 of one); with points that of the maps (0.01 of
-       one). The covariance includes it. NaN as inside_share */
+       labels (0.12 of one) and of the maps (0.03 of one); with points and a network that of the
+       maps (0.01 of one). The covariance includes it. NaN as inside_share */
     double model_error_mm;
     /* partial volume: sd of the point spread, mm; other fits: 0 */
     double blur;

@@ -1,0 +1,262 @@
+/* Distances of points from the surface of a shape, without voxels: their derivatives and those of
+ * the area against differences, on the surface and on a map; and fits to points of a hollow shape,
+ * whose walls hold its ends at wrong places.
+ * Tests: shape_surface.c map_area.c even_points.c map_bias.c */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "ball_model.h"
+#include "fit/data/map_area.h"
+#include "oracle/fit_tools.h"
+
+#define PI 3.14159265358979324
+
+// ---- a cup: a tube with a bottom, and walls as thin as `wall`
+
+enum { HEIGHT, RADIUS, WALL, CUP_PARAMS };
+enum { AROUND = 32, ALONG = 20, CUP_RINGS = 2 * ALONG };
+
+static const sdm_param cup_params[CUP_PARAMS] = {{"height", "mm", 12, 30, 20, ""},
+                                                 {"radius", "mm", 3, 5, 4, ""},
+                                                 {"wall", "mm", 0.4, 1.2, 0.8, ""}};
+
+// radius and height of a ring: along the outside from the bottom up, then down the inside
+static void cup_ring(const double *p, int i, double *r, double *z)
+{
+    const double along = (double)(i % ALONG) / (ALONG - 1);
+    *r = i < ALONG ? p[RADIUS] : p[RADIUS] - p[WALL];
+    *z = i < ALONG ? p[HEIGHT] * along : p[HEIGHT] - (p[HEIGHT] - p[WALL]) * along;
+}
+
+static int cup_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    const int failed =
+        host->reserve(host, out, CUP_RINGS * AROUND + 2, (size_t)2 * CUP_RINGS * AROUND);
+    if (failed) return failed;
+    double *v = out->vert;
+    for (int i = 0; i < CUP_RINGS; i++)
+        for (int j = 0; j < AROUND; j++, v += 3) {
+            double r;
+            cup_ring(p, i, &r, &v[2]);
+            v[0] = r * cos(2 * PI * j / AROUND), v[1] = r * sin(2 * PI * j / AROUND);
+        }
+    const uint32_t below = CUP_RINGS * AROUND, above = below + 1, last = below - AROUND;
+    v[0] = v[1] = v[2] = v[3] = v[4] = 0, v[5] = p[WALL];
+    uint32_t *t = out->tri;
+    for (uint32_t j = 0; j < AROUND; j++) {
+        const uint32_t k = (j + 1) % AROUND, ends[] = {below, k, j, last + j, last + k, above};
+        memcpy(t, ends, sizeof ends);
+        t += 6;
+        for (uint32_t a = 0; a < last; a += AROUND, t += 6) {
+            const uint32_t b = a + AROUND, quad[] = {a + j, a + k, b + k, a + j, b + k, b + j};
+            memcpy(t, quad, sizeof quad);
+        }
+    }
+    return 0;
+}
+
+static const sdm_shape cup = {.abi = SDM_SHAPE_ABI,
+                              .size = sizeof(sdm_shape),
+                              .name = "cup",
+                              .summary = "a cup",
+                              .params = cup_params,
+                              .n_params = CUP_PARAMS,
+                              .mesh = cup_mesh};
+
+static sdm_instance *instance_of(const sdm_shape *shape)
+{
+    sdm_instance *out = NULL;
+    assert_int_equal(sdm_instance_create(shape, NULL, 0, NULL, &out, NULL), SDM_OK);
+    return out;
+}
+
+// ---- derivatives
+
+static fit_shape_surface surface_at(const sdm_instance *shape, const double *p)
+{
+    fit_shape_surface s = {0};
+    assert_int_equal(sdm_fit_surface_make(shape, p, true, NULL, &s, NULL), SDM_OK);
+    return s;
+}
+
+static void test_derivatives_of_distances(void **state)
+{
+    (void)state;
+    const double p[CUP_PARAMS] = {18, 4.2, 0.7}, e = 1e-5;
+    sdm_instance *shape = instance_of(&cup);
+    fit_shape_surface s = surface_at(shape, p);
+    for (uint64_t i = 0; i < 200; i++) {
+        double x[3], closest[3], gradient[3], by[CUP_PARAMS];
+        uint32_t triangle;
+        for (size_t a = 0; a < 3; a++)
+            x[a] = (a < 2 ? 12 : 24) * sdm_rng_uniform(11, a, i) - (a < 2 ? 6 : 3);
+        (void)sdm_exact_point(s.engine, x, closest, gradient, &triangle);
+        sdm_fit_surface_derivatives(&s, triangle, closest, gradient, by);
+        for (size_t k = 0; k < CUP_PARAMS; k++) {
+            double change = 0;
+            for (int side = -1; side <= 1; side += 2) {
+                double q[CUP_PARAMS];
+                memcpy(q, p, sizeof q);
+                q[k] += side * e;
+                fit_shape_surface other = surface_at(shape, q);
+                change += side * sdm_exact_point(other.engine, x, NULL, NULL, NULL) / (2 * e);
+                sdm_fit_surface_dispose(&other);
+            }
+            // a nearest point at an edge between triangles of one sheet changes sides: no kink
+            if (!(fabs(by[k] - change) < 1e-4))
+                fail_msg("point %d, parameter %zu: %g, by differences %g", (int)i, k, by[k],
+                         change);
+        }
+    }
+    sdm_fit_surface_dispose(&s);
+    sdm_instance_free(shape);
+}
+
+static void test_area_of_the_surface(void **state)
+{
+    (void)state;
+    const double p[CUP_PARAMS] = {18, 4.2, 0.7}, e = 1e-5, n = AROUND, around = 2 * n * sin(PI / n),
+                 disc = 0.5 * n * sin(2 * PI / n), r = p[RADIUS], q = r - p[WALL];
+    const double expected = around * (r * p[HEIGHT] + q * (p[HEIGHT] - p[WALL])) +
+                            disc * (r * r + (r * r - q * q) + q * q);
+    sdm_instance *shape = instance_of(&cup);
+    fit_shape_surface s = surface_at(shape, p);
+    double area, gradient[CUP_PARAMS];
+    sdm_fit_surface_area(&s, &area, gradient);
+    assert_true(fabs(area / expected - 1) < 1e-12);
+    for (size_t k = 0; k < CUP_PARAMS; k++) {
+        double change = 0;
+        for (int side = -1; side <= 1; side += 2) {
+            double at[CUP_PARAMS], other, ignored[CUP_PARAMS];
+            memcpy(at, p, sizeof at);
+            at[k] += side * e;
+            fit_shape_surface moved = surface_at(shape, at);
+            sdm_fit_surface_area(&moved, &other, ignored);
+            sdm_fit_surface_dispose(&moved);
+            change += side * other / (2 * e);
+        }
+        assert_true(fabs(gradient[k] - change) < 1e-4 * fabs(change));
+    }
+    sdm_fit_surface_dispose(&s);
+    sdm_instance_free(shape);
+}
+
+static void test_area_on_a_map(void **state)
+{
+    (void)state;
+    const sdm_grid grid = sdm_grid_centred((int64_t[3]){36, 36, 36}, 0.12, (double[3]){0, 0, 0});
+    const double p[2] = {1.4, 0.3}, r = ball_radius(p), area = 4 * PI * r * r;
+    sdm_instance *ball = instance_of(&ball_shape);
+    const sdm_fit_source source = {.shape = ball, .grid = grid};
+    const sdm_fit_opts o = sdm_fit_defaults();
+    fit_maps maps;
+    double found, gradient[2];
+    assert_int_equal(sdm_fit_maps_create(&source, false, &o, &maps, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_maps_make(&maps, p, true, NULL), SDM_OK);
+    sdm_fit_maps_area(&maps, &found, gradient);
+    assert_true(fabs(found / area - 1) < 0.01);
+    // d area / d r = 8 pi r; the second parameter is a tenth of a mm
+    assert_true(fabs(gradient[0] / (8 * PI * r) - 1) < 0.03);
+    assert_true(fabs(gradient[1] / (0.8 * PI * r) - 1) < 0.03);
+    sdm_fit_maps_dispose(&maps);
+    sdm_instance_free(ball);
+}
+
+// ---- fits
+
+enum { POINTS = 1500 };
+
+// points on the surface of a shape at p with errors of 0.03 mm; every stray-th lies anywhere near
+static double *points_on(const sdm_instance *shape, const double *p, size_t stray)
+{
+    sdm_mesh m = {0};
+    double *x = calloc((size_t)3 * POINTS, sizeof *x);
+    if (!x) abort();
+    assert_int_equal(sdm_instance_mesh(shape, p, &m, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_surface_points(&m, POINTS, 5, x, NULL), SDM_OK);
+    sdm_mesh_dispose(&m);
+    for (size_t i = 0; i < POINTS; i++)
+        for (size_t k = 0; k < 3; k++) {
+            x[3 * i + k] += 0.03 * sdm_rng_normal(23, k, i);
+            if (stray && i % stray == 0)
+                x[3 * i + k] = (k < 2 ? 12 : 24) * sdm_rng_uniform(22, k, i) - (k < 2 ? 6 : 3);
+        }
+    return x;
+}
+
+/* From one start of another height. The points of the rim, one in a hundred, lie beside the walls
+ * of a cup that is too high, and nothing else tells that it is. */
+static void test_ends_of_a_hollow_shape_are_found(void **state)
+{
+    (void)state;
+    const double truths[2][CUP_PARAMS] = {{17, 4.2, 0.7}, {24, 3.6, 0.9}};
+    sdm_instance *shape = instance_of(&cup);
+    for (size_t c = 0; c < 4; c++) {
+        const double *truth = truths[c / 2];
+        double *x = points_on(shape, truth, c % 2 ? 5 : 0);
+        const sdm_fit_source source = {
+            .shape = shape,
+            .grid = sdm_grid_centred((int64_t[3]){28, 28, 80}, 0.42, (double[3]){0, 0, 14})};
+        const sdm_fit_target target = {.kind = SDM_FIT_POINTS, .points = x, .n_points = POINTS};
+        sdm_fit_opts o = sdm_fit_defaults();
+        sdm_fit_result r;
+        sdm_error err = {0};
+        o.n_threads = 2;
+        if (sdm_fit(&source, &target, &o, &r, &err)) fail_msg("case %zu: %s", c, err.text);
+        for (size_t k = 0; k < CUP_PARAMS; k++) {
+            const double error = fabs(r.params[k] - truth[k]);
+            if (!(error < 4 * r.sd[k] && r.sd[k] < 0.04))
+                fail_msg("case %zu, %s: %g for %g, sd %g", c, cup_params[k].name, r.params[k],
+                         truth[k], r.sd[k]);
+        }
+        sdm_fit_dispose(&r);
+        free(x);
+    }
+    sdm_instance_free(shape);
+}
+
+/* A network has voxels: its deviations hold what they do to the estimate, and the search for the
+ * shape on whose surface points lie evenly takes the area from its map. */
+static void test_points_and_a_network(void **state)
+{
+    (void)state;
+    const sdm_grid grid = sdm_grid_centred((int64_t[3]){17, 17, 17}, 0.25, (double[3]){0, 0, 0});
+    const double p[2] = {1.3, 0};
+    sdm_instance *ball = instance_of(&ball_shape);
+    sdm_model *model = ball_model("bulge", &grid, NULL);
+    double *x = points_on(ball, p, 0);
+    const sdm_fit_source source = {.model = model};
+    const sdm_fit_target target = {.kind = SDM_FIT_POINTS, .points = x, .n_points = POINTS};
+    sdm_fit_opts o = sdm_fit_defaults();
+    sdm_fit_result r;
+    sdm_error err = {0};
+    const sdm_status s = sdm_fit(&source, &target, &o, &r, &err);
+    if (s && s != SDM_E_QUALITY) fail_msg("%s", err.text);
+    // radius and bulge are one unknown: only their sum is determined
+    assert_true(fabs(ball_radius(r.params) - 1.3) < 0.01);
+    sdm_fit_dispose(&r);
+    free(x);
+    sdm_model_free(model);
+    sdm_instance_free(ball);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_derivatives_of_distances),
+        cmocka_unit_test(test_area_of_the_surface),
+        cmocka_unit_test(test_area_on_a_map),
+        cmocka_unit_test(test_ends_of_a_hollow_shape_are_found),
+        cmocka_unit_test(test_points_and_a_network),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -18,6 +18,10 @@ static double contrast(const fit_problem *p)
     return fabs(p->opts->appearance.inside[0].mean - p->opts->appearance.outside[0].mean);
 }
 
+// smallest sd of points, over the reach of the shape: fewer points than unknowns may lie on it
+// exactly
+#define POINT_SD_LEAST 1e-5
+
 // the share of outliers stays where it can still change
 static double outliers_limit(double share) { return fmin(fmax(share, 1e-6), 0.9); }
 
@@ -87,7 +91,8 @@ static void points_update(fit_problem *p)
         sum += w * (dof + 1) / (dof + r * r) * r * r;
         n += w;
     }
-    p->state.point_sd *= sqrt(fmax(sum / fmax(n, 1), 1e-6));
+    p->state.point_sd = fmax(p->state.point_sd * sqrt(fmax(sum / fmax(n, 1), 1e-6)),
+                             POINT_SD_LEAST * p->extent.reach);
     p->state.outliers = outliers_limit(1 - n / (double)p->samples.n);
 }
 

@@ -45,7 +45,7 @@ void cli_print_audit(const sdm_part_audit *audit)
     const sdm_audit *a = &audit->mesh;
     printf("vertices             %zu\n", a->n_vert);
     printf("triangles            %zu\n", a->n_tri);
-    printf("parts                %zu\n", a->components);
+    printf("parts                %zu\n", audit->n);
     printf("closed               %s\n", a->closed ? "yes" : "no");
     printf("manifold             %s\n", a->manifold ? "yes" : "no");
     printf("inside out           %s\n", a->inverted ? "yes" : "no");
@@ -164,12 +164,21 @@ void cli_describe_open(const sdm_part_audit *a, sdm_text *text)
 void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
 {
     const sdm_part *p = &a->part[index];
+    if (p->volume > 0) {
+        size_t largest = 0;
+        for (size_t i = 1; i < a->n; i++)
+            if (a->part[i].volume < a->part[largest].volume) largest = i;
+        name_part(a, largest, text);
+        sdm_text_add(text,
+                     "is inside out and larger than the rest: maps turn the whole mesh, and ");
+        name_part(a, index, text);
+        sdm_text_add(text, "is subtracted from what it overlaps");
+        return;
+    }
     name_part(a, index, text);
-    if (p->volume > 0)
-        sdm_text_add(text, "runs the other way than the rest, which is inside out: ");
-    else
-        sdm_text_add(text, "is inside out%s: ", p->met ? " and overlaps another" : "");
-    sdm_text_add(text, "it is subtracted from what it overlaps and is not solid itself");
+    sdm_text_add(text,
+                 "is inside out%s: it is subtracted from what it overlaps and is not solid itself",
+                 p->met ? " and overlaps another" : "");
 }
 
 void cli_describe_thin(const sdm_part_audit *a, size_t index, double voxel, sdm_text *text)

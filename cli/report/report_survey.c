@@ -49,10 +49,11 @@ static bool make(const cli_survey *s, size_t index, sdm_mesh *mesh, sdm_error *e
 /* "in 3 of 145 shapes" */
 static void add_share(const cli_survey *s, const sdm_survey_count *c, sdm_text *text)
 {
-    if (c->shapes == s->found.n)
+    const size_t n = s->found.n - s->found.untested;
+    if (c->shapes == n)
         sdm_text_add(text, "in all %zu shapes", c->shapes);
     else
-        sdm_text_add(text, "in %zu of %zu shapes", c->shapes, s->found.n);
+        sdm_text_add(text, "in %zu of %zu shapes", c->shapes, n);
 }
 
 /* "WHAT in 3 of 145 shapes, up to 12 at a=1 b=2" */
@@ -125,9 +126,31 @@ static void tell_turned(teller *t)
     sdm_text text = {0};
     if (!c->shapes) return;
     add_count(t->s, c, "parts that are inside out and that the exact engine turns", &text);
-    const bool always = c->shapes == t->s->found.n;
+    const bool always = c->shapes == t->s->found.n - t->s->found.untested;
     if (!always) sdm_text_add(&text, ": at other parameters they are not");
     tell(t, always ? SDM_OK : SDM_E_QUALITY, &text);
+}
+
+/* Inner walls that pass through each other, and where they begin to. */
+static void tell_folded(teller *t)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    const sdm_survey_count *c = &f->folded;
+    const sdm_param *params = sdm_instance_params(t->s->shape, NULL);
+    sdm_text text = {0};
+    if (!c->shapes) return;
+    const double *p = f->p + c->worst * f->n_params;
+    sdm_text_add(&text, "walls pass through each other ");
+    add_share(t->s, c, &text);
+    sdm_text_add(&text, ": on the way from the default shape to ");
+    add_params(t->s, c->worst, SIZE_MAX, &text);
+    sdm_text_add(&text, " %.2g %% of the surface turns over, at about", 100 * c->amount);
+    for (size_t i = 0; i < f->n_params && i < PARAMS_TOLD; i++)
+        sdm_text_add(&text, " %s=%.3g", params[i].name, f->p[i] + f->folded_at * (p[i] - f->p[i]));
+    sdm_text_add(&text,
+                 "; is a wall thicker than the shape is wide? Narrow the ranges, or limit the "
+                 "wall in mesh()");
+    tell(t, SDM_E_QUALITY, &text);
 }
 
 static void tell_sizes(teller *t)
@@ -273,12 +296,14 @@ static void tell_params(teller *t)
     for (size_t k = 0; k < f->n_params; k++) {
         const char *unit = params[k].unit;
         sdm_text slow = {0}, other = {0};
-        // all parameters are slow if the vertices are in another unit: tell_unit() says so
+        // all parameters are slow if the vertices are in another unit: tell_unit() says so; one
+        // with a threshold moves vertices there alone: tell_jumps()
+        const bool jumps = f->jump && f->jump[k].kind != SDM_BREAK_NONE;
         if (f->speed[k] == 0) {
             sdm_text_add(&slow, "the parameter '%s' moves no vertex: does mesh() use it?",
                          params[k].name);
             tell(t, SDM_E_QUALITY, &slow);
-        } else if (sdm_survey_is_slow(f, t->s->shape, k) && !f->scale.odd_speed) {
+        } else if (sdm_survey_is_slow(f, t->s->shape, k) && !f->scale.odd_speed && !jumps) {
             sdm_text_add(&slow,
                          "1 mm of the parameter '%s' moves no vertex by more than %.2g mm: are the "
                          "vertices of a part in another unit than mm?",
@@ -343,8 +368,25 @@ static void tell_notes(teller *t)
         if (!n || (on_purpose && t->s->brief && n == f->n)) continue;
         add_count(t->s, notes[i].count, notes[i].what, &text);
         sdm_text_add(&text, "%s", notes[i].after);
+        // the first shape with overlaps is not the default shape
+        if (notes[i].count == &f->overlaps && f->overlaps_begin)
+            sdm_text_add(&text,
+                         "; the default shape has none: look at slices there (exact -o x.png)");
         tell(t, SDM_OK, &text);
     }
+}
+
+/* What was left out for want of time. */
+static void tell_untested(teller *t)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    sdm_text text = {0};
+    if (!f->untested && !f->lines_untested) return;
+    sdm_text_add(&text,
+                 "not tested for want of time: %zu of %zu shapes, %zu of %zu lines along a "
+                 "parameter; --samples N tests N random shapes, however long it takes",
+                 f->untested, f->n, f->lines_untested, f->lines);
+    tell(t, SDM_OK, &text);
 }
 
 sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user, sdm_error *err)
@@ -354,6 +396,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_open(&t);
     tell_inside_out(&t);
     tell_turned(&t);
+    tell_folded(&t);
     tell_sizes(&t);
     tell_jumps(&t);
     tell_unit(&t);
@@ -362,6 +405,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_thin(&t);
     tell_callbacks(&t);
     tell_notes(&t);
+    tell_untested(&t);
     return t.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the findings") : SDM_OK;
 }
 

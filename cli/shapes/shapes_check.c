@@ -10,6 +10,7 @@
 #include "inputs/setup.h"
 #include "report/files.h"
 #include "report/json_values.h"
+#include "report/progress_bar.h"
 #include "report/report_audit.h"
 #include "report/report_survey.h"
 #include "report/terminal.h"
@@ -18,7 +19,7 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
-enum { SAMPLES = 128, DRAWN = 9, TITLE_MAX = 200 };
+enum { SAMPLES = 128, SECONDS = 60, DRAWN = 9, TITLE_MAX = 200 };
 
 typedef struct check {
     const cli_args *args;
@@ -29,7 +30,14 @@ typedef struct check {
     double range[SDM_MAX_PARAMS][2];
     sdm_distribution distribution[SDM_MAX_PARAMS];
     sdm_survey_opts opts;
+    cli_progress bar;
 } check;
+
+static void show_progress(void *user, const char *what, double share)
+{
+    check *c = user;
+    cli_progress_show(&c->bar, what, share, NULL);
+}
 
 /* ---- the shape ---- */
 
@@ -68,7 +76,10 @@ static sdm_status open_shape(check *c, sdm_error *err)
     c->opts = (sdm_survey_opts){.samples = args->samples >= 0 ? (size_t)args->samples : SAMPLES,
                                 .seed = args->seed >= 0 ? (uint64_t)args->seed : 1,
                                 .n_threads = (int)args->threads,
-                                .cancelled = cli_interrupted};
+                                .seconds = args->samples >= 0 ? 0 : SECONDS,
+                                .cancelled = cli_interrupted,
+                                .progress = show_progress,
+                                .user = c};
     if (name && cli_ends_with_any(name, ".yaml .yml")) return open_config(c, err);
     if (args->files.n > 2)
         return sdm_fail(err, SDM_E_ARG, "shapes check: unexpected argument '%s'",
@@ -160,18 +171,12 @@ static sdm_status print_json(const check *c, sdm_error *err)
     const struct {
         const char *key;
         const sdm_survey_count *count;
-    } counts[] = {{"failed", &f->failed},
-                  {"open", &f->open},
-                  {"inside_out", &f->inside_out},
-                  {"turned", &f->turned},
-                  {"resized", &f->resized},
-                  {"rewired", &f->rewired},
-                  {"overlaps", &f->overlaps},
-                  {"degenerate", &f->degenerate},
-                  {"duplicate", &f->duplicate},
-                  {"cut", &f->cut},
-                  {"thin", &f->thin},
-                  {"apart", &f->apart}};
+    } counts[] = {
+        {"failed", &f->failed},       {"open", &f->open},         {"inside_out", &f->inside_out},
+        {"turned", &f->turned},       {"folded", &f->folded},     {"resized", &f->resized},
+        {"rewired", &f->rewired},     {"overlaps", &f->overlaps}, {"degenerate", &f->degenerate},
+        {"duplicate", &f->duplicate}, {"cut", &f->cut},           {"thin", &f->thin},
+        {"apart", &f->apart}};
     sdm_json j = {0};
     sdm_json_open(&j, NULL, '{');
     sdm_json_text(&j, "shape", sdm_instance_shape(c->survey.shape)->name);
@@ -179,6 +184,7 @@ static sdm_status print_json(const check *c, sdm_error *err)
     sdm_json_int(&j, "shapes", (int64_t)f->n);
     sdm_json_int(&j, "corners", (int64_t)f->n_corners);
     sdm_json_int(&j, "samples", (int64_t)f->n_samples);
+    sdm_json_int(&j, "untested", (int64_t)f->untested);
     sdm_json_int(&j, "vertices", (int64_t)f->n_vert);
     sdm_json_int(&j, "triangles", (int64_t)f->n_tri);
     sdm_json_real(&j, "ms_mesh", f->ms_mesh);
@@ -285,7 +291,9 @@ sdm_status cli_shapes_check(const cli_args *args, sdm_error *err)
     if (!s) s = cli_check_files(args, NULL, err);
     if (!s) s = open_shape(&c, err);
     c.survey.shape = c.shape;
+    cli_progress_start(&c.bar);
     if (!s) s = sdm_shape_survey_make(c.shape, &c.opts, &c.survey.found, err);
+    cli_progress_end(&c.bar, !s);
     if (!s) {
         s = args->json ? print_json(&c, err) : print_text(&c, err);
         for (size_t i = 0; i < args->outputs.n && !s; i++)

@@ -7,20 +7,27 @@ unfit=$plugins/unfit/unfit.so
 
 expect 0 - sdmgen shapes test "$plugins/good/octahedron.so" --samples 8
 has '^octahedron: the default shape, 2 corners of the ranges, 8 random shapes$'
-[ "$(grep -cE '^(passed|skipped|doubtful|failed) +[a-z]+ +.' out)" -eq 10 ] || bad "not ten tests: $(cat out)"
+[ "$(grep -cE '^(passed|skipped|doubtful|failed) +[a-z]+ +.' out)" -eq 11 ] || bad "not eleven tests: $(cat out)"
 has '^fine: the shape keeps the contract'
 expect 0 - sdmgen shapes test octahedron --plugin "$plugins/good/octahedron.so" --samples 8
 expect 0 - sdmgen shapes test torus --samples 8
 has '^skipped +outside'
-expect 4 '^sdmgen: error: unfit_jump: 1 of 10 tests failed: maps, derivatives or trainings would suffer$' \
+expect 4 '^sdmgen: error: unfit_jump: 1 of 11 tests failed: maps, derivatives or trainings would suffer$' \
     sdmgen shapes test unfit_jump --plugin "$unfit" --samples 8
 has '^failed +continuous vertex (8|9|1[0-5]) jumps by 0\.125 mm along size; at size=2\.0*[0-9]* reach=1\.[0-9]+$'
-expect 3 'unfit_open: 1 of 10 tests failed: meshes are broken' sdmgen shapes test unfit_open --plugin "$unfit" --samples 8 --json
+expect 3 'unfit_open: 1 of 11 tests failed: meshes are broken' sdmgen shapes test unfit_open --plugin "$unfit" --samples 8 --json
 has '^\{"shape": "unfit_open", "verdict": "broken", "corners": 4, "samples": 8, "tests": \[\{"test": "meshes", "outcome": "passed"'
 has '"test": "closed", "outcome": "failed", "figure": 3, "text": "[^"]*", "at": \{"size": '
 
+# vertices in metres: a hint, no failure
+sed 's/p\[RADIUS\]/p[RADIUS] \/ 1000/g' "$source_folder/examples/plugin/octahedron.c" >metres.c
+cc -shared -fPIC -I"$source_folder/framework/include" metres.c -o metres.so -lm || bad 'the plug-in metres.so was not built'
+expect 0 - sdmgen shapes test ./metres.so --samples 4
+has '^doubtful units +the shape is 0\.01 mm in size, 1 mm of .radius. moves its vertices by 0\.001 mm: are they in m\? Multiply them by 1000$'
+has '^fine: .*, with doubts$'
+
 # a shape that crashes is tested to the end
-expect 4 '1 of 10 tests failed' sdmgen shapes test picky --plugin "$unfit" --samples 8
+expect 4 '1 of 11 tests failed' sdmgen shapes test picky --plugin "$unfit" --samples 8
 has '^failed +options +with mode=abort: .*unfit\.so: mesh\(\): the plug-in called abort\(\)'
 
 expect 2 '^sdmgen: error: shapes test: --plugin has 12 shapes: name one' sdmgen shapes test "$unfit"

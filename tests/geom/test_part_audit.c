@@ -99,6 +99,54 @@ static void test_overlapping_parts(void **state)
     }
 }
 
+/* A body of 4 x 4 x 4 and a box of 1 x 4 x 4 beside it with which it shares an edge: two parts, of
+ * which one may be inside out. */
+static void test_parts_that_share_an_edge(void **state)
+{
+    (void)state;
+    for (int flip = 0; flip < 2; flip++) {
+        sdm_mesh m = {0}, plate = {0};
+        add_box(&m, 0, 4, 2, false);
+        mesh_box(&plate, (const double[3]){4, 2, -2}, (const double[3]){5, 6, 2});
+        if (flip) mesh_flip(&plate);
+        if (sdm_mesh_reserve(&m, 16, 24, &err)) fail_msg("%s", err.text);
+        memcpy(m.vert + 24, plate.vert, 24 * sizeof *m.vert);
+        for (size_t i = 0; i < 36; i++) m.tri[36 + i] = plate.tri[i] + 8;
+        sdm_part_audit a = audit_of(&m);
+        assert_int_equal(a.mesh.components, 1);
+        assert_int_equal(a.n, 2);
+        assert_true(a.part[0].met > 0 && a.part[1].met > 0);
+        near(a.part[1].volume, flip ? -16 : 16);
+        assert_int_equal(a.part[0].state, SDM_PART_SOLID);
+        assert_int_equal(a.part[1].state, flip ? SDM_PART_INSIDE_OUT : SDM_PART_SOLID);
+        assert_int_equal(a.inside_out, flip);
+        sdm_part_audit_dispose(&a);
+        size_t n;
+        assert_int_equal(sdm_mesh_turn_parts(&m, &n, &err), SDM_OK);
+        assert_int_equal(n, flip);
+        a = audit_of(&m);
+        near(a.mesh.volume, 80);
+        sdm_part_audit_dispose(&a);
+        sdm_mesh_dispose(&m);
+        sdm_mesh_dispose(&plate);
+    }
+}
+
+/* Two boxes side by side: their common face is there twice, and all its edges are shared. */
+static void test_boxes_with_a_common_face(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    add_box(&m, 0, 4, 2, false);
+    add_box(&m, 4, 6, 2, false); // the common face is there twice, once each way
+    sdm_part_audit a = audit_of(&m);
+    assert_int_equal(a.n, 2);
+    assert_int_equal(a.inside_out, 0);
+    near(a.union_volume, 96);
+    sdm_part_audit_dispose(&a);
+    sdm_mesh_dispose(&m);
+}
+
 /* A shell with a cavity, and a box beside it that is inside out: the engine turns the latter. */
 static void test_cavity_and_parts_apart(void **state)
 {
@@ -233,6 +281,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_overlapping_parts),
+        cmocka_unit_test(test_parts_that_share_an_edge),
+        cmocka_unit_test(test_boxes_with_a_common_face),
         cmocka_unit_test(test_cavity_and_parts_apart),
         cmocka_unit_test(test_open_and_flat_parts),
         cmocka_unit_test(test_thickness),

@@ -402,7 +402,13 @@ static void test_few_points_are_refused(void **state)
     assert_true(f->limit > 3 && f->limit <= 9);
     assert_non_null(strstr(err.text, "points on the surface cannot determine"));
     sdm_fit_dispose(&r);
-    (void)fit_to(few, 24, &r, &err);
+    (void)fit_to(few, 15, &r, &err);
+    f = finding(&r, SDM_FIT_CHECK_DATA);
+    assert_true(f->grade == SDM_FIT_DOUBTFUL && f->figure <= 15);
+    assert_true(f->limit > 15 && f->limit <= 27);
+    assert_non_null(strstr(f->text, "hardly determine"));
+    sdm_fit_dispose(&r);
+    (void)fit_to(x, n, &r, &err);
     assert_int_equal(finding(&r, SDM_FIT_CHECK_DATA)->grade, SDM_FIT_PASSED);
     sdm_fit_dispose(&r);
     free(x);

@@ -1,6 +1,6 @@
 /* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
  * known from the source; shapes without faults pass.
- * Tests: shape_survey.c survey_line.c survey_scale.c units.c */
+ * Tests: shape_survey.c survey_fold.c survey_line.c survey_scale.c units.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -186,6 +186,59 @@ static void breaks_along_a_parameter(void **state)
     }
 }
 
+// A parameter with a threshold moves vertices there alone: it does not `move no vertex`.
+static void a_step_moves_vertices(void **state)
+{
+    (void)state;
+    for (int brief = 0; brief < 2; brief++) {
+        sdm_shape_survey s = survey_with("step", &(sdm_survey_opts){.samples = 8, .brief = brief});
+        assert_true(s.speed[1] == 1);
+        if (!brief) assert_int_equal(s.jump[1].kind, SDM_BREAK_JUMP);
+        sdm_shape_survey_dispose(&s);
+    }
+}
+
+// The sides of the handle pass through each other at size 1.75; its volume stays positive.
+static void walls_that_pass_through_each_other(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("none");
+    assert_int_equal(s.folded.shapes, 0);
+    sdm_shape_survey_dispose(&s);
+    s = survey("wall");
+    assert_int_equal(s.inside_out.shapes, 0);
+    size_t small = 0;
+    for (size_t i = 0; i < s.n; i++) small += s.p[2 * i] < 1.75;
+    assert_true(s.folded.shapes >= 2 && s.folded.shapes <= small);
+    const double worst = s.p[2 * s.folded.worst];
+    assert_true(worst < 1.75 && s.folded.amount > 0.1);
+    assert_true(fabs(2.5 + s.folded_at * (worst - 2.5) - 1.75) < 0.1);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    sdm_shape_survey_dispose(&s);
+}
+
+static void count_calls(void *user, const char *what, double share)
+{
+    assert_true(share > 0 && share <= 1 && strlen(what) > 0);
+    ++*(size_t *)user;
+}
+
+static void time_is_short(void **state)
+{
+    (void)state;
+    size_t calls = 0;
+    sdm_shape_survey s = survey_with(
+        "none",
+        &(sdm_survey_opts){.samples = 8, .seconds = 1e-9, .progress = count_calls, .user = &calls});
+    // the first shape is always tested
+    assert_int_equal(s.untested, s.n - 1);
+    assert_true(s.lines > 0 && s.lines_untested == s.lines);
+    assert_true(s.failed.shapes == 0 && s.overlaps.shapes == 1);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_OK);
+    assert_true(calls >= s.n + s.lines);
+    sdm_shape_survey_dispose(&s);
+}
+
 static void callbacks(void **state)
 {
     (void)state;
@@ -322,6 +375,9 @@ int main(void)
         cmocka_unit_test(vertices_in_metres),
         cmocka_unit_test(a_part_in_metres),
         cmocka_unit_test(breaks_along_a_parameter),
+        cmocka_unit_test(a_step_moves_vertices),
+        cmocka_unit_test(walls_that_pass_through_each_other),
+        cmocka_unit_test(time_is_short),
         cmocka_unit_test(callbacks),
         cmocka_unit_test(a_grid_that_cuts),
         cmocka_unit_test(a_grid_that_is_too_coarse),

@@ -32,6 +32,40 @@ static bool same_triangle(const sdm_mesh *a, const sdm_mesh *b, size_t t)
     return !memcmp(a->tri + 3 * t, b->tri + 3 * t, 3 * sizeof *a->tri);
 }
 
+/* Joins the parts of an edge of more than two triangles that are not closed there by themselves: in
+ * which not as many triangles run one way as the other. */
+static void join_open_sides(const sdm_topology *topo, const sdm_edge *e, uint32_t *root)
+{
+    uint32_t open = NO_PART;
+    for (uint32_t h = e->first; h != SDM_NONE; h = topo->next[h]) {
+        const uint32_t part = sdm_forest_root(root, h / 3);
+        int balance = 0;
+        for (uint32_t g = e->first; g != SDM_NONE; g = topo->next[g])
+            if (sdm_forest_root(root, g / 3) == part)
+                balance += topo->tri[g] == e->lo ? 1 : -1; // the corner at which g begins
+        if (!balance) continue;
+        if (open != NO_PART) sdm_forest_join(root, open, part);
+        open = part;
+    }
+}
+
+/* Finds the parts as sdm_topology_parts() does, but separates those that only share edges and are
+ * closed by themselves: a box on a plate may be inside out without the plate. */
+static void find_shells(const sdm_topology *topo, uint32_t *root)
+{
+    enum { CROWD = 64 }; // triangles of an edge that are looked at one by one
+    for (size_t t = 0; t < topo->n_tri; t++) root[t] = (uint32_t)t;
+    for (int shared = 0; shared < 2; shared++)
+        for (size_t i = 0; i < topo->n_edges; i++) {
+            const sdm_edge *e = &topo->edges[i];
+            const uint32_t n = e->n_up + e->n_down;
+            if ((n > 2 && n <= CROWD) != shared) continue;
+            if (shared) join_open_sides(topo, e, root);
+            for (uint32_t h = e->first; !shared && topo->next[h] != SDM_NONE; h = topo->next[h])
+                sdm_forest_join(root, h / 3, topo->next[h] / 3);
+        }
+}
+
 /* Numbers the parts and allocates them. */
 static sdm_status number_parts(job *j, sdm_error *err)
 {
@@ -40,9 +74,11 @@ static sdm_status number_parts(job *j, sdm_error *err)
     uint32_t *root = NULL;
     sdm_status s = SDM_ALLOC(&root, n_tri, "parts", err);
     if (!s) s = SDM_ALLOC(&j->part_of, n_tri, "parts", err);
-    if (!s) s = SDM_ALLOC(&a->part, j->survey.audit.components, "parts", err);
+    size_t n = 0;
+    if (!s) find_shells(&j->survey.topo, root);
+    for (size_t t = 0; t < n_tri && !s; t++) n += root[t] == t;
+    if (!s) s = SDM_ALLOC(&a->part, n, "parts", err);
     if (!s) {
-        sdm_topology_parts(&j->survey.topo, root);
         // the root is the lowest triangle of its part, so it comes first
         for (uint32_t t = 0; t < n_tri; t++) {
             const uint32_t r = sdm_forest_root(root, t);
@@ -106,6 +142,18 @@ static void measure_parts(job *j)
     }
 }
 
+/* Counts the triangles of edge e that lie beside those of another part. */
+static void count_shared_edge(job *j, const sdm_edge *e)
+{
+    const uint32_t *next = j->survey.topo.next, part = j->part_of[e->first / 3];
+    for (uint32_t h = next[e->first]; h != SDM_NONE; h = next[h]) {
+        const uint32_t other = j->part_of[h / 3];
+        if (other == part) continue;
+        j->out->part[part].met++;
+        j->out->part[other].met++;
+    }
+}
+
 /* Counts open edges and contacts between parts. */
 static void count_edges_and_contacts(job *j)
 {
@@ -113,6 +161,7 @@ static void count_edges_and_contacts(job *j)
     const sdm_contacts *contacts = &j->survey.contacts;
     for (size_t i = 0; i < topo->n_edges; i++) {
         const sdm_edge *e = &topo->edges[i];
+        if (e->n_up + e->n_down > 2) count_shared_edge(j, e);
         if (e->n_up == e->n_down) continue;
         sdm_part *p = &j->out->part[j->part_of[e->first / 3]];
         const double *lo = j->given->vert + 3 * (size_t)e->lo,

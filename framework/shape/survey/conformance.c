@@ -137,6 +137,34 @@ static void tell_continuous(tests *t)
     }
 }
 
+/* The size and the motion by the parameters. */
+static void tell_units(tests *t)
+{
+    const sdm_shape_survey *f = &t->found;
+    const sdm_survey_scale *c = &f->scale;
+    const sdm_param *params = t->instance->params;
+    if (f->failed.shapes == f->n) {
+        result(t, SDM_TEST_UNITS, SDM_TEST_SKIPPED, 0, "there is no mesh");
+        return;
+    }
+    sdm_text text = {0};
+    if (c->odd_size || c->odd_speed) {
+        sdm_text_add(&text, "the shape is %.3g mm in size", c->size);
+        if (c->odd_speed)
+            sdm_text_add(&text, ", 1 mm of '%s' moves its vertices by %.2g mm",
+                         params[c->param].name, c->speed);
+        if (c->unit)
+            sdm_text_add(&text, ": are they in %s? Multiply them by %g", c->unit, c->unit_mm);
+    }
+    for (size_t k = 0; k < f->n_params; k++)
+        if (f->speed[k] == 0)
+            sdm_text_add(&text, "%sthe parameter '%s' moves no vertex: does mesh() use it?",
+                         text.data ? "; " : "", params[k].name);
+    result(t, SDM_TEST_UNITS, text.data ? SDM_TEST_DOUBTFUL : SDM_TEST_PASSED, c->size, "%s",
+           text.data ? text.data : "the size fits to mm, every parameter moves vertices");
+    sdm_text_dispose(&text);
+}
+
 static void tell_velocity(tests *t)
 {
     const sdm_shape_survey *f = &t->found;
@@ -178,6 +206,7 @@ static sdm_status test_meshes(tests *t, sdm_error *err)
     tell_count(t, SDM_TEST_ORIENTED, turned && !f->inside_out.shapes ? &f->turned : &f->inside_out,
                "parts are inside out", "no part is inside out");
     tell_triangles(t);
+    tell_units(t);
     tell_continuous(t);
     tell_velocity(t);
     return SDM_OK;
@@ -343,11 +372,12 @@ sdm_status sdm_conformance_make(const sdm_instance *shape, const sdm_conformance
                                 sdm_conformance *out, sdm_error *err)
 {
     static const char *const names[SDM_N_TESTS] = {
-        [SDM_TEST_MESHES] = "meshes",         [SDM_TEST_CLOSED] = "closed",
-        [SDM_TEST_ORIENTED] = "oriented",     [SDM_TEST_TRIANGLES] = "triangles",
-        [SDM_TEST_CONTINUOUS] = "continuous", [SDM_TEST_VELOCITY] = "velocity",
-        [SDM_TEST_REPEATS] = "repeats",       [SDM_TEST_THREADS] = "threads",
-        [SDM_TEST_OUTSIDE] = "outside",       [SDM_TEST_OPTIONS] = "options"};
+        [SDM_TEST_MESHES] = "meshes",     [SDM_TEST_CLOSED] = "closed",
+        [SDM_TEST_ORIENTED] = "oriented", [SDM_TEST_TRIANGLES] = "triangles",
+        [SDM_TEST_UNITS] = "units",       [SDM_TEST_CONTINUOUS] = "continuous",
+        [SDM_TEST_VELOCITY] = "velocity", [SDM_TEST_REPEATS] = "repeats",
+        [SDM_TEST_THREADS] = "threads",   [SDM_TEST_OUTSIDE] = "outside",
+        [SDM_TEST_OPTIONS] = "options"};
     memset(out, 0, sizeof *out);
     for (int i = 0; i < SDM_N_TESTS; i++) out->test[i].name = names[i];
     tests t = {.instance = shape, .opts = opts, .out = out};

@@ -12,14 +12,23 @@
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/threads.h"
 #include "sdm/memory.h"
+#include "survey_fold.h"
 #include "survey_line.h"
 #include "survey_scale.h"
 
-enum { LINES_PER_PARAM = 4, LINES_MAX = 64, VELOCITIES = 4, REPEATS = 8, BOX_SAMPLES = 64 };
+enum {
+    LINES_PER_PARAM = 4,
+    LINES_MAX = 64,
+    FOLD_SAMPLES = 32,
+    VELOCITIES = 4,
+    REPEATS = 8,
+    BOX_SAMPLES = 64
+};
 
 /* What is known about one shape. */
 typedef struct finding {
     sdm_status status;
+    bool untested; /* for want of time; the status is then SDM_E_CANCELLED */
     size_t n_vert, n_tri;
     uint64_t crc_vert, crc_tri;
     size_t open, inside_out, turned, apart, overlaps, degenerate, duplicate;
@@ -101,11 +110,21 @@ static bool is_cancelled(const sdm_survey_opts *o) { return o->cancelled && o->c
 /* A loop body: works on item i with a mesh of the thread. */
 typedef sdm_status survey_body(void *user, size_t i, sdm_mesh *mesh, sdm_error *err);
 
-/* Runs body(user, i) for i < n on several threads. The error of the lowest i that failed counts. */
-static sdm_status run(const sdm_survey_opts *opts, int n_threads, size_t n, survey_body *body,
-                      void *user, sdm_error *err)
+/* Reports that one more of n items is done. */
+static void report(const sdm_survey_opts *opts, const char *what, size_t *done, size_t n)
+{
+    if (!opts->progress || !what) return;
+#pragma omp critical(sdm_survey_progress)
+    opts->progress(opts->user, what, (double)++*done / (double)n);
+}
+
+/* Runs body(user, i) for i < n on several threads. The error of the lowest i that failed counts.
+ * what: the stage, for the progress; NULL: none. */
+static sdm_status run(const sdm_survey_opts *opts, int n_threads, const char *what, size_t n,
+                      survey_body *body, void *user, sdm_error *err)
 {
     sdm_status status = SDM_OK;
+    size_t done = 0;
 #pragma omp parallel num_threads(n_threads)
     {
         sdm_mesh mesh = {0};
@@ -119,6 +138,7 @@ static sdm_status run(const sdm_survey_opts *opts, int n_threads, size_t n, surv
             const sdm_status s = is_cancelled(opts)
                                      ? sdm_fail(&why, SDM_E_CANCELLED, "the survey was cancelled")
                                      : body(user, i, &mesh, &why);
+            if (!s) report(opts, what, &done, n);
             if (!s) continue;
 #pragma omp critical(sdm_survey)
             if (!status) {
@@ -134,16 +154,30 @@ static sdm_status run(const sdm_survey_opts *opts, int n_threads, size_t n, surv
 
 /* ---- all meshes ---- */
 
+/* A line through the ranges, along one parameter. */
+typedef struct followed {
+    sdm_survey_jump jump;
+    bool untested; /* for want of time */
+} followed;
+
 typedef struct survey {
     shape_family family;
     const sdm_survey_opts *opts;
     sdm_shape_survey *out;
-    finding *found;        /* [n] */
-    sdm_survey_jump *line; /* [n_lines] */
+    finding *found; /* [n] */
+    followed *line; /* [n_lines] */
     size_t n_lines;
-    bool *unlike; /* [REPEATS] */
-    double size;  /* diagonal of the box, mm */
+    survey_fold *fold; /* [1 + n_corners + FOLD_SAMPLES], by shape */
+    bool *unlike;      /* [REPEATS] */
+    double size;       /* diagonal of the box, mm */
+    double start;      /* time of the clock, s */
 } survey;
+
+/* Is `part` of the time over? */
+static bool is_late(const survey *v, double part)
+{
+    return v->opts->seconds > 0 && sdm_clock() - v->start > part * v->opts->seconds;
+}
 
 static const double *params_of(const survey *v, size_t i)
 {
@@ -153,6 +187,11 @@ static const double *params_of(const survey *v, size_t i)
 static sdm_status examine_one(void *user, size_t i, sdm_mesh *mesh, sdm_error *err)
 {
     survey *v = user;
+    if (i && is_late(v, 0.5)) {
+        v->found[i].untested = true;
+        v->found[i].status = SDM_E_CANCELLED;
+        return SDM_OK;
+    }
     return examine(v->family.shape, v->opts, params_of(v, i), mesh, &v->found[i], err);
 }
 
@@ -199,7 +238,8 @@ static void sum_up(survey *v)
     s->volume[0] = s->volume[1] = s->area[0] = s->area[1] = NAN;
     for (size_t i = 0; i < s->n; i++) {
         const finding *f = &v->found[i];
-        count(&s->failed, i, f->status != SDM_OK);
+        s->untested += f->untested;
+        count(&s->failed, i, f->status && !f->untested);
         if (f->status) continue;
         if (!first) {
             first = f;
@@ -226,6 +266,7 @@ static void sum_up(survey *v)
         count_beyond(s, i, f);
         if (v->opts->grid) count_thin(s, i, f->thick, sdm_grid_coarsest(v->opts->grid));
     }
+    s->overlaps_begin = s->overlaps.shapes && !v->found[0].status && !v->found[0].overlaps;
     double sum = 0;
     for (int a = 0; a < 3; a++) sum += (s->high[a] - s->low[a]) * (s->high[a] - s->low[a]);
     v->size = sqrt(sum);
@@ -233,16 +274,43 @@ static void sum_up(survey *v)
 
 /* ---- what a brief survey leaves out ---- */
 
+static sdm_status find_fold(void *user, size_t i, sdm_mesh *mesh, sdm_error *err)
+{
+    (void)mesh;
+    survey *v = user;
+    if (!i || v->found[i].status || is_late(v, 0.75)) return SDM_OK;
+    return sdm_survey_find_fold(&v->family, params_of(v, 0), params_of(v, i), v->size, &v->fold[i],
+                                err);
+}
+
+/* Looks for folds between the first shape and the corners and some samples. */
+static sdm_status find_folds(survey *v, int n_threads, sdm_error *err)
+{
+    sdm_shape_survey *s = v->out;
+    const size_t all = 1 + s->n_corners + FOLD_SAMPLES, n = s->n < all ? s->n : all;
+    sdm_status status = SDM_ALLOC(&v->fold, n, "folds", err);
+    if (!status) status = run(v->opts, n_threads, "folds", n, find_fold, v, err);
+    for (size_t i = 0; i < n && !status; i++) {
+        const survey_fold *fold = &v->fold[i];
+        if (!(fold->share > SDM_SURVEY_FOLD_MIN)) continue;
+        if (fold->share > s->folded.amount) s->folded_at = fold->at;
+        count(&s->folded, i, fold->share);
+    }
+    return status;
+}
+
 /* Line number i follows parameter i % n_params from a sample. */
 static sdm_status follow_one(void *user, size_t i, sdm_mesh *mesh, sdm_error *err)
 {
     (void)mesh;
     survey *v = user;
+    v->line[i].untested = is_late(v, 1);
+    if (v->line[i].untested) return SDM_OK;
     const size_t n = v->out->n_params,
                  shape = v->out->n - 1 - (i / n) % (v->out->n_samples ? v->out->n_samples : 1);
     const sdm_status s =
-        sdm_survey_line(&v->family, params_of(v, shape), i % n, v->size, &v->line[i], err);
-    v->line[i].shape = shape;
+        sdm_survey_line(&v->family, params_of(v, shape), i % n, v->size, &v->line[i].jump, err);
+    v->line[i].jump.shape = shape;
     return s;
 }
 
@@ -254,10 +322,12 @@ static sdm_status follow_lines(survey *v, int n_threads, sdm_error *err)
                                                  : LINES_PER_PARAM * n;
     sdm_status status = SDM_ALLOC(&s->jump, n, "jumps of the mesh", err);
     if (!status) status = SDM_ALLOC(&v->line, v->n_lines, "lines through the ranges", err);
-    if (!status) status = run(v->opts, n_threads, v->n_lines, follow_one, v, err);
+    if (!status) status = run(v->opts, n_threads, "lines", v->n_lines, follow_one, v, err);
+    s->lines = v->n_lines;
     for (size_t i = 0; i < v->n_lines && !status; i++) {
         sdm_survey_jump *worst = &s->jump[i % n];
-        const sdm_survey_jump *j = &v->line[i];
+        const sdm_survey_jump *j = &v->line[i].jump;
+        s->lines_untested += v->line[i].untested;
         // a change of sizes or triangles counts more than a jump
         if (j->kind > worst->kind || (j->kind == worst->kind && j->mm > worst->mm)) *worst = *j;
     }
@@ -344,7 +414,7 @@ static sdm_status repeat(survey *v, int n_threads, sdm_error *err)
         ms[i] = 1e3 * (sdm_clock() - start);
     }
     sdm_mesh_dispose(&mesh);
-    if (!s) s = run(v->opts, n_threads > 1 ? n_threads : 2, n, repeat_one, v, err);
+    if (!s) s = run(v->opts, n_threads > 1 ? n_threads : 2, NULL, n, repeat_one, v, err);
     if (s) return s;
     for (size_t i = 0; i < n; i++) v->out->unlike += v->unlike[i];
     qsort(ms, n, sizeof *ms, by_size);
@@ -378,22 +448,24 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
     static const sdm_survey_opts none = {0};
     if (!opts) opts = &none;
     *out = (sdm_shape_survey){0};
-    survey v = {.opts = opts, .out = out};
+    survey v = {.opts = opts, .out = out, .start = sdm_clock()};
     const int n_threads = sdm_threads(opts->n_threads);
     sdm_status s = opts->grid ? sdm_grid_check(opts->grid, err) : SDM_OK;
     if (!s) s = sdm_family_set(&v.family, shape, opts->range, opts->distribution, opts->seed, err);
     if (!s) s = choose(&v.family, opts, out, err);
     if (!s) s = SDM_ALLOC(&v.found, out->n, "findings of a survey", err);
-    if (!s) s = run(opts, n_threads, out->n, examine_one, &v, err);
+    if (!s) s = run(opts, n_threads, "shapes", out->n, examine_one, &v, err);
     if (!s) sum_up(&v);
-    if (!s && !opts->brief && out->failed.shapes < out->n) {
-        s = follow_lines(&v, n_threads, err);
+    if (!s && !opts->brief && out->failed.shapes < out->n - out->untested) {
+        s = find_folds(&v, n_threads, err);
+        if (!s) s = follow_lines(&v, n_threads, err);
         if (!s) s = compare_velocities(&v, err);
         if (!s) s = repeat(&v, n_threads, err);
-        if (!s) s = widen_box(&v, err);
+        if (!s && !is_late(&v, 1)) s = widen_box(&v, err);
     }
     if (!s) s = sdm_survey_measure_scale(&v.family, out, err);
     sdm_free(v.found);
+    sdm_free(v.fold);
     sdm_free(v.line);
     sdm_free(v.unlike);
     if (s) sdm_shape_survey_dispose(out);
@@ -424,9 +496,10 @@ size_t sdm_survey_samples(const sdm_instance *shape, size_t samples)
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
 {
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
-    bool bad = s->inside_out.shapes || (s->turned.shapes && s->turned.shapes < s->n) ||
-               s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->thin.shapes ||
-               s->unlike || s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
+    bool bad = s->inside_out.shapes || s->folded.shapes ||
+               (s->turned.shapes && s->turned.shapes < s->n - s->untested) || s->resized.shapes ||
+               s->rewired.shapes || s->cut.shapes || s->thin.shapes || s->unlike ||
+               s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
                s->scale.odd_speed || s->scale.odd_angle;
     for (size_t k = 0; k < s->n_params && s->jump; k++)
         bad = bad || s->jump[k].kind != SDM_BREAK_NONE;

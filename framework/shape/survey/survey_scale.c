@@ -27,17 +27,17 @@ bool sdm_survey_is_slow(const sdm_shape_survey *s, const sdm_instance *shape, si
     return s->speed[k] == 0 || (is_length(shape, k) && s->speed[k] < SDM_SURVEY_SPEED_SLOW);
 }
 
-/* *speed = how far a vertex moves per unit of parameter k beside p[], at most; NaN: not known. */
-static sdm_status measure_speed(const shape_family *f, const double *p, size_t k,
-                                const sdm_mesh *here, sdm_mesh *there, double *speed,
+/* *speed = how far a vertex moves, at most, from the mesh `here` to the mesh with parameter k at
+ * `value` and the others as in p[], divided by `change`, that of the parameter; NaN: not known. */
+static sdm_status measure_speed(const shape_family *f, const double *p, size_t k, double value,
+                                double change, const sdm_mesh *here, sdm_mesh *there, double *speed,
                                 sdm_error *err)
 {
     double moved[SHAPE_PARAMS_MAX], square = 0;
-    const double step = STEP * (f->max[k] - f->min[k]);
     *speed = NAN;
     memcpy(moved, p, f->shape->n_params * sizeof *moved);
-    moved[k] += moved[k] + step <= f->max[k] ? step : -step;
-    if (!(step > 0)) return SDM_OK;
+    moved[k] = value;
+    if (!(change > 0)) return SDM_OK;
     const sdm_status s = sdm_instance_mesh(f->shape, moved, there, err);
     if (s || there->n_vert != here->n_vert) return s == SDM_E_NOMEM ? s : SDM_OK;
     for (size_t v = 0; v < here->n_vert; v++) {
@@ -46,8 +46,38 @@ static sdm_status measure_speed(const shape_family *f, const double *p, size_t k
             sum += (there->vert[i] - here->vert[i]) * (there->vert[i] - here->vert[i]);
         square = fmax(square, sum);
     }
-    *speed = sqrt(square) / fabs(moved[k] - p[k]);
+    *speed = sqrt(square) / change;
     return SDM_OK;
+}
+
+/* *speed = how far a vertex moves per unit of parameter k beside p[], whose mesh is `here`. */
+static sdm_status speed_beside(const shape_family *f, const double *p, size_t k,
+                               const sdm_mesh *here, sdm_mesh *there, double *speed, sdm_error *err)
+{
+    const double step = STEP * (f->max[k] - f->min[k]);
+    const double value = p[k] + (p[k] + step <= f->max[k] ? step : -step);
+    return measure_speed(f, p, k, value, fabs(value - p[k]), here, there, speed, err);
+}
+
+/* Measures parameter k again, which moves nothing beside the shapes so far: a parameter with a
+ * threshold moves vertices only there. The speed becomes the largest motion from the first shape to
+ * a quarter of the range, over the width of the range; NaN if the mesh gets other vertices. */
+static sdm_status measure_threshold(const shape_family *f, sdm_shape_survey *s, size_t k,
+                                    sdm_error *err)
+{
+    enum { QUARTERS = 4 };
+    sdm_mesh here = {0}, there = {0};
+    sdm_status status = sdm_instance_mesh(f->shape, s->p, &here, err);
+    for (int i = 0; i <= QUARTERS && !status; i++) {
+        const double width = f->max[k] - f->min[k], value = f->min[k] + width * i / QUARTERS;
+        double speed;
+        status = measure_speed(f, s->p, k, value, width, &here, &there, &speed, err);
+        if (!(speed * width <= 1e-9 * s->scale.size) && !(speed <= s->speed[k]))
+            s->speed[k] = speed;
+    }
+    sdm_mesh_dispose(&there);
+    sdm_mesh_dispose(&here);
+    return status == SDM_E_NOMEM ? status : SDM_OK;
 }
 
 /* Raises the speeds s->speed[] of the parameters that are slow so far by those beside shape
@@ -61,7 +91,7 @@ static sdm_status raise_speeds(const shape_family *f, sdm_shape_survey *s, size_
     for (size_t k = 0; k < s->n_params && !status; k++) {
         double speed;
         if (shape && !sdm_survey_is_slow(s, f->shape, k)) continue;
-        status = measure_speed(f, p, k, &here, &there, &speed, err);
+        status = speed_beside(f, p, k, &here, &there, &speed, err);
         if (speed * (f->max[k] - f->min[k]) <= 1e-9 * s->scale.size) speed = 0;
         s->speed[k] = fmax(s->speed[k], speed); // fmax() ignores NaN
     }
@@ -76,6 +106,8 @@ static sdm_status find_speed(const shape_family *f, sdm_shape_survey *s, sdm_err
     sdm_status status = SDM_OK;
     for (size_t i = 0; i <= SLOW_SAMPLES && i <= s->n_samples && !status; i++)
         status = raise_speeds(f, s, i ? s->n - i : 0, err);
+    for (size_t k = 0; k < s->n_params && !status; k++)
+        if (s->speed[k] == 0) status = measure_threshold(f, s, k, err);
     for (size_t k = 0; k < s->n_params; k++)
         if (is_length(f->shape, k) && isfinite(s->speed[k]) && !(s->speed[k] <= s->scale.speed))
             s->scale.speed = s->speed[k], s->scale.param = k;
@@ -97,7 +129,7 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
         s->speed[k] = NAN;
         c->odd_angle = c->odd_angle || sdm_survey_is_odd_angle(&f->shape->params[k]);
     }
-    if (status || s->failed.shapes == s->n) return status;
+    if (status || s->failed.shapes == s->n - s->untested) return status;
     for (int a = 0; a < 3; a++) c->size = fmax(c->size, s->high[a] - s->low[a]);
     c->odd_size = c->size < SDM_SURVEY_SIZE_MIN || c->size > SDM_SURVEY_SIZE_MAX;
     status = find_speed(f, s, err);

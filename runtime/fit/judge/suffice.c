@@ -24,6 +24,9 @@
 // largest share of the surface with a shorter gradient
 #define DETAILS_MAX 0.1
 
+// points for each unknown that also test the fit: with fewer, most shapes pass close by all points
+#define POINTS_PER_UNKNOWN 3
+
 // largest number of rigid motions that leave a surface in place: the rotations of a ball
 #define SYMMETRIES_MAX 3
 
@@ -72,11 +75,18 @@ sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sd
     (void)sdm_fit_extent(&p->maps, &e, NULL);
     const sdm_status status = spread(p, &wide, err);
     if (status) return status;
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, n >= unknowns, SDM_FIT_FAILED, (double)n,
-                      (double)unknowns,
-                      "%zu points on the surface cannot determine %zu unknowns: give at least as "
-                      "many, or keep the parameters or the pose",
-                      n, unknowns);
+    if (n < unknowns)
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_FAILED, (double)n, (double)unknowns,
+                          "%zu points on the surface cannot determine %zu unknowns: give at least "
+                          "as many, or keep the parameters or the pose",
+                          n, unknowns);
+    else
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, n >= POINTS_PER_UNKNOWN * unknowns,
+                          SDM_FIT_DOUBTFUL, (double)n, (double)(POINTS_PER_UNKNOWN * unknowns),
+                          "%zu points on the surface hardly determine %zu unknowns: other shapes "
+                          "pass as close by them; give at least %zu points, or keep the parameters "
+                          "or the pose",
+                          n, unknowns, POINTS_PER_UNKNOWN * unknowns);
     sdm_fit_judge_add(v, SDM_FIT_CHECK_SIZE, wide >= SPREAD_MIN * e.reach, SDM_FIT_FAILED, wide,
                       SPREAD_MIN * e.reach,
                       "the points lie within %.2g mm of their middle, but the fitted shape reaches "

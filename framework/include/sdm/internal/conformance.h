@@ -22,6 +22,8 @@ enum {
     SDM_TEST_CLOSED,     /* every edge has as many triangles one way as the other */
     SDM_TEST_ORIENTED,   /* no part is inside out */
     SDM_TEST_TRIANGLES,  /* the same numbers and the same triangles everywhere */
+    SDM_TEST_UNITS, /* the size and the parameters look like mm; every parameter does something;
+                       doubtful at most */
     SDM_TEST_CONTINUOUS, /* small steps of a parameter move vertices by small amounts */
     SDM_TEST_VELOCITY,   /* velocity() is the derivative of mesh() */
     SDM_TEST_REPEATS,    /* the same call gives the same bits */

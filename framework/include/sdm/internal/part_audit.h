@@ -1,9 +1,10 @@
 /* The parts of a mesh: which way out each one is, what the exact engine makes of it, and the volume
  * of the solid that they form together.
  *
- * A part is a set of triangles connected by edges. The orientation follows from the signed volume:
- * positive when the triangles run counter-clockwise seen from outside. exact.h has the rules of the
- * engine; in short, a closed part that is inside out is
+ * A part is a set of triangles connected by edges; parts that are closed by themselves and share
+ * edges, such as a box on a plate with a common edge, are told apart. The orientation follows from
+ * the signed volume: positive when the triangles run counter-clockwise seen from outside. exact.h
+ * has the rules of the engine; in short, a closed part that is inside out is
  * - turned, if the mesh is closed and the part meets no other part and does not lie in a solid;
  * - a cavity, if it meets no other part and lies in a solid;
  * - not turned, if it meets another part or the mesh is open: it then subtracts its volume from the
@@ -31,9 +32,10 @@ typedef struct sdm_part {
     size_t first_vert, last_vert; /* lowest and highest index of a vertex */
     size_t
         open_edges; /* edges on which not as many triangles run in one direction as in the other */
-    double open_at[3];   /* middle of the first of them, mm */
-    size_t met;          /* pairs of a triangle of this part and a triangle of another that meet */
-    double volume, area; /* signed, mm^3, as given; mm^2 */
+    double open_at[3]; /* middle of the first of them, mm */
+    size_t met; /* pairs of a triangle of this part and a triangle of another that meet or share an
+                   edge */
+    double volume, area;   /* signed, mm^3, as given; mm^2 */
     double min[3], max[3]; /* bounding box, mm */
     bool turned;           /* the engine reverses its triangles, alone or with the whole mesh */
     sdm_part_state state;

@@ -21,8 +21,12 @@ typedef struct sdm_survey_opts {
     const sdm_grid *grid; /* NULL: nothing is compared with a grid */
     bool brief;           /* only meshes and their audits: no lines, velocities and repetitions */
     int n_threads;
+    double seconds; /* what has not begun after this time is left out; 0: no limit */
     /* called by any thread; true: the survey ends with SDM_E_CANCELLED. May be NULL. */
     bool (*cancelled)(void *user);
+    /* called by one thread at a time after each shape or line of a stage of the survey, of which
+     * `share` (0 .. 1) is done; `what`: "shapes", "folds" or "lines". May be NULL. */
+    void (*progress)(void *user, const char *what, double share);
     void *user;
 } sdm_survey_opts;
 
@@ -74,7 +78,9 @@ typedef struct sdm_shape_survey {
      * (all for at most 6 parameters, else 64 random ones in which normally distributed parameters
      * have random values; in a brief survey no more than samples), then the samples */
     size_t n, n_corners, n_samples;
-    double *p; /* [n][n_params] */
+    double *p;                    /* [n][n_params] */
+    size_t untested;              /* shapes left out for want of time; never the first one */
+    size_t lines, lines_untested; /* lines through the ranges, and those left out */
 
     /* the meshes: those that could not be made, and properties of the others */
     sdm_survey_count failed;
@@ -82,6 +88,7 @@ typedef struct sdm_shape_survey {
     sdm_survey_count inside_out; /* parts of state SDM_PART_INSIDE_OUT (part_audit.h) */
     sdm_survey_count turned;     /* parts that are inside out and that the exact engine turns */
     sdm_survey_count overlaps;   /* pairs of triangles that meet: the union counts */
+    bool overlaps_begin;         /* some shapes overlap themselves, but not shape 0 */
     sdm_survey_count degenerate, duplicate; /* triangles */
     size_t n_vert, n_tri;                   /* of the first mesh */
     sdm_survey_count resized;  /* other numbers of vertices or triangles; amount: of vertices */
@@ -106,6 +113,11 @@ typedef struct sdm_shape_survey {
                             of the grid; 0: not beyond */
 
     /* what a brief survey leaves out */
+    /* corners and the first samples in which triangles have turned over within a sixteenth of the
+     * straight way from shape 0: walls pass through each other; amount: the share of these
+     * triangles of the area, which is above SDM_SURVEY_FOLD_MIN */
+    sdm_survey_count folded;
+    double folded_at;      /* where on the way to the worst of them: 0 at shape 0, 1 at the worst */
     sdm_survey_jump *jump; /* [n_params] the worst break along each parameter */
     bool has_velocity;     /* the shape has a callback of this name */
     /* largest difference between the callback and differences of meshes, relative to the largest
@@ -117,9 +129,9 @@ typedef struct sdm_shape_survey {
     double ms_mesh; /* median time of a mesh, ms */
 } sdm_shape_survey;
 
-/* Surveys the shape. A mesh that cannot be made is a finding (`failed`), no error. The findings
- * depend neither on the number of threads nor on the time. SDM_E_RANGE: a range does not lie within
- * the shape's; SDM_E_NOMEM, SDM_E_CANCELLED. */
+/* Surveys the shape. A mesh that cannot be made is a finding (`failed`), no error. Without a limit
+ * of time the findings depend neither on the number of threads nor on the time. SDM_E_RANGE: a
+ * range does not lie within the shape's; SDM_E_NOMEM, SDM_E_CANCELLED. */
 sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opts *opts,
                                  sdm_shape_survey *out, sdm_error *err);
 void sdm_shape_survey_dispose(sdm_shape_survey *s);
@@ -130,11 +142,15 @@ size_t sdm_survey_samples(const sdm_instance *shape, size_t samples);
 
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
  * are usable, but a training or derivatives would suffer: parts that are inside out (at some of the
- * parameters also those that the engine turns), sizes, triangles or vertices that jump, a grid that
- * cuts or is too coarse for a part, wrong velocities, results that differ from call to call, or an
- * odd size or speed (another unit than mm, or a
+ * parameters also those that the engine turns), walls that pass through each other, sizes,
+ * triangles or vertices that jump, a grid that cuts or is too coarse for a part, wrong velocities,
+ * results that differ from call to call, or an odd size or speed (another unit than mm, or a
  * parameter that does nothing). Else SDM_OK. */
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
+
+/* A smaller share of the area may turn over: slivers at a tip, rings of a tube that bends sharply
+ * (at most 0.018 in the shape `duct`; an inner wall has 0.1 and more). */
+#define SDM_SURVEY_FOLD_MIN 0.04
 
 /* velocity_error above this is wrong. */
 #define SDM_SURVEY_VELOCITY_LIMIT 1e-3

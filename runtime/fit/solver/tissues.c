@@ -51,7 +51,7 @@ void sdm_fit_appearance_unpack(fit_problem *p, const double *x)
 {
     fit_state *s = &p->state;
     if (p->target->kind == SDM_FIT_POINTS) {
-        s->point_sd = exp(x[0]);
+        s->point_sd = fmax(exp(x[0]), POINT_SD_LEAST * p->extent.reach);
         s->outliers = outliers_limit(1 / (1 + exp(-x[1])));
     }
     for (size_t i = 0; i < p->observation.n_tissues; i++) {

@@ -17,17 +17,31 @@ bool sdm_field_leaves(const sdm_field *f, const sdm_grid *g)
     return false;
 }
 
-/* sdm_field_bound() for the voxels from .. to - 1 of row (j, k). */
-static void bound_part(const spline_grid *g, size_t j, size_t k, size_t from, size_t to,
-                       float *values, float *slopes)
+/* The square of the distance to the box in row (j, k) of a grid: (beyond^2 + first) + second with
+   the distance `beyond` along the row. These are the sums of field_square(), whichever axis of the
+   map the row is parallel to. */
+typedef struct row_square {
+    float first, second;
+} row_square;
+
+static row_square square_of_row(const spline_grid *g, size_t j, size_t k)
 {
     const spline_axis *axis = g->axis;
-    float beyond[3];
-    for (size_t i = from; i < to; i++) {
-        beyond[axis[0].axis] = axis[0].beyond[i];
-        beyond[axis[1].axis] = axis[1].beyond[j];
-        beyond[axis[2].axis] = axis[2].beyond[k];
-        const float bound = field_bound(values[i], field_square(beyond));
+    float square[3] = {0};
+    square[axis[1].axis] = axis[1].beyond[j] * axis[1].beyond[j];
+    square[axis[2].axis] = axis[2].beyond[k] * axis[2].beyond[k];
+    return axis[0].axis == 0   ? (row_square){square[1], square[2]}
+           : axis[0].axis == 1 ? (row_square){square[0], square[2]}
+                               : (row_square){square[0] + square[1], 0};
+}
+
+/* sdm_field_bound() for n voxels of a row. */
+static void bound_part(row_square row, size_t n, const float *restrict beyond,
+                       float *restrict values, float *restrict slopes)
+{
+    for (size_t i = 0; i < n; i++) {
+        const float bound =
+            field_bound(values[i], (beyond[i] * beyond[i] + row.first) + row.second);
         if (slopes)
             slopes[i] *= (values[i] > 0 ? values[i] : 0) / bound;
         else
@@ -47,9 +61,11 @@ void sdm_field_bound(const sdm_field *f, const spline_grid *g, float *values, fl
     for (size_t r = 0; r < rows; r++) {
         const size_t j = r % ny, k = r / ny;
         const bool whole = g->axis[1].beyond[j] > 0 || g->axis[2].beyond[k] > 0;
+        const row_square row = square_of_row(g, j, k);
+        const float *beyond = g->axis[0].beyond;
         float *to = values + r * nx, *by = slopes ? slopes + r * nx : NULL;
-        bound_part(g, j, k, 0, whole ? nx : first, to, by);
-        if (!whole) bound_part(g, j, k, last, nx, to, by);
+        bound_part(row, whole ? nx : first, beyond, to, by);
+        if (!whole) bound_part(row, nx - last, beyond + last, to + last, by ? by + last : NULL);
     }
 }
 

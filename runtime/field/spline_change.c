@@ -19,16 +19,51 @@ static size_t window_end(const spline_shape *s, int a, size_t b)
     return end < s->padded[a] ? end : s->padded[a];
 }
 
-/* most[i] = max(most[i], abs(c[i + step] - c[i])). */
-static void take_differences(const float *restrict c, const float *restrict next, size_t n,
-                             float *restrict most)
+/* from[WINDOW] = the planes or rows first .. end - 1 of `size` floats, the last one repeated: that
+   changes no maximum. */
+static void list_window(const float *c, size_t size, size_t first, size_t end,
+                        const float *from[WINDOW])
 {
-    for (size_t i = 0; i < n; i++) most[i] = larger(most[i], fabsf(next[i] - c[i]));
+    for (size_t k = 0; k < WINDOW; k++)
+        from[k] = c + (first + k < end ? first + k : end - 1) * size;
 }
 
-static void take_largest(const float *restrict from, size_t n, float *restrict most)
+_Static_assert(WINDOW == 5, "the loops name the planes or rows of a window");
+
+/* most[n] = the largest difference of coefficients `step` apart in the planes of a window. */
+static void take_differences(const float *const plane[WINDOW], size_t n, size_t step,
+                             float *restrict most)
 {
-    for (size_t i = 0; i < n; i++) most[i] = larger(most[i], from[i]);
+    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
+    for (size_t i = 0; i < n; i++) {
+        const float ab = larger(fabsf(a[i + step] - a[i]), fabsf(b[i + step] - b[i])),
+                    cd = larger(fabsf(c[i + step] - c[i]), fabsf(d[i + step] - d[i]));
+        most[i] = larger(larger(ab, cd), fabsf(e[i + step] - e[i]));
+    }
+}
+
+/* most[n] = the largest difference from plane to plane. */
+static void take_steps(const float *const plane[WINDOW], size_t n, float *restrict most)
+{
+    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
+    for (size_t i = 0; i < n; i++)
+        most[i] = larger(larger(fabsf(b[i] - a[i]), fabsf(c[i] - b[i])),
+                         larger(fabsf(d[i] - c[i]), fabsf(e[i] - d[i])));
+}
+
+/* most[n] = the largest of the rows of a window. */
+static void take_largest(const float *const row[WINDOW], size_t n, float *restrict most)
+{
+    const float *a = row[0], *b = row[1], *c = row[2], *d = row[3], *e = row[4];
+    for (size_t i = 0; i < n; i++)
+        most[i] = larger(larger(larger(a[i], b[i]), larger(c[i], d[i])), e[i]);
+}
+
+/* four[n] = the largest of row[i] .. row[i + 3]. */
+static void take_fours(const float *restrict row, size_t n, float *restrict four)
+{
+    for (size_t i = 0; i < n; i++)
+        four[i] = larger(larger(row[i], row[i + 1]), larger(row[i + 2], row[i + 3]));
 }
 
 /* plane[3][size of a plane] = the largest differences along x, y and z over the planes of layer b
@@ -36,43 +71,39 @@ static void take_largest(const float *restrict from, size_t n, float *restrict m
    are not used. */
 static void layer_differences(const spline_shape *s, const float *c, size_t b, float *plane)
 {
-    const size_t size = s->step[2], first = b * SPLINE_BRICK, end = window_end(s, 2, b);
-    memset(plane, 0, 3 * size * sizeof *plane);
-    for (size_t k = first; k < end; k++) {
-        const float *at = c + k * size;
-        take_differences(at, at + 1, size - 1, plane);
-        take_differences(at, at + s->step[1], size - s->step[1], plane + size);
-        if (k + 1 < end) take_differences(at, at + size, size, plane + 2 * size);
-    }
+    const size_t size = s->step[2], line = s->step[1];
+    const float *window[WINDOW];
+    list_window(c, size, b * SPLINE_BRICK, window_end(s, 2, b), window);
+    take_differences(window, size - 1, 1, plane);
+    take_differences(window, size - line, line, plane + size);
+    take_steps(window, size, plane + 2 * size);
 }
 
-/* The bound of brick (i, j) of a layer; row[3][padded x]: the largest differences over its rows. */
-static float brick_bound(const spline_shape *s, const double reach[3], const float *row, size_t i)
-{
-    double sum = 0;
-    for (int a = 0; a < 3; a++) {
-        const size_t end = window_end(s, 0, i) - (a == 0);
-        float most = 0;
-        for (size_t x = i * SPLINE_BRICK; x < end; x++)
-            most = larger(most, row[(size_t)a * s->padded[0] + x]);
-        sum += (double)most * reach[a];
-    }
-    return (float)sum * (1 + 1e-5f); // covers roundings
-}
+/* Floats of a row, with zeros after its end for the windows of the last bricks. */
+static size_t row_size(const spline_shape *s) { return s->padded[0] + WINDOW; }
 
+/* The bounds of the bricks of layer b; row[6][row_size()]: memory, zeros at the ends of the rows.
+ */
 static void layer_bounds(const spline_shape *s, const double reach[3], const float *plane, size_t b,
                          float *row, spline_change *out)
 {
-    const size_t nx = s->padded[0], size = s->step[2];
-    float *to = out->max + b * out->n[0] * out->n[1];
+    const size_t nx = s->padded[0], size = s->step[2], next = row_size(s);
+    float *to = out->max + b * out->n[0] * out->n[1], *four = row + 3 * next;
     for (size_t j = 0; j < out->n[1]; j++) {
-        const size_t end = window_end(s, 1, j);
-        memset(row, 0, 3 * nx * sizeof *row);
-        for (size_t y = j * SPLINE_BRICK; y < end; y++)
-            for (size_t a = 0; a < 3; a++)
-                if (a != 1 || y + 1 < end)
-                    take_largest(plane + a * size + y * nx, nx, row + a * nx);
-        for (size_t i = 0; i < out->n[0]; i++) *to++ = brick_bound(s, reach, row, i);
+        for (size_t a = 0; a < 3; a++) {
+            const float *window[WINDOW];
+            list_window(plane + a * size, nx, j * SPLINE_BRICK, window_end(s, 1, j) - (a == 1),
+                        window);
+            take_largest(window, nx, row + a * next);
+            if (a == 0) row[nx - 1] = 0; // the last coefficient has no next one
+            take_fours(row + a * next, nx, four + a * next);
+        }
+        for (size_t x = 0; x < out->n[0] * SPLINE_BRICK; x += SPLINE_BRICK) {
+            double sum = (double)four[x] * reach[0];
+            for (size_t a = 1; a < 3; a++)
+                sum += (double)larger(four[a * next + x], row[a * next + x + 4]) * reach[a];
+            *to++ = (float)sum * (1 + 1e-5f); // covers roundings
+        }
     }
 }
 
@@ -81,8 +112,7 @@ sdm_status sdm_spline_change_create(const spline_shape *s, const double reach[3]
 {
     memset(out, 0, sizeof *out);
     for (int a = 0; a < 3; a++) out->n[a] = (s->padded[a] - 3 + SPLINE_BRICK - 1) / SPLINE_BRICK;
-    const size_t own = 3 * s->step[2] + 3 * s->padded[0],
-                 bricks = out->n[0] * out->n[1] * out->n[2];
+    const size_t own = 3 * s->step[2] + 6 * row_size(s), bricks = out->n[0] * out->n[1] * out->n[2];
     float *memory = NULL;
     sdm_status status = SDM_ALLOC(&out->max, bricks, "bounds on changes", err);
     if (!status)

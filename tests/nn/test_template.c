@@ -2,8 +2,8 @@
  * culling, grids of all kinds, the same bits for all instruction sets.
  * Tests: template_build.c template_carry.c template_forward.c template_kernels_avx2.c
  * template_kernels_avx512.c template_kernels_generic.c template_native.c template_pose.c
- * template_begin.c template_blocks.c template_corners.c template_far.c template_run.c
- * template_warp.c template_work.c */
+ * template_blocks.c template_corners.c template_far.c template_run.c template_warp.c
+ * template_work.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

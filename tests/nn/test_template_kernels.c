@@ -373,32 +373,6 @@ static void block_reproduces_cubic_functions_with_the_same_bits(void **state)
     }
 }
 
-static void displace_is_the_sum_with_the_same_bits(void **state)
-{
-    (void)state;
-    enum { LINE = 20, PLANE = 100, FLOATS = 3 * PLANE + 3 * LINE + 16 };
-    float *control = numbers(FLOATS, 90, -2, 2), *w = numbers(24, 91, -1, 1), first[4][4];
-    const float(*weights)[2][4] = (const float(*)[2][4])w;
-    tables[0]->displace(control, LINE, PLANE, weights, first);
-    for (int d = 0; d < 4; d++) // no derivative, by x, y, z
-        for (int c = 0; c < 4; c++) {
-            double sum = 0;
-            for (int i = 0; i < 64; i++) {
-                const int at[3] = {i % 4, i / 4 % 4, i / 16};
-                double term = (double)control[PLANE * at[2] + LINE * at[1] + 4 * at[0] + c];
-                for (int a = 0; a < 3; a++) term *= (double)weights[a][d == a + 1][at[a]];
-                sum += term;
-            }
-            assert_true(fabs((double)first[d][c] - sum) <= 1e-5);
-        }
-    for (size_t t = 1; t < n_tables; t++) {
-        float other[4][4];
-        tables[t]->displace(control, LINE, PLANE, weights, other);
-        assert_memory_equal(first, other, sizeof first);
-    }
-    free(control), free(w);
-}
-
 int main(void)
 {
     find_tables();
@@ -409,7 +383,6 @@ int main(void)
         cmocka_unit_test(normalise_is_the_formula_with_the_same_bits),
         cmocka_unit_test(expand_makes_splines_with_the_same_bits),
         cmocka_unit_test(block_reproduces_cubic_functions_with_the_same_bits),
-        cmocka_unit_test(displace_is_the_sum_with_the_same_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -229,21 +229,65 @@ static void sums_and_choices_are_the_formulas(void **state)
         }
     }
     const float slope[3] = {0.5f, -0.25f, 0.125f};
-    int32_t above = 0;
     float least = INFINITY;
-    for (size_t v = 0; v < 64; v++) {
-        above += 0.1f + (slope[0] * a[0][v] + (slope[1] * a[1][v] + slope[2] * a[2][v])) > b[0][v];
-        least = fminf(least, fabsf(b[1][v]));
-    }
-    assert_true(above > 8 && above < 56);
+    for (size_t v = 0; v < 64; v++) least = fminf(least, fabsf(b[1][v]));
     for (size_t t = 0; t < n_tables; t++) {
-        assert_int_equal(tables[t]->count_above(0.1f, slope, pa, b[0]), above);
         assert_true(tables[t]->least(b[1]) == least);
+        float lesser[64], plane[64], largest = -INFINITY;
+        memcpy(lesser, b[0], sizeof lesser);
+        lesser[5] = 0.25f;
+        const float first = a[0][5];
+        a[0][5] = NAN;
+        tables[t]->take_lesser(a[0], lesser);
+        a[0][5] = first;
+        for (size_t v = 0; v < 64; v++)
+            assert_true(lesser[v] == (v == 5 ? 0.25f : fminf(a[0][v], b[0][v])));
+        for (size_t v = 0; v < 64; v++) {
+            plane[v] = 0.1f + (slope[0] * (float)(v % 4) +
+                               (slope[1] * (float)(v / 4 % 4) + slope[2] * (float)(v / 16)));
+            largest = fmaxf(largest, b[0][v] - plane[v]);
+        }
+        assert_true(tables[t]->is_above(0.1f + 1.001f * largest, slope, b[0]));
+        assert_false(tables[t]->is_above(0.1f + 0.999f * largest, slope, b[0]));
+        for (size_t v = 0; v < 64; v++) { // wherever a voxel is not below
+            float values[64];
+            for (size_t i = 0; i < 64; i++) values[i] = plane[i] - (i == v ? 0.0f : 0.5f);
+            assert_false(tables[t]->is_above(0.1f, slope, values));
+        }
         for (size_t v = 0; v < 64; v++) { // wherever it lies
             float values[64];
             for (size_t i = 0; i < 64; i++) values[i] = i == v ? -0.5f : 1;
             assert_true(tables[t]->least(values) == 0.5f);
         }
+    }
+}
+
+static void lines_and_tangents_are_the_formulas(void **state)
+{
+    (void)state;
+    enum { POINTS = 21 };
+    static float rows[4][ROOM], line[ROOM], out[7 * POINTS], other[7 * POINTS];
+    const float by[3][3] = {{1, -0.5f, 0.25f}, {0.75f, 2, -1}, {-0.125f, 0.5f, 3}};
+    for (size_t k = 0; k < 4; k++) fill(rows[k], ROOM, 60 + k, -1, 1);
+    const float *const g[3] = {rows[1], rows[2], rows[3]};
+    for (size_t t = 0; t < n_tables; t++) {
+        for (size_t n = 1; n <= POINTS; n++) {
+            tables[t]->line(n, 0.1, -0.3, line);
+            for (size_t i = 0; i < n; i++) assert_true(line[i] == (float)(0.1 + -0.3 * (double)i));
+        }
+        memset(out, 0, sizeof out);
+        tables[t]->tangents(POINTS, rows[0], g, by, 7, out);
+        for (size_t i = 0; i < POINTS; i++) {
+            assert_true(out[7 * i] == rows[0][i]);
+            for (size_t a = 0; a < 3; a++) {
+                double expected = 0;
+                for (size_t b = 0; b < 3; b++) expected += (double)by[a][b] * (double)g[b][i];
+                assert_near((double)out[7 * i + 1 + a], expected, 1e-6);
+            }
+            for (size_t k = 4; k < 7; k++) assert_true(out[7 * i + k] == 0);
+        }
+        if (t == 0) memcpy(other, out, sizeof other);
+        assert_memory_equal(out, other, sizeof other);
     }
 }
 
@@ -284,6 +328,7 @@ int main(void)
         cmocka_unit_test(correction_has_these_slopes),
         cmocka_unit_test(factor_has_these_slopes),
         cmocka_unit_test(sums_and_choices_are_the_formulas),
+        cmocka_unit_test(lines_and_tangents_are_the_formulas),
         cmocka_unit_test(layers_are_combined),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

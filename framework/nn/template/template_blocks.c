@@ -7,36 +7,25 @@
 
 enum { BLOCK = SDM_TEMPLATE_STEP, VOXELS = SDM_TEMPLATE_BLOCK_VOXELS };
 
-// Half of the diagonal of a block, mm.
-static double block_radius(const sdm_grid *grid)
-{
-    double sum = 0;
-    for (int a = 0; a < 3; a++) {
-        const double half = 0.5 * (BLOCK - 1) * grid->spacing[a];
-        sum += half * half;
-    }
-    return sqrt(sum);
-}
-
 // The interpolation may change a distance by this much, mm.
 static double cull_slack(const template_work *w) { return 0.1 * w->grid->spacing[0]; }
 
-// value[64] = the distance to part c in a block; value may be row.value.
-static void part_values(template_work *w, size_t c, const template_block *b, float *value)
+// Returns the distances to part c in a block: value[64], or w->row.value.
+static const float *part_values(template_work *w, size_t c, const template_block *b, float *value)
 {
-    float far[VOXELS];
-    const float share = sdm_template_far(w, c, b, far);
-    if (share == 1) {
-        memcpy(value, far, sizeof far);
-        return;
-    }
+    const float share = sdm_template_far(w, c, b, value);
+    if (share == 1) return value;
     sdm_template_run(w, c, b);
-    if (share > 0) {
-        sdm_template_blend(share, far, w->row.value, value);
-        if (value == w->row.value) w->loaded = SIZE_MAX;
-    } else if (value != w->row.value) {
-        memcpy(value, w->row.value, sizeof far);
-    }
+    if (share == 0) return w->row.value;
+    sdm_template_blend(share, value, w->row.value, value);
+    return value;
+}
+
+// value[64] = the distances to part c in a block.
+static void first_values(template_work *w, size_t c, const template_block *b, float *value)
+{
+    const float *from = part_values(w, c, b, value);
+    if (from != value) memcpy(value, from, VOXELS * sizeof *value);
 }
 
 /* Centres. */
@@ -54,32 +43,32 @@ static double slope_bound(const template_work *w, size_t c)
     return sqrt(forward * back);
 }
 
-// w->centre of part c, which has no warp, in the row (y, z) of blocks.
-static void affine_centres(template_work *w, size_t c, size_t y, size_t z)
+// w->centre of part c, which has no warp.
+static void affine_centres(template_work *w, size_t c)
 {
-    const part_state *part = &w->part[c];
     const template_row *r = &w->row;
-    const size_t n_parts = w->k->n_parts, n = w->blocks[0];
+    const size_t n_parts = w->k->n_parts, n = w->blocks[0], all = w->blocks[1],
+                 most = sdm_template_max_rows(n);
     const double half = 0.5 * (BLOCK - 1);
-    float by[3][3];
-    sdm_template_row_points(
-        w, c, (const double[]){half, half + (double)(BLOCK * y), half + (double)(BLOCK * z)}, n,
-        by);
-    sdm_template_lookup(w, c, n);
-    if (!part->rigid) {
-        float metric[6];
-        sdm_template_metric(w->pose[c].inverse, metric);
-        for (int a = 0; a < 6; a++)
-            for (size_t x = 0; x < n; x++) r->metric[a][x] = metric[a];
-        sdm_template_kernels()->normalise(n, r->f, (const float *const *)r->g,
-                                          (const float *const *)r->metric, r->f);
-    }
-    float *out = w->centre + 4 * ((z * w->blocks[1] + y) * n * n_parts + c);
-    for (size_t x = 0; x < n; x++, out += 4 * n_parts) {
-        out[0] = r->f[x];
-        for (int a = 0; a < 3; a++)
-            out[1 + a] = by[a][0] * r->g[0][x] + by[a][1] * r->g[1][x] + by[a][2] * r->g[2][x];
-    }
+    float metric[6], *out = w->centre + 4 * c;
+    sdm_template_metric(w->pose[c].inverse, metric);
+    for (size_t z = 0; z < w->blocks[2]; z++)
+        for (size_t y = 0; y < all; y += most) {
+            const template_rows rows = {
+                .first = {half, half + (double)(BLOCK * y), half + (double)(BLOCK * z)},
+                .n = n,
+                .n_rows = all - y < most ? all - y : most};
+            const size_t count = n * rows.n_rows;
+            sdm_template_lookup_rows(w, c, &rows);
+            if (!w->part[c].rigid) {
+                for (int a = 0; a < 6; a++)
+                    for (size_t i = 0; i < count; i++) r->metric[a][i] = metric[a];
+                w->kernels->normalise(count, r->f, (const float *const *)r->g,
+                                      (const float *const *)r->metric, r->f);
+            }
+            sdm_template_tangents(w, c, count, 1, 4 * n_parts, out);
+            out += 4 * n_parts * count;
+        }
 }
 
 // The same for a part with a warp: the mean of the corners.
@@ -94,17 +83,14 @@ static void warped_centres(template_work *w, size_t c)
     } while (sdm_template_next_block(w, &b));
 }
 
-void sdm_template_centres(template_work *w)
+void sdm_template_centres(template_work *w, size_t c)
 {
-    for (size_t c = 0; c < w->k->n_parts; c++) {
-        if (w->part[c].warped) {
-            warped_centres(w, c);
-            continue;
-        }
-        w->part[c].slope = slope_bound(w, c);
-        for (size_t z = 0; z < w->blocks[2]; z++)
-            for (size_t y = 0; y < w->blocks[1]; y++) affine_centres(w, c, y, z);
+    if (w->part[c].warped) {
+        warped_centres(w, c);
+        return;
     }
+    w->part[c].slope = slope_bound(w, c);
+    affine_centres(w, c);
 }
 
 // True if the distance to part c is at least value[] in all voxels of a block, by a lower bound. It
@@ -126,8 +112,7 @@ static bool is_behind(const template_work *w, size_t c, const template_block *b,
         memset(slope, 0, sizeof slope);
     }
     for (int a = 0; a < 3; a++) base -= slope[a] * 0.5f * (float)(BLOCK - 1);
-    return sdm_template_kernels()->count_above(base, slope, (const float *const *)w->offset,
-                                               value) == VOXELS;
+    return w->kernels->is_above(base, slope, value);
 }
 
 // The part that is the nearest at the centre of a block.
@@ -145,26 +130,26 @@ void sdm_template_values(template_work *w, const template_block *b, float *value
     const size_t n_parts = w->k->n_parts;
     w->loaded = SIZE_MAX;
     if (n_parts == 1) {
-        part_values(w, 0, b, value);
+        first_values(w, 0, b, value);
         if (nearest) memset(nearest, 0, VOXELS);
         return;
     }
     const size_t first = nearest_part(w, b);
     const float *centre = w->centre + 4 * b->number * n_parts;
     // no voxel is nearer to a rigid part that is at least this far from the centre
-    const double radius = block_radius(w->grid);
+    const double radius = w->block_radius;
     const float far =
         w->part[first].rigid ? centre[4 * first] + (float)(2 * radius + cull_slack(w)) : INFINITY;
-    part_values(w, first, b, value);
+    first_values(w, first, b, value);
     if (nearest) memset(nearest, (int)first, VOXELS);
     for (size_t c = 0; c < n_parts; c++) {
         if (c == first || (centre[4 * c] > far && w->part[c].rigid) ||
             is_behind(w, c, b, radius, value))
             continue;
-        const float *other = w->row.value;
-        part_values(w, c, b, w->row.value);
+        float interpolated[VOXELS];
+        const float *other = part_values(w, c, b, interpolated);
         for (size_t v = 0; v < VOXELS && nearest; v++)
             if (other[v] < value[v]) nearest[v] = (uint8_t)c;
-        for (size_t v = 0; v < VOXELS; v++) value[v] = other[v] < value[v] ? other[v] : value[v];
+        w->kernels->take_lesser(other, value);
     }
 }

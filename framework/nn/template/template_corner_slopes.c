@@ -9,7 +9,7 @@ static void load_stations(const template_work *w, size_t c, size_t first, size_t
     const warp_scratch *warp = &w->warp[c];
     const template_row *r = &w->row;
     for (size_t x = 0; x < n; x++) {
-        const station *s = &warp->station[first + x];
+        const template_station *s = &warp->station[first + x];
         for (int a = 0; a < 3; a++)
             r->u[a][x] = (float)((s->y[a] - near->origin[a]) / near->spacing);
         for (size_t a = 0; a < 6; a++) r->metric[a][x] = warp->metric[8 * (first + x) + a];

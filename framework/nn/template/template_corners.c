@@ -17,34 +17,36 @@ static bool is_in(const template_level *l, const float u[3])
     return in;
 }
 
-// Sets the distance at the corners of a row, the points row.u, to NAN outside of the lattice `far`.
-static void forget_outside(const template_work *w, size_t c, float *corner)
+// Sets the distance at the n corners of a row, the points at .. at + n - 1 of w->row, to NAN
+// outside of the lattice `far`.
+static void forget_outside(const template_work *w, size_t c, size_t at, size_t n, float *corner)
 {
     const template_level *far = &w->k->far[c];
-    const template_row *r = &w->row;
-    for (size_t x = 0; x <= w->blocks[0]; x++)
-        if (!is_in(far, (const float[]){r->u[0][x], r->u[1][x], r->u[2][x]})) corner[4 * x] = NAN;
+    float *const *u = w->row.u;
+    const size_t last = at + n - 1;
+    if (is_in(far, (const float[]){u[0][at], u[1][at], u[2][at]}) &&
+        is_in(far, (const float[]){u[0][last], u[1][last], u[2][last]}))
+        return;
+    for (size_t x = 0; x < n; x++)
+        if (!is_in(far, (const float[]){u[0][at + x], u[1][at + x], u[2][at + x]}))
+            corner[4 * x] = NAN;
 }
 
 /* Rigid parts: points on a regular lattice. */
 
-static void rigid_row(const template_work *w, size_t c, size_t y, size_t z, float *corner)
+static void rigid_corners(const template_work *w, size_t c, float *corner)
 {
-    const template_row *r = &w->row;
-    const size_t n = w->blocks[0] + 1;
-    float by[3][3];
-    sdm_template_row_points(w, c, (const double[]){0, (double)(BLOCK * y), (double)(BLOCK * z)}, n,
-                            by);
-    sdm_template_lookup(w, c, n);
-    for (size_t x = 0; x < n; x++) {
-        corner[4 * x] = r->f[x];
-        for (int a = 0; a < 3; a++)
-            corner[4 * x + 1 + (size_t)a] =
-                BLOCK * (by[a][0] * r->g[0][x] + by[a][1] * r->g[1][x] + by[a][2] * r->g[2][x]);
-    }
-    const float first[3] = {r->u[0][0], r->u[1][0], r->u[2][0]},
-                last[3] = {r->u[0][n - 1], r->u[1][n - 1], r->u[2][n - 1]};
-    if (!is_in(&w->k->far[c], first) || !is_in(&w->k->far[c], last)) forget_outside(w, c, corner);
+    const size_t n = w->blocks[0] + 1, all = w->blocks[1] + 1, most = sdm_template_max_rows(n);
+    for (size_t z = 0; z <= w->blocks[2]; z++)
+        for (size_t y = 0; y < all; y += most) {
+            const template_rows rows = {.first = {0, (double)(BLOCK * y), (double)(BLOCK * z)},
+                                        .n = n,
+                                        .n_rows = all - y < most ? all - y : most};
+            sdm_template_lookup_rows(w, c, &rows);
+            sdm_template_tangents(w, c, n * rows.n_rows, BLOCK, 4, corner);
+            for (size_t row = 0; row < rows.n_rows; row++, corner += 4 * n)
+                forget_outside(w, c, n * row, n, corner);
+        }
 }
 
 /* Parts with a warp: the corners are stations. The distance is f s + r with the template f, the
@@ -55,7 +57,7 @@ static void rigid_row(const template_work *w, size_t c, size_t y, size_t z, floa
 static void sample_row(template_work *w, size_t c, size_t first, size_t n)
 {
     const float *points = w->warp[c].points + 4 * first, *metric = w->warp[c].metric + 8 * first;
-    const template_table *t = sdm_template_kernels();
+    const template_table *t = w->kernels;
     const template_row *r = &w->row;
     float *out = w->warp[c].sample + SAMPLE_SIZE * first;
     for (size_t x = 0; x < n; x++) {
@@ -119,6 +121,5 @@ void sdm_template_corners(template_work *w, size_t c)
     if (w->part[c].warped)
         warped_corners(w, c, corner);
     else if (w->part[c].rigid)
-        for (size_t z = 0; z < planes; z++)
-            for (size_t y = 0; y < rows; y++, corner += 4 * line) rigid_row(w, c, y, z, corner);
+        rigid_corners(w, c, corner);
 }

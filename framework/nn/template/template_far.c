@@ -20,7 +20,7 @@ size_t sdm_template_corner_step(const template_work *w, size_t i)
 void sdm_template_interpolate(const template_work *w, const float *corner, float *value)
 {
     const size_t line = 4 * (w->blocks[0] + 1), plane = line * (w->blocks[1] + 1);
-    sdm_template_kernels()->block(corner, line, plane, value);
+    w->kernels->block(corner, line, plane, value);
 }
 
 // 1 / (longest edge of a voxel, mm)
@@ -42,12 +42,11 @@ static size_t least_voxel(const float *value)
 float sdm_template_far(const template_work *w, size_t c, const template_block *b, float *value)
 {
     const part_state *part = &w->part[c];
-    if (!part->warped && !(part->rigid && sdm_template_place(w, c, b) != TEMPLATE_WITHIN)) return 0;
+    if (!part->warped && !(part->rigid && !sdm_template_is_within(w, c, b))) return 0;
     sdm_template_interpolate(w, w->corner + 4 * sdm_template_corner_at(w, c, b), value);
     if (isnan(value[0])) return 0; // every value is a sum with terms of all corners
     if (part->rigid) return 1;
-    const float from = SDM_TEMPLATE_FAR_VOXELS,
-                least = sdm_template_kernels()->least(value) * voxels_per_mm(w);
+    const float from = SDM_TEMPLATE_FAR_VOXELS, least = w->kernels->least(value) * voxels_per_mm(w);
     return least <= from ? 0 : least >= from + 1 ? 1 : least - from;
 }
 

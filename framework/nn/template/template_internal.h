@@ -74,21 +74,15 @@ void sdm_template_metric_slope(const double b[9], const double db[9], float slop
    -m^-1 dm m^-1. */
 void sdm_template_inverse_slope(const part_pose *pose, const double dm[9], double out[9]);
 
-/* One station of a part with a warp. */
-typedef struct station {
-    double y[3];       /* carried point */
-    double inverse[9]; /* (I + dU/dy)^-1 at y */
-} station;
-
 /* Scratch memory of a warp for one map. */
 typedef struct warp_scratch {
     float *control; /* [nodes][4] */
     /* [stations][4] carried points as indices; after sdm_template_prefilter() coefficients of the
        B-splines through them */
     float *points;
-    float *metric;    /* [stations][8] */
-    float *sample;    /* [stations][8] samples, see template_work.h */
-    station *station; /* [stations]; NULL unless derivatives are wanted */
+    float *metric;             /* [stations][8] */
+    float *sample;             /* [stations][8] samples, see template_work.h */
+    template_station *station; /* [stations]; NULL unless derivatives are wanted */
 } warp_scratch;
 
 /* Fills points and metric (and station) of w for a part in `pose`, with the control of w. */

@@ -4,6 +4,7 @@
    each voxel. */
 #pragma once
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -41,6 +42,43 @@ typedef struct template_slope_rows {
     float *dr[3];
 } template_slope_rows;
 
+/* The warp of a part. */
+typedef struct template_warp {
+    const float
+        *control; /* [nz][ny][nx][4] displacements of the control points, the fourth 0; mm */
+    int32_t n[3]; /* fewer than 2^28 control points */
+    double origin[3], spacing;
+} template_warp;
+
+/* Where a point lies among the control points of a warp. */
+typedef struct template_place {
+    int32_t first;          /* float of the first of the 4 x 4 x 4 control points */
+    float weights[3][2][4]; /* along x, y, z, and their derivatives */
+} template_place;
+
+/* A voxel index at which a warp is inverted exactly. */
+typedef struct template_station {
+    double y[3];       /* carried point */
+    double inverse[9]; /* (I + dU/dy)^-1 at y */
+} template_station;
+
+/* Up to four lines of n stations each, one after the other: y + U(y) = first + i step for the
+   station i of a line. Lengths in mm. */
+typedef struct template_stations {
+    size_t n, n_lines;
+    double first[3][4], step[3][4]; /* of each line */
+    double frame[9];                /* inverse of the part's matrix m */
+    double origin[3], spacing;      /* of the lattice `near` */
+    size_t line, plane;             /* stations in a line, in a plane */
+    /* Input and output: y - (y + U(y)) of the first station of the line before, then of the last
+       line. */
+    double shift[3];
+    /* Output, by lines: y as an index, [4], after the lines before it; metric, [8]; the stations,
+       unless NULL. */
+    float *points, *metric;
+    template_station *station;
+} template_stations;
+
 typedef struct template_table {
     /* c[n_c][64] = combinations of stations in a block of 16 lines of four voxels: the first three
        by cubic B-splines of points[line][4 stations][4], the others linear in metric[line][2
@@ -72,21 +110,37 @@ typedef struct template_table {
                            float *const *out);
     /* sum[64] = a[0] b[0] + ... + a[n-1] b[n-1], n > 0 rows of 64 each. */
     void (*sum_products)(size_t n, const float *const *a, const float *const *b, float *sum);
-    /* How many of the 64 sums base + slope . offset[3][64] are larger than value[64]? */
-    int32_t (*count_above)(float base, const float slope[3], const float *const *offset,
-                           const float *value);
+    /* Is base + slope . (x, y, z) larger than value[z][y][x] for all x, y, z = 0 .. 3? */
+    bool (*is_above)(float base, const float slope[3], const float *value);
+    /* value[64] = the lesser of value and other[64]; where other is NAN, value. */
+    void (*take_lesser)(const float *other, float *value);
+    /* out[i] = first + i step for i = 0 .. n - 1, rounded once to a float; writes up to
+       SDM_TEMPLATE_LANES - 1 floats beyond. */
+    void (*line)(size_t n, double first, double step, float *out);
+    /* out[i stride .. i stride + 3] = f[i] and the three sums by[a] . g[i], i = 0 .. n - 1. */
+    void (*tangents)(size_t n, const float *f, const float *const *g, const float (*by)[3],
+                     size_t stride, float *out);
     /* The smallest of |value[64]|, none of which is NAN. */
     float (*least)(const float *value);
     /* value[4][4][4] = a function in a block of 4 x 4 x 4 voxels, cubic interpolation (Hermite)
        from its value and slopes by blocks at the eight corners, the voxels (0, 0, 0) .. (4, 4, 4):
        corner[x][4], and the same `line` floats further along y and `plane` floats along z. */
     void (*block)(const float *corner, size_t line, size_t plane, float *value);
-    /* sum[4][4] = the sums over 4 x 4 x 4 control points of their values (four floats) times
-       weights: products of weights[a][0] along the axes, and with weights[a][1] in place of
-       weights[a][0] for one axis a = 0, 1, 2. control: the first of them; the same `line` floats
-       further along y and `plane` floats along z. */
-    void (*displace)(const float *control, size_t line, size_t plane, const float (*weights)[2][4],
-                     float (*sum)[4]);
+    /* *place = where the point y[3] lies in a warp. Beyond the lattice the displacement is that of
+       the nearest point of the lattice. */
+    void (*find_place)(const template_warp *w, const double y[3], template_place *place);
+    /* sum[4][4] = the displacement (x, y, z, 0) of a warp at a place, and its derivatives by x, y
+       and z. */
+    void (*displace)(const template_warp *w, const template_place *place, float (*sum)[4]);
+    /* Inverts a warp at lines of stations by Newton's method. Stops when the next step would change
+       y by about the square of the last step. Where the warp folds (determinant near 0) it is
+       treated as the identity.
+       invert_line: one line. The starts make the second differences along y and z together vanish:
+       they do not depend on the stations before on the line.
+       invert_in_turn: the start of a station is the station before on the line, moved to first
+       order; that of the first one is y of the first one of the line before, moved. */
+    void (*invert_line)(const template_warp *w, template_stations *s);
+    void (*invert_in_turn)(const template_warp *w, template_stations *s);
 } template_table;
 
 extern const template_table sdm_template_generic;

@@ -278,14 +278,30 @@ static float least(const float *value)
     vec all = (vec)((veci)load(value) & magnitude);
     for (size_t v = VW; v < 64; v += VW)
         all = MIN_VEC((vec)((veci)load(value + v) & magnitude), all);
-    float each[VW], smallest = INFINITY;
-    store(each, all);
-    for (int i = 0; i < VW; i++) smallest = each[i] < smallest ? each[i] : smallest;
-    return smallest;
+    all = MIN_VEC(all, high_pairs(all, all));
+    all = MIN_VEC(all, spread(all, 1));
+    return VW == 8 && all[VW - 4] < all[0] ? all[VW - 4] : all[0];
+}
+
+static bool is_above(float base, const float slope[3], const float *value)
+{
+    static const float x[8] = {0, 1, 2, 3, 0, 1, 2, 3}, y[8] = {0, 0, 0, 0, 1, 1, 1, 1};
+    const vec by_x = splat(slope[0]) * load(x), by_y = splat(slope[1]);
+    veci above = splat_int(-1);
+    EACH(v, 64 / VW)
+    {
+        const int line = v * VW / 4;
+        const vec yz =
+            by_y * (splat((float)(line % 4)) + load(y)) + splat(slope[2] * (float)(line / 4));
+        above &= splat(base) + (by_x + yz) > load(value + v * VW);
+    }
+    int32_t each[VW], all = -1;
+    memcpy(each, &above, sizeof each);
+    for (int i = 0; i < VW; i++) all &= each[i];
+    return all;
 }
 
 // The compiler makes vectors of the loops of the next functions, of sixteen floats with AVX-512.
-// The counter is as wide as the floats that are compared.
 
 static void combine(const template_expansion *e, const float *points, const float *metric, size_t n,
                     size_t phase, float *out)
@@ -296,17 +312,6 @@ static void combine(const template_expansion *e, const float *points, const floa
     for (size_t i = 0; i < 4 * n; i++)
         out[i] = w[0] * p[i] + w[1] * p[4 * n + i] + w[2] * p[8 * n + i] + w[3] * p[12 * n + i];
     for (size_t i = 0; i < 8 * n; i++) out_metric[i] = g[i] + t * (g[8 * n + i] - g[i]);
-}
-
-static int32_t count_above(float base, const float slope[3], const float *const *offset,
-                           const float *value)
-{
-    int32_t count = 0;
-    for (size_t v = 0; v < 64; v++)
-        count +=
-            base + (slope[0] * offset[0][v] + (slope[1] * offset[1][v] + slope[2] * offset[2][v])) >
-            value[v];
-    return count;
 }
 
 static void normalise(size_t n, const float *f, const float *const *g, const float *const *metric,
@@ -320,6 +325,40 @@ static void normalise(size_t n, const float *f, const float *const *g, const flo
         const float q = x * x * xx + y * y * yy + z * z * zz +
                         2 * (y * z * metric[3][i] + x * z * metric[4][i] + x * y * metric[5][i]);
         out[i] = f[i] * sqrtf((x * x + y * y + z * z + e) / (q + e * t));
+    }
+}
+
+static void take_lesser(const float *other, float *value)
+{
+    for (size_t v = 0; v < 64; v += VW) store(value + v, MIN_VEC(load(other + v), load(value + v)));
+}
+
+static void line(size_t n, double first, double step, float *out)
+{
+    for (int32_t at = 0; at < (int32_t)n; at += SDM_TEMPLATE_LANES, out += SDM_TEMPLATE_LANES)
+        for (int32_t i = 0; i < SDM_TEMPLATE_LANES; i++) out[i] = (float)(first + step * (at + i));
+}
+
+static void tangents(size_t n, const float *f, const float *const *g, const float (*by)[3],
+                     size_t stride, float *out)
+{
+    for (size_t v = 0; v < n; v += VW) {
+        vec slope[3];
+        EACH(a, 3)
+        slope[a] = splat(by[a][0]) * load(g[0] + v) + splat(by[a][1]) * load(g[1] + v) +
+                   splat(by[a][2]) * load(g[2] + v);
+        const vec low[2] = {interleave_low(load(f + v), slope[0]),
+                            interleave_low(slope[1], slope[2])},
+                  high[2] = {interleave_high(load(f + v), slope[0]),
+                             interleave_high(slope[1], slope[2])};
+        float point[4][VW]; // points k, and with VW = 8 also k + 4
+        store(point[0], low_pairs(low[0], low[1]));
+        store(point[1], high_pairs(low[0], low[1]));
+        store(point[2], low_pairs(high[0], high[1]));
+        store(point[3], high_pairs(high[0], high[1]));
+        const size_t count = n - v < VW ? n - v : VW;
+        for (size_t i = 0; i < count; i++, out += stride)
+            memcpy(out, point[i % 4] + i / 4 * 4, 4 * sizeof *out);
     }
 }
 
@@ -426,64 +465,16 @@ static void block(const float *corner, size_t line, size_t plane, float *value)
     }
 }
 
-/* Control points of a line are PARTS vectors. Along x the first and third, the second and fourth
-   control point are summed first: with VW = 8 these are the halves of vectors. */
-#define PARTS (16 / VW)
-
-// to[4] = the sum along x with the weights w.
-static inline void sum_line(const vec line[PARTS], const vec w[PARTS], float *to)
-{
-#if VW == 8
-    vec two[2];
-    const vec sum = line[0] * w[0] + line[1] * w[1];
-    halves(sum, sum, two);
-    const vec all = two[0] + two[1];
-#else
-    const vec all = (line[0] * w[0] + line[2] * w[2]) + (line[1] * w[1] + line[3] * w[3]);
-#endif
-    memcpy(to, &all, 16);
-}
-
-static void displace(const float *control, size_t line, size_t plane, const float (*weights)[2][4],
-                     float (*sum)[4])
-{
-    vec f[PARTS], y[PARTS], z[PARTS]; // sums along y and z: no derivative, by y, by z
-    EACH(h, PARTS) f[h] = y[h] = z[h] = splat(0);
-    EACH(k, 4)
-    {
-        vec plain[PARTS], by_y[PARTS];
-        EACH(h, PARTS) plain[h] = by_y[h] = splat(0);
-        EACH(j, 4)
-        {
-            const float *from = control + (size_t)k * plane + (size_t)j * line;
-            EACH(h, PARTS)
-            {
-                const vec v = load(from + VW * h);
-                plain[h] += splat(weights[1][0][j]) * v;
-                by_y[h] += splat(weights[1][1][j]) * v;
-            }
-        }
-        EACH(h, PARTS)
-        {
-            f[h] += splat(weights[2][0][k]) * plain[h];
-            y[h] += splat(weights[2][0][k]) * by_y[h];
-            z[h] += splat(weights[2][1][k]) * plain[h];
-        }
-    }
-    vec x[2][PARTS];
-    EACH(d, 2) EACH(h, PARTS) x[d][h] = repeat_each(weights[0][d] + h * VW / 4);
-    sum_line(f, x[0], sum[0]);
-    sum_line(f, x[1], sum[1]);
-    sum_line(y, x[0], sum[2]);
-    sum_line(z, x[0], sum[3]);
-}
-
 #include "template_kernels_slopes.h"
+#include "template_kernels_warp.h"
 
 const template_table TABLE = {.expand = expand,
                               .lookup = lookup,
                               .combine = combine,
-                              .count_above = count_above,
+                              .is_above = is_above,
+                              .take_lesser = take_lesser,
+                              .line = line,
+                              .tangents = tangents,
                               .least = least,
                               .normalise = normalise,
                               .correct = correct,
@@ -492,4 +483,7 @@ const template_table TABLE = {.expand = expand,
                               .correct_slopes = correct_slopes,
                               .sum_products = sum_products,
                               .block = block,
-                              .displace = displace};
+                              .find_place = find_place,
+                              .displace = displace,
+                              .invert_line = invert_line,
+                              .invert_in_turn = invert_in_turn};

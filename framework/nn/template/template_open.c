@@ -141,7 +141,7 @@ static void expansion_set_up(template_network *k)
 static sdm_status check_stations(const sdm_model *m, sdm_error *err)
 {
     const template_network *k = m->network;
-    double bytes = sizeof(station) + 12 * sizeof(float) * (1 + (double)m->info.n_params);
+    double bytes = sizeof(template_station) + 12 * sizeof(float) * (1 + (double)m->info.n_params);
     for (int a = 0; a < 3; a++) bytes *= (double)k->stations[a];
     if (bytes * SDM_TEMPLATE_MAX_PARTS < (double)(SIZE_MAX / 4)) return SDM_OK;
     return sdm_fail(err, SDM_E_NOMEM, "the grid has more voxels than memory can hold");

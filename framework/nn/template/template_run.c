@@ -72,11 +72,12 @@ size_t sdm_template_count_near(const template_work *w, size_t c, size_t n)
 }
 
 // Looks up elements from .. to - 1 of row.u. The kernel writes a few elements beyond.
-static void lookup_range(const template_row *r, const template_level *l, size_t from, size_t to)
+static void lookup_range(const template_work *w, const template_level *l, size_t from, size_t to)
 {
+    const template_row *r = &w->row;
     const float *const u[3] = {r->u[0] + from, r->u[1] + from, r->u[2] + from};
     float *const g[3] = {r->g[0] + from, r->g[1] + from, r->g[2] + from};
-    if (to > from) sdm_template_kernels()->lookup(l, to - from, u, r->f + from, g);
+    if (to > from) w->kernels->lookup(l, to - from, u, r->f + from, g);
 }
 
 void sdm_template_lookup(const template_work *w, size_t c, size_t n)
@@ -92,13 +93,13 @@ void sdm_template_lookup(const template_work *w, size_t c, size_t n)
     while (last > first && !is_near(u, &end, last - 1)) last--;
     if (count == last - first) {
         // from left to right, because each call writes beyond its end
-        lookup_range(r, far, 0, first);
-        lookup_range(r, near, first, last);
-        lookup_range(r, far, last, n);
+        lookup_range(w, far, 0, first);
+        lookup_range(w, near, first, last);
+        lookup_range(w, far, last, n);
         return;
     }
-    lookup_range(r, near, 0, n);
-    sdm_template_kernels()->lookup(far, n, (const float *const *)u, r->far_f, r->far_g);
+    lookup_range(w, near, 0, n);
+    w->kernels->lookup(far, n, (const float *const *)u, r->far_f, r->far_g);
     for (size_t i = 0; i < n; i++) {
         if (is_near(u, &end, i)) continue;
         r->f[i] = r->far_f[i];
@@ -106,42 +107,96 @@ void sdm_template_lookup(const template_work *w, size_t c, size_t n)
     }
 }
 
-template_place sdm_template_place(const template_work *w, size_t c, const template_block *b)
+// The middle of a block along axis i of the lattice `near` of a part without a warp.
+static double block_middle(const part_state *part, const template_block *b, int i)
+{
+    double middle = part->from[i];
+    for (int a = 0; a < 3; a++)
+        middle += part->by[a][i] * ((double)(BLOCK * b->at[a]) + 0.5 * (BLOCK - 1));
+    return middle;
+}
+
+// The indices of a block in the row are rounded to floats: they are at most this far off.
+static const double ROUNDING = 1e-4;
+
+static bool is_within(double middle, double extent, double end)
+{
+    return middle - extent >= ROUNDING && middle + extent <= end - ROUNDING;
+}
+
+bool sdm_template_is_within(const template_work *w, size_t c, const template_block *b)
 {
     const part_state *part = &w->part[c];
-    const template_level *near = &w->k->near[c];
-    bool inside = true, outside = false;
+    for (int i = 0; i < 3; i++)
+        if (!is_within(block_middle(part, b, i), part->extent[i], w->k->near[c].n[i] - 1))
+            return false;
+    return true;
+}
+
+// The same for a block wholly beyond the lattice.
+static bool is_beyond(const template_work *w, size_t c, const template_block *b)
+{
+    const part_state *part = &w->part[c];
     for (int i = 0; i < 3; i++) {
-        // the middle of the block and its extent on both sides
-        const double half = 0.5 * (BLOCK - 1);
-        double middle = part->from[i], extent = 0;
-        for (int a = 0; a < 3; a++) {
-            middle += part->by[a][i] * ((double)(BLOCK * b->at[a]) + half);
-            extent += fabs(part->by[a][i]) * half;
-        }
-        // the indices in the row are rounded to floats
-        const double end = near->n[i] - 1, rounding = 1e-4;
-        inside &= middle - extent >= rounding && middle + extent <= end - rounding;
-        outside |= middle + extent < -rounding || middle - extent > end + rounding;
+        const double middle = block_middle(part, b, i), extent = part->extent[i],
+                     end = w->k->near[c].n[i] - 1;
+        if (middle + extent < -ROUNDING || middle - extent > end + ROUNDING) return true;
     }
-    return inside ? TEMPLATE_WITHIN : outside ? TEMPLATE_BEYOND : TEMPLATE_ACROSS;
+    return false;
 }
 
 /* Parts. */
 
-void sdm_template_row_points(const template_work *w, size_t c, const double first[3], size_t n,
-                             float by[3][3])
+size_t sdm_template_max_rows(size_t n)
+{
+    return n < SDM_TEMPLATE_ROWS_POINTS ? SDM_TEMPLATE_ROWS_POINTS / n : 1;
+}
+
+// Looks up the points at .. at + n - 1 of w->row, a line, that lie within the lattice `near`.
+static void lookup_line(const template_work *w, size_t c, size_t at, size_t n)
+{
+    const template_row *r = &w->row;
+    const lattice_end end = end_of_near(w, c);
+    size_t first = at, last = at + n;
+    for (int a = 0; a < 3; a++) {
+        const float from = r->u[a][first], to = r->u[a][last - 1];
+        if ((from < 0 && to < 0) || (from > end.at[a] && to > end.at[a])) return;
+    }
+    while (first < last && !is_near(r->u, &end, first)) first++;
+    while (last > first && !is_near(r->u, &end, last - 1)) last--;
+    if (first == last) return;
+    // by other rows, because the kernel writes beyond its end
+    const float *const u[3] = {r->u[0] + first, r->u[1] + first, r->u[2] + first};
+    w->kernels->lookup(&w->k->near[c], last - first, u, r->far_f, r->far_g);
+    memcpy(r->f + first, r->far_f, (last - first) * sizeof *r->f);
+    for (int a = 0; a < 3; a++) memcpy(r->g[a] + first, r->far_g[a], (last - first) * sizeof *r->f);
+}
+
+void sdm_template_lookup_rows(const template_work *w, size_t c, const template_rows *rows)
 {
     const part_state *part = &w->part[c];
-    for (int i = 0; i < 3; i++) {
-        double u = part->from[i];
-        for (int a = 0; a < 3; a++) {
-            u += part->by[a][i] * first[a];
-            by[a][i] = (float)(w->k->parts[c].near.spacing * part->by[a][i]);
+    const size_t n = rows->n;
+    for (size_t y = 0; y < rows->n_rows; y++)
+        for (int i = 0; i < 3; i++) {
+            const double at[3] = {rows->first[0], rows->first[1] + (double)(BLOCK * y),
+                                  rows->first[2]};
+            double u = part->from[i];
+            for (int a = 0; a < 3; a++) u += part->by[a][i] * at[a];
+            w->kernels->line(n, u, part->by[0][i] * BLOCK, w->row.u[i] + n * y);
         }
-        for (size_t x = 0; x < n; x++)
-            w->row.u[i][x] = (float)(u + part->by[0][i] * (double)(BLOCK * x));
-    }
+    lookup_range(w, &w->k->far[c], 0, n * rows->n_rows);
+    for (size_t y = 0; y < rows->n_rows; y++) lookup_line(w, c, n * y, n);
+}
+
+void sdm_template_tangents(const template_work *w, size_t c, size_t n, float step, size_t stride,
+                           float *out)
+{
+    const template_row *r = &w->row;
+    float by[3][3];
+    for (int a = 0; a < 3; a++)
+        for (int i = 0; i < 3; i++)
+            by[a][i] = step * (float)(w->k->parts[c].near.spacing * w->part[c].by[a][i]);
+    w->kernels->tangents(n, r->f, (const float *const *)r->g, (const float(*)[3])by, stride, out);
 }
 
 void sdm_template_affine(const template_work *w, const double from[3], const double by[3][3],
@@ -181,14 +236,15 @@ void sdm_template_run(template_work *w, size_t c, const template_block *b)
 {
     template_row *r = &w->row;
     const template_network *k = w->k;
-    const template_table *t = sdm_template_kernels();
-    const template_place where = w->part[c].warped ? TEMPLATE_ACROSS : sdm_template_place(w, c, b);
+    const template_table *t = w->kernels;
     sdm_template_points(w, c, b);
     w->loaded = c;
-    if (where == TEMPLATE_ACROSS)
-        sdm_template_lookup(w, c, VOXELS);
+    if (!w->part[c].warped && sdm_template_is_within(w, c, b))
+        lookup_range(w, &k->near[c], 0, VOXELS);
+    else if (!w->part[c].warped && is_beyond(w, c, b))
+        lookup_range(w, &k->far[c], 0, VOXELS);
     else
-        lookup_range(r, where == TEMPLATE_WITHIN ? &k->near[c] : &k->far[c], 0, VOXELS);
+        sdm_template_lookup(w, c, VOXELS);
     if (w->part[c].rigid)
         memcpy(r->value, r->f, VOXELS * sizeof *r->value);
     else

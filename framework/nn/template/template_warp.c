@@ -19,12 +19,23 @@ void sdm_template_control(const sdm_template_part *part, const double *a, float 
 {
     // first the three elements of all nodes one after the other, as in the modes
     const size_t n = sdm_lattice_count(&part->warp);
-    memset(control, 0, 4 * n * sizeof *control);
-    for (size_t m = 0; m < part->n_modes; m++) {
-        const float f = (float)a[m], *mode = part->modes + 3 * n * m;
-        if (f == 0) continue;
-        for (size_t i = 0; i < 3 * n; i++) control[i] += f * mode[i];
+    const float *mode[SDM_TEMPLATE_MAX_MODES];
+    float f[SDM_TEMPLATE_MAX_MODES];
+    size_t used = 0, m = 0;
+    for (size_t i = 0; i < part->n_modes; i++) {
+        if ((float)a[i] == 0) continue;
+        f[used] = (float)a[i];
+        mode[used++] = part->modes + 3 * n * i;
     }
+    memset(control, 0, 4 * n * sizeof *control);
+    for (; m + 4 <= used; m += 4) { // four modes for one pass over the sums
+        const float *const *v = mode + m, *w = f + m;
+        for (size_t i = 0; i < 3 * n; i++)
+            control[i] =
+                control[i] + w[0] * v[0][i] + w[1] * v[1][i] + w[2] * v[2][i] + w[3] * v[3][i];
+    }
+    for (; m < used; m++)
+        for (size_t i = 0; i < 3 * n; i++) control[i] += f[m] * mode[m][i];
     for (size_t i = n; i-- > 0;) {
         const float *from = control + 3 * i, node[4] = {from[0], from[1], from[2], 0};
         memcpy(control + 4 * i, node, sizeof node);
@@ -95,87 +106,13 @@ void sdm_template_displacement(const sdm_lattice *l, const float *control, const
     }
 }
 
-// weights[2][4] = those of the four control points around a coordinate and their derivatives.
-// Returns the index of the first control point.
-static size_t first_weights(double u, uint32_t n, float per_mm, float (*weights)[4])
+static template_warp warp_of(const sdm_template_part *part, const float *control)
 {
-    const bool inside = u >= 1 && u <= (double)n - 2;
-    u = u > 1 ? u : 1;
-    u = u < (double)n - 2 ? u : (double)n - 2;
-    size_t i = (size_t)u;
-    if (i > n - 3u) i = n - 3u;
-    const float t = (float)(u - (double)i), f = inside ? per_mm : 0;
-    const float a = 1.0f / 6, b = 2.0f / 3;
-    const quad w = (quad){a, b, a, 0} +
-                   t * ((quad){-0.5f, 0, 0.5f, 0} +
-                        t * ((quad){0.5f, -1, 0.5f, 0} + t * (quad){-a, 0.5f, -0.5f, a})),
-               d = (quad){-0.5f, 0, 0.5f, 0} +
-                   t * ((quad){1, -2, 1, 0} + t * (quad){-0.5f, 1.5f, -1.5f, 0.5f});
-    const quad slope = f * d;
-    memcpy(weights[0], &w, sizeof w);
-    memcpy(weights[1], &slope, sizeof slope);
-    return i - 1;
-}
-
-/* Where a point lies among the control points of a warp. */
-typedef struct warp_place {
-    size_t first;           /* float of the first of the 4 x 4 x 4 control points */
-    float weights[3][2][4]; /* along x, y, z, and their derivatives */
-} warp_place;
-
-static inline void find_place(const sdm_lattice *l, const double y[3], warp_place *p)
-{
-    const double per_mm = 1 / l->spacing;
-    size_t at[3];
-    for (int a = 0; a < 3; a++)
-        at[a] =
-            first_weights((y[a] - l->origin[a]) * per_mm, l->n[a], (float)per_mm, p->weights[a]);
-    p->first = 4 * (at[0] + l->n[0] * (at[1] + l->n[1] * at[2]));
-}
-
-// The same as sdm_template_displacement() without second derivatives, faster.
-static inline void displacement(const sdm_lattice *l, const float *control, const warp_place *p,
-                                double u[3], double du[9])
-{
-    const size_t line = 4 * (size_t)l->n[0], plane = line * l->n[1];
-    float sum[4][4];
-    sdm_template_kernels()->displace(control + p->first, line, plane,
-                                     (const float(*)[2][4])p->weights, sum);
-    for (int i = 0; i < 3; i++) {
-        u[i] = (double)sum[0][i];
-        for (int a = 0; a < 3; a++) du[3 * i + a] = (double)sum[1 + a][i];
-    }
-}
-
-// out[9] = (I + du)^-1. A warp that folds (determinant near 0) is treated as the identity.
-static void inverse_of_warp(const double du[9], double out[9])
-{
-    double a[9];
-    for (int i = 0; i < 9; i++) a[i] = du[i] + (i % 4 == 0);
-    const double det = m3_adjugate(a, out), factor = 1 / det;
-    for (int i = 0; i < 9; i++) out[i] = det > 1e-2 ? out[i] * factor : (double)(i % 4 == 0);
-}
-
-// Solves y + U(y) = q by Newton's method from y. Stops when the next step would change y by about
-// the square of the last step. inverse[9] = (I + dU)^-1 at the last point of evaluation.
-static void newton(const sdm_lattice *l, const float *control, const double q[3], double y[3],
-                   double inverse[9])
-{
-    enum { ITERATIONS = 12 };
-    const double stop = 0.005 * l->spacing, longest = 0.5 * l->spacing;
-    for (int n = 0; n < ITERATIONS; n++) {
-        double u[3], du[9], f[3], d[3];
-        warp_place place;
-        find_place(l, y, &place);
-        displacement(l, control, &place, u, du);
-        inverse_of_warp(du, inverse);
-        for (int i = 0; i < 3; i++) f[i] = q[i] - y[i] - u[i];
-        m3_apply(inverse, f, d);
-        const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-        const double scale = length > longest ? longest / length : 1;
-        for (int i = 0; i < 3; i++) y[i] += scale * d[i];
-        if (length < stop) return;
-    }
+    const sdm_lattice *l = &part->warp;
+    return (template_warp){.control = control,
+                           .n = {(int32_t)l->n[0], (int32_t)l->n[1], (int32_t)l->n[2]},
+                           .origin = {l->origin[0], l->origin[1], l->origin[2]},
+                           .spacing = l->spacing};
 }
 
 // Position of a station in the world.
@@ -216,7 +153,8 @@ void sdm_template_inverse_slope(const part_pose *pose, const double dm[9], doubl
     for (int i = 0; i < 9; i++) out[i] = -out[i];
 }
 
-void sdm_template_spline(float *v, size_t n, size_t stride, size_t width)
+// sdm_template_spline() for several arrays of samples, `gap` floats apart.
+static void splines(float *v, size_t n, size_t stride, size_t width, size_t arrays, size_t gap)
 {
     // (c[i-1] + 4 c[i] + c[i+1]) / 6 = v[i], c[0] = v[0], c[n-1] = v[n-1]: Thomas algorithm. Its
     // factors reach their limit, 2 - sqrt(3), within a few steps.
@@ -225,60 +163,37 @@ void sdm_template_spline(float *v, size_t n, size_t stride, size_t width)
     for (size_t i = 1; i < FACTORS; i++) factor[i] = 1 / (4 - factor[i - 1]);
     for (size_t i = 1; i + 1 < n; i++) {
         const float f = factor[i < FACTORS ? i : FACTORS - 1];
-        float *to = v + i * stride;
-        const float *before = to - stride;
-        for (size_t c = 0; c < width; c++) to[c] = (6 * to[c] - before[c]) * f;
+        for (size_t a = 0; a < arrays; a++) {
+            float *to = v + i * stride + a * gap;
+            const float *before = to - stride;
+            for (size_t c = 0; c < width; c++) to[c] = (6 * to[c] - before[c]) * f;
+        }
     }
     for (size_t i = n - 2; i > 0; i--) {
         const float f = factor[i < FACTORS ? i : FACTORS - 1];
-        float *to = v + i * stride;
-        const float *after = to + stride;
-        for (size_t c = 0; c < width; c++) to[c] -= f * after[c];
+        for (size_t a = 0; a < arrays; a++) {
+            float *to = v + i * stride + a * gap;
+            const float *after = to + stride;
+            for (size_t c = 0; c < width; c++) to[c] -= f * after[c];
+        }
     }
+}
+
+void sdm_template_spline(float *v, size_t n, size_t stride, size_t width)
+{
+    splines(v, n, stride, width, 1, 0);
 }
 
 void sdm_template_prefilter(const template_network *k, float *points)
 {
     const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2], line = 4 * nx,
                  plane = line * ny;
-    for (size_t i = 0; i < ny * nz; i++) sdm_template_spline(points + line * i, nx, 4, 4);
-    for (size_t z = 0; z < nz; z++) sdm_template_spline(points + plane * z, ny, line, line);
-    sdm_template_spline(points, nz, plane, plane);
-}
-
-// y[3] = a start for the station `at`, from the lines of stations before it along y and z: what
-// makes its second differences along y and z together vanish. It does not wait for the station
-// before it on the same line.
-static void predict(const warp_scratch *w, const sdm_lattice *near, size_t at, size_t line,
-                    size_t plane, double y[3])
-{
-    const float *p = w->points + 4 * at;
-    for (size_t c = 0; c < 3; c++) {
-        double before[3]; // along z, combined along y
-        for (size_t k = 0; k < 3; k++) {
-            const float *from = p + c - 4 * k * plane;
-            before[k] = 2 * (double)*(from - 4 * line) - (double)*(from - 8 * line);
-            if (k > 0) before[k] -= (double)*from;
-        }
-        y[c] = (before[0] - 2 * before[1] + before[2]) * near->spacing + near->origin[c];
+    for (size_t z = 0; z < nz; z++) {
+        splines(points + plane * z, nx, 4, 4, ny,
+                line); // independent sums overlap in the processor
+        splines(points + plane * z, ny, line, line, 1, 0);
     }
-}
-
-// Stores a station.
-static void set_station(const part_pose *pose, const sdm_lattice *near, const warp_scratch *w,
-                        size_t at, const double y[3], const double inverse[9])
-{
-    const double per_index = 1 / near->spacing;
-    double b[9];
-    for (int c = 0; c < 3; c++)
-        w->points[4 * at + (size_t)c] = (float)((y[c] - near->origin[c]) * per_index);
-    w->points[4 * at + 3] = 0;
-    m3_product(inverse, pose->inverse, b);
-    sdm_template_metric(b, w->metric + 8 * at);
-    w->metric[8 * at + 6] = w->metric[8 * at + 7] = 0;
-    if (!w->station) return;
-    memcpy(w->station[at].y, y, 3 * sizeof *y);
-    memcpy(w->station[at].inverse, inverse, 9 * sizeof *inverse);
+    splines(points, nz, plane, plane, 1, 0);
 }
 
 // q[3] = the point of the frame, without the warp, of a station.
@@ -294,34 +209,32 @@ static void station_in_frame(const part_pose *pose, const sdm_grid *grid, size_t
 void sdm_template_invert(const template_network *k, const sdm_template_part *part,
                          const part_pose *pose, const sdm_grid *grid, const warp_scratch *w)
 {
-    const size_t *n = k->stations, line = n[0], plane = n[0] * n[1];
-    static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-    size_t at = 0;
-    double row[3] = {0}, row_q[3] = {0}; // the first station of the line before
+    const size_t *n = k->stations;
+    const template_table *kernels = sdm_template_kernels();
+    const template_warp warp = warp_of(part, w->control);
+    const sdm_lattice *near = &part->near;
+    template_stations s = {.n = n[0],
+                           .origin = {near->origin[0], near->origin[1], near->origin[2]},
+                           .spacing = near->spacing,
+                           .line = n[0],
+                           .plane = n[0] * n[1]};
+    memcpy(s.frame, pose->inverse, sizeof s.frame);
     for (size_t z = 0; z < n[2]; z++)
-        for (size_t j = 0; j < n[1]; j++) {
-            double first[3], second[3], y[3], inverse[9];
-            station_in_frame(pose, grid, 0, j, z, first);
-            station_in_frame(pose, grid, 1, j, z, second);
-            memcpy(inverse, unit, sizeof unit);
-            for (size_t i = 0; i < n[0]; i++, at++) {
-                double q[3], step[3], move[3];
-                for (int c = 0; c < 3; c++) {
-                    step[c] = second[c] - first[c];
-                    q[c] = first[c] + step[c] * (double)i;
-                }
-                if (j > 1 && z > 1) {
-                    predict(w, &part->near, at, line, plane, y);
-                } else if (i > 0) { // the station before it, moved to first order
-                    m3_apply(inverse, step, move);
-                    for (int c = 0; c < 3; c++) y[c] += move[c];
-                } else {
-                    for (int c = 0; c < 3; c++) y[c] = q[c] + (row[c] - row_q[c]);
-                }
-                newton(&part->warp, w->control, q, y, inverse);
-                if (i == 0) memcpy(row, y, sizeof y), memcpy(row_q, q, sizeof q);
-                set_station(pose, &part->near, w, at, y, inverse);
+        for (size_t y = 0; y < n[1]; y += s.n_lines) {
+            const bool in_turn = y < 2 || z < 2;
+            const size_t at = z * s.plane + y * s.line, left = z < 2 ? n[1] - y : 2 - y;
+            s.n_lines = !in_turn ? 1 : left < 4 ? left : 4;
+            for (size_t l = 0; l < s.n_lines; l++) {
+                double first[3], second[3];
+                station_in_frame(pose, grid, 0, y + l, z, first);
+                station_in_frame(pose, grid, 1, y + l, z, second);
+                for (int c = 0; c < 3; c++)
+                    s.first[c][l] = first[c], s.step[c][l] = second[c] - first[c];
             }
+            s.points = w->points + 4 * at;
+            s.metric = w->metric + 8 * at;
+            s.station = w->station ? w->station + at : NULL;
+            (in_turn ? kernels->invert_in_turn : kernels->invert_line)(&warp, &s);
         }
 }
 
@@ -329,11 +242,11 @@ void sdm_template_invert(const template_network *k, const sdm_template_part *par
 typedef struct moving_station {
     double x[3], inverse[9], b[9], metric[9]; /* B and B B^T, see sdm_template_metric() */
     double bend[3][9];                        /* second derivatives of the warp at y */
-    warp_place place;
+    template_place place;
 } moving_station;
 
 static void prepare_station(const sdm_template_part *part, const part_pose *pose,
-                            const warp_scratch *w, const station *s, moving_station *out)
+                            const warp_scratch *w, const template_station *s, moving_station *out)
 {
     double u[3], du[9], turned[9];
     memcpy(out->inverse, s->inverse, sizeof s->inverse);
@@ -342,26 +255,30 @@ static void prepare_station(const sdm_template_part *part, const part_pose *pose
         for (int j = 0; j < 3; j++) turned[3 * i + j] = out->b[3 * j + i];
     m3_product(out->b, turned, out->metric);
     sdm_template_displacement(&part->warp, w->control, s->y, u, du, out->bend);
-    find_place(&part->warp, s->y, &out->place);
+    const template_warp warp = warp_of(part, w->control);
+    sdm_template_kernels()->find_place(&warp, s->y, &out->place);
 }
 
 // The derivatives of a station.
 static void move_station(const sdm_template_part *part, const moving_station *s,
                          const warp_motion *motion, float points[4], float metric[8])
 {
-    double dq[3] = {0}, u[3], du[9], f[3], dy[3], a[9], am[9];
+    const template_warp warp = warp_of(part, motion->control);
+    double dq[3] = {0}, du[9], f[3], dy[3], a[9], am[9];
+    float sum[4][4];
     // q = m^-1 (x - b): dq = d(m^-1) (x - b) - m^-1 db
     if (motion->turns) m3_apply(motion->inverse, s->x, dq);
     // y + U(y) = q: (I + U') dy = dq - dU(y)
-    displacement(&part->warp, motion->control, &s->place, u, du);
-    for (int c = 0; c < 3; c++) f[c] = dq[c] - motion->shift[c] - u[c];
+    sdm_template_kernels()->displace(&warp, &s->place, sum);
+    for (int c = 0; c < 3; c++) f[c] = dq[c] - motion->shift[c] - (double)sum[0][c];
     m3_apply(s->inverse, f, dy);
     for (int c = 0; c < 3; c++) points[c] = (float)(dy[c] * (1 / part->near.spacing));
     points[3] = 0;
     // B = J^-1 m^-1, J = I + U': dB = -J^-1 dJ B + J^-1 d(m^-1), dJ = dU' + U'' dy.
     // The metric G = B B^T changes by H + H^T with H = dB B^T = -J^-1 dJ G + J^-1 d(m^-1) B^T.
     for (int e = 0; e < 9; e++)
-        du[e] += s->bend[0][e] * dy[0] + s->bend[1][e] * dy[1] + s->bend[2][e] * dy[2];
+        du[e] = (double)sum[1 + e % 3][e / 3] +
+                (s->bend[0][e] * dy[0] + s->bend[1][e] * dy[1] + s->bend[2][e] * dy[2]);
     m3_product(s->inverse, du, a);
     m3_product(a, s->metric, am);
     if (motion->turns) {

@@ -1,9 +1,21 @@
 /* Scratch memory of a map of a template network, and its blocks. */
-#include "template_work.h"
-
+#include <math.h>
 #include <string.h>
 
+#include "template_work.h"
+
 enum { BLOCK = SDM_TEMPLATE_STEP };
+
+// Half of the diagonal of a block, mm.
+static double block_radius(const sdm_grid *grid)
+{
+    double sum = 0;
+    for (int a = 0; a < 3; a++) {
+        const double half = 0.5 * (BLOCK - 1) * grid->spacing[a];
+        sum += half * half;
+    }
+    return sqrt(sum);
+}
 
 void *sdm_template_take(void *memory, size_t *at, size_t bytes)
 {
@@ -22,8 +34,8 @@ void sdm_template_take_lines(const template_network *k, void *memory, size_t *at
 size_t sdm_template_row_bytes(const template_network *k)
 {
     // the kernels use room for whole vectors
-    const size_t n =
-        k->stations[0] > SDM_TEMPLATE_BLOCK_VOXELS ? k->stations[0] : SDM_TEMPLATE_BLOCK_VOXELS;
+    const size_t least = SDM_TEMPLATE_ROWS_POINTS,
+                 n = k->stations[0] > least ? k->stations[0] : least;
     return (n + 3 * SDM_TEMPLATE_LANES) * sizeof(float);
 }
 
@@ -59,7 +71,12 @@ size_t sdm_template_carve(const sdm_model *m, bool slopes, size_t correction_map
 {
     const template_network *k = m->network;
     size_t at = 0, corners = 1;
-    *w = (template_work){.model = m, .k = k, .grid = &m->info.grid, .n_blocks = 1};
+    *w = (template_work){.model = m,
+                         .k = k,
+                         .kernels = sdm_template_kernels(),
+                         .grid = &m->info.grid,
+                         .block_radius = block_radius(&m->info.grid),
+                         .n_blocks = 1};
     for (int a = 0; a < 3; a++) {
         w->blocks[a] = k->stations[a] - 3;
         w->n_blocks *= w->blocks[a];

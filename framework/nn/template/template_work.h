@@ -15,6 +15,9 @@ typedef struct template_block {
 
 enum { SDM_TEMPLATE_BLOCK_VOXELS = 64 };
 
+/* Points of several rows are looked up at once, up to this number. */
+enum { SDM_TEMPLATE_ROWS_POINTS = 256 };
+
 /* Arrays with an element for each voxel of a block, or for each point of a row of stations. */
 typedef struct template_row {
     float *u[3];      /* indices */
@@ -43,21 +46,24 @@ typedef struct part_state {
     /* Without a warp the index at a voxel is an affine function of the voxel's index: the index at
        voxel (0, 0, 0), and by[a], its change along axis a of the grid. */
     double from[3], by[3][3];
-    double slope; /* without a warp: bound on how fast the distance changes, mm per mm */
+    double extent[3]; /* without a warp: half of the extent of a block, in indices */
+    double slope;     /* without a warp: bound on how fast the distance changes, mm per mm */
 } part_state;
 
 /* Scratch memory of one map. */
 typedef struct template_work {
     const sdm_model *model;
     const template_network *k;
+    const template_table *kernels;
     const sdm_grid *grid;
     double *g, *dg;  /* [N], [P][N] (derivatives wanted only) */
     float *phi;      /* polynomials */
     part_pose *pose; /* [n_parts] */
     warp_scratch warp[SDM_TEMPLATE_MAX_PARTS];
     warp_lines lines[SDM_TEMPLATE_MAX_PARTS];
-    part_state *part; /* [n_parts] */
-    size_t blocks[3]; /* number of blocks along each axis */
+    part_state *part;    /* [n_parts] */
+    double block_radius; /* half of the diagonal of a block, mm */
+    size_t blocks[3];    /* number of blocks along each axis */
     size_t n_blocks;
     /* [n_parts][corners][4] the distance to each part at the corners of the blocks, the first
        voxel of each block and of those that would follow the last ones, and its gradient by blocks;
@@ -78,7 +84,7 @@ typedef struct template_work {
 /* Takes the next `bytes` of memory (NULL: only counts), 64-byte aligned, and advances *at. */
 void *sdm_template_take(void *memory, size_t *at, size_t bytes);
 
-/* Bytes of a row of voxels of a block, or of stations. */
+/* Bytes of a row: of voxels of a block, of stations, or of rows of points a block apart. */
 size_t sdm_template_row_bytes(const template_network *k);
 
 /* The same for the arrays plane and line of *l. */
@@ -99,11 +105,23 @@ bool sdm_template_next_block(const template_work *w, template_block *b);
 void sdm_template_expand(const template_network *k, const template_block *b, warp_lines *l,
                          size_t n_c, float *const *c);
 
-/* row.u[n] = the indices of part c, which has no warp, at n points of the grid a block apart along
-   x, from the voxel index first[3]; by[a] = how the point of the template (mm) changes by a voxel
-   along axis a. */
-void sdm_template_row_points(const template_work *w, size_t c, const double first[3], size_t n,
-                             float by[3][3]);
+/* Rows of points of the grid, along x and y a block apart. */
+typedef struct template_rows {
+    double first[3];  /* voxel index of the first point */
+    size_t n, n_rows; /* points in a row, rows */
+} template_rows;
+
+/* How many rows of n points may be looked up at once, at least 1. */
+size_t sdm_template_max_rows(size_t n);
+
+/* u, f and g of w->row = part c, which has no warp, at the points of *rows, one row after the
+   other. */
+void sdm_template_lookup_rows(const template_work *w, size_t c, const template_rows *rows);
+
+/* out[i stride .. i stride + 3] = distance of w->row.f and its gradient by `step` voxels along the
+   axes of the grid, at the point i < n of w->row. */
+void sdm_template_tangents(const template_work *w, size_t c, size_t n, float step, size_t stride,
+                           float *out);
 
 /* Does the index i of row.u lie within the lattice `near` of part c? How many of row.u[n] do? */
 bool sdm_template_is_near(const template_work *w, size_t c, size_t i);
@@ -113,10 +131,8 @@ size_t sdm_template_count_near(const template_work *w, size_t c, size_t n);
    `near`, and from `far` for points outside of it. */
 void sdm_template_lookup(const template_work *w, size_t c, size_t n);
 
-/* Where a block of a part without a warp lies: wholly within the lattice `near`, wholly beyond it,
-   or neither. */
-typedef enum template_place { TEMPLATE_WITHIN, TEMPLATE_BEYOND, TEMPLATE_ACROSS } template_place;
-template_place sdm_template_place(const template_work *w, size_t c, const template_block *b);
+/* Does a block of part c, which has no warp, lie wholly within the lattice `near`? */
+bool sdm_template_is_within(const template_work *w, size_t c, const template_block *b);
 
 /* u[3][64] = an affine function of the voxel's index in the voxels of a block: from[3] at voxel
    (0, 0, 0), by[a] along axis a. */
@@ -160,7 +176,7 @@ void sdm_template_interpolate(const template_work *w, const float *corner, float
 float sdm_template_far(const template_work *w, size_t c, const template_block *b, float *value);
 
 /* value[64] = the distances in a block that is blended, from the interpolated and the exact ones;
-   value may be `exact`. */
+   value may be `far`. */
 void sdm_template_blend(float share, const float *far, const float *exact, float *value);
 
 /* slope[64] = a derivative of these distances, from those of the interpolated distances and of the
@@ -168,14 +184,15 @@ void sdm_template_blend(float share, const float *far, const float *exact, float
 void sdm_template_blend_slope(const template_work *w, float share, const float *far,
                               const float *exact, const float *far_slope, float *slope);
 
-/* template_blocks.c. The centres of all blocks, and the bounds for the culling. */
-void sdm_template_centres(template_work *w);
+/* template_blocks.c. The centres of all blocks for part c, and the bounds for the culling. After
+   its corners. */
+void sdm_template_centres(template_work *w, size_t c);
 
 /* value[64] = the map in a block: the minimum over the parts; nearest[64] = the part that has it,
    unless NULL. Parts that cannot be the nearest in the block are left out. */
 void sdm_template_values(template_work *w, const template_block *b, float *value, uint8_t *nearest);
 
-/* template_begin.c. Prepares the map at the parameters p[P]: numbers, frames, warps, corners and
+/* template_forward.c. Prepares the map at the parameters p[P]: numbers, frames, warps, corners and
    centres of the blocks. Before the call the caller computes the correction. slopes: as in
    sdm_template_carve(). */
 void sdm_template_begin(template_work *w, const double *p, bool slopes);

@@ -49,13 +49,20 @@ static void trainer_init(run *r, const sdm_instance *shape, const char *folder,
 /* Settles which kinds are trained: with network.kind: auto by a race, or as the checkpoint says. */
 static sdm_status settle(run *r, trainer *t, sdm_error *err)
 {
+    sdm_status s = SDM_OK;
     r->turns = (training_turns){.n = 1, .kind = {r->asked->network.kind}, .share = 1};
-    if (r->asked->network.kind != SDM_NETWORK_AUTO) return SDM_OK;
-    bool found = false;
-    const sdm_status s = r->resume ? trainer_checkpoint_turns(t, &r->turns, &found, err) : SDM_OK;
-    // the folder may have been moved
-    trainer_export_path(t, r->turns.first.model_path);
-    return s || found ? s : trainer_race(t, r->settled, &r->turns, r->gain, err);
+    if (r->asked->network.kind == SDM_NETWORK_AUTO) {
+        bool found = false;
+        if (r->resume) s = trainer_checkpoint_turns(t, &r->turns, &found, err);
+        // the folder may have been moved
+        trainer_export_path(t, r->turns.first.model_path);
+        if (!s && !found) {
+            s = trainer_race(t, r->settled, &r->turns, r->gain, err);
+            r->turns.tried = trainer_shared_seconds(t);
+        }
+    }
+    r->turns.budget = trainer_turns_budget(r->asked);
+    return s;
 }
 
 /* Trains the kind of the present turn. *unfit: as trainer_training() tells. */

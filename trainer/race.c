@@ -2,6 +2,7 @@
 #include "race.h"
 
 #include <math.h>
+#include <stdio.h>
 
 #include "data/dataset_fill.h"
 #include "sdm/internal/clock.h"
@@ -36,7 +37,8 @@ typedef struct entrant {
     bool cut;            /* the budget of time ended before all maps of the trial were made */
     sdm_accuracy accuracy;
     double seconds;
-    trainer run; /* its trial; run.kind is NULL without one */
+    char left_out[SDM_ERROR_TEXT_MAX]; /* why the shape does not allow it; "": it does */
+    trainer run;                       /* its trial; run.kind is NULL without one */
 } entrant;
 
 static void entrant_dispose(entrant *e)
@@ -104,6 +106,7 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
     sdm_error reason = {0};
     sdm_status s = trainer_set_up(r, &reason);
     if (s == SDM_E_UNSUPPORTED && e->kind != SDM_NETWORK_POD) {
+        snprintf(e->left_out, sizeof e->left_out, "%s", reason.text);
         trainer_message(t, "auto: %s is left out: %s", trainer_turn_name(e->kind), reason.text);
         s = SDM_OK;
     } else {
@@ -189,7 +192,10 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
         trainer_message(t, "auto: network.kind is %s: %s", trainer_turn_name(out->kind[0]), reason);
         for (size_t i = 0; i < 2; i++)
             if (e[i].finished) figures[n++] = (turn_figures){e[i].kind, &e[i].accuracy};
-        s = trainer_turns_record(t->metrics, out->kind[0], out->n > 1 ? &out->kind[1] : NULL,
+        char why[2 * SDM_ERROR_TEXT_MAX];
+        snprintf(why, sizeof why, "%s%s%s", reason,
+                 e[0].left_out[0] ? ": template is left out: " : "", e[0].left_out);
+        s = trainer_turns_record(t->metrics, out->kind[0], out->n > 1 ? &out->kind[1] : NULL, why,
                                  figures, n, err);
     }
     for (int i = 0; i < out->n && !s; i++) {

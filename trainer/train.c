@@ -95,7 +95,7 @@ static sdm_status begin_second(run *r, const trainer *t, sdm_error *err)
     }
     const turn_figures figures = {r->turns.kind[0], a};
     const sdm_status s =
-        trainer_turns_record(&r->metrics, r->turns.kind[1], NULL, &figures, 1, err);
+        trainer_turns_record(&r->metrics, r->turns.kind[1], NULL, NULL, &figures, 1, err);
     if (s) return s;
     trainer_message(t,
                     "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere; %s is trained "
@@ -124,7 +124,7 @@ static sdm_status keep_better(run *r, trainer *t, sdm_train_report *report, sdm_
     report->other = both[!best].accuracy;
     report->other_kind = r->turns.kind[!best];
     const sdm_status s =
-        trainer_turns_record(&r->metrics, r->turns.kind[best], NULL, figures, 2, err);
+        trainer_turns_record(&r->metrics, r->turns.kind[best], NULL, NULL, figures, 2, err);
     return s ? s : trainer_metrics_write(t, err);
 }
 

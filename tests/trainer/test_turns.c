@@ -350,9 +350,10 @@ static void turns_share_the_budget(void **state)
     const turn_figures figures = {SDM_NETWORK_TEMPLATE, &near};
     history h;
     sdm_text_add(&metrics, "{\"phase\": \"refine\", \"step\": 7, \"heldout_mse_mm2\": 1}\n");
-    assert_int_equal(trainer_turns_record(&metrics, SDM_NETWORK_POD, NULL, &figures, 1, NULL),
-                     SDM_OK);
+    assert_int_equal(
+        trainer_turns_record(&metrics, SDM_NETWORK_POD, NULL, "why", &figures, 1, NULL), SDM_OK);
     sdm_text_add(&metrics, "{\"phase\": \"fit\", \"step\": 3, \"heldout_mse_mm2\": 1}\n");
+    assert_non_null(strstr(metrics.data, "\"reason\": \"why\", \"template_rmse_mm\": 40"));
     assert_non_null(strstr(metrics.data, "\"template_score_mm\": 5}"));
     assert_int_equal(trainer_history_read(&t, &h, NULL), SDM_OK);
     assert_true(h.n == 1 && h.point[0].step == 3);

@@ -61,8 +61,8 @@ bool trainer_second_wins(const training_turns *r, const sdm_accuracy *second)
 }
 
 sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
-                                const sdm_network_kind *then, const turn_figures *e, size_t n,
-                                sdm_error *err)
+                                const sdm_network_kind *then, const char *reason,
+                                const turn_figures *e, size_t n, sdm_error *err)
 {
     char key[64];
     sdm_json j = {0};
@@ -70,6 +70,7 @@ sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
     sdm_json_text(&j, "phase", "auto");
     sdm_json_text(&j, "kind", trainer_turn_name(kind));
     if (then) sdm_json_text(&j, "then", trainer_turn_name(*then));
+    if (reason) sdm_json_text(&j, "reason", reason);
     for (size_t i = 0; i < n; i++) {
         const char *name = trainer_turn_name(e[i].kind);
         snprintf(key, sizeof key, "%s_rmse_mm", name);

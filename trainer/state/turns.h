@@ -43,7 +43,8 @@ typedef struct turn_figures {
 } turn_figures;
 
 /* Appends a line with phase "auto" to *metrics: `kind` is trained next, or kept; then: the kind to
-   be trained after it, NULL: none; e[n]: the errors of the kinds so far. Writes no file. */
+   be trained after it, NULL: none; reason: why, in words, NULL: as the errors tell; e[n]: the
+   errors of the kinds so far. Writes no file. */
 sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
-                                const sdm_network_kind *then, const turn_figures *e, size_t n,
-                                sdm_error *err);
+                                const sdm_network_kind *then, const char *reason,
+                                const turn_figures *e, size_t n, sdm_error *err);

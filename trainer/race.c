@@ -2,6 +2,7 @@
 #include "race.h"
 
 #include <math.h>
+#include <stdio.h>
 
 #include "data/dataset_fill.h"
 #include "sdm/internal/clock.h"
@@ -24,14 +25,20 @@ static const double HOPELESS = 15;
 /* Part of the budget for a template that is trained before `pod`. */
 static const double TEMPLATE_SHARE = 1.0 / 3;
 
+/* No more maps are made for the trials once this part of a budget of time is used. */
+static const double TRIALS_SHARE = 0.25;
+
 /* A kind of network in the race. */
 typedef struct entrant {
     sdm_network_kind kind;
-    bool finished; /* false: the shape does not allow this kind */
-    bool ready;    /* it needs no training */
+    const trainer *race; /* the run, with the whole budget */
+    bool finished;       /* false: the shape does not allow this kind */
+    bool ready;          /* it needs no training */
+    bool cut;            /* the budget of time ended before all maps of the trial were made */
     sdm_accuracy accuracy;
     double seconds;
-    trainer run; /* its trial; run.kind is NULL without one */
+    char left_out[SDM_ERROR_TEXT_MAX]; /* why the shape does not allow it; "": it does */
+    trainer run;                       /* its trial; run.kind is NULL without one */
 } entrant;
 
 static void entrant_dispose(entrant *e)
@@ -69,7 +76,13 @@ static void trial_config(const sdm_config *from, size_t n_params, sdm_network_ki
     c->train.minutes = 0, c->train.samples = 0, c->train.steps = 1;
 }
 
-static bool trial_cancelled(void *user) { return trainer_cancelled(user); }
+static bool trial_cancelled(void *user) { return trainer_cancelled(((entrant *)user)->race); }
+
+/* true when the trials have used their part of a time budget. */
+static bool trial_enough(void *user)
+{
+    return trainer_start_fraction(((entrant *)user)->race) > TRIALS_SHARE;
+}
 
 /* Trains and measures one entrant. Keeps its design and its maps. */
 static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_error *err)
@@ -89,10 +102,11 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
                    .heldout_mse = NAN,
                    .evaluated_step = -1,
                    .metrics = &metrics};
-    const fill_hooks hooks = {.cancelled = trial_cancelled, .user = r};
+    const fill_hooks hooks = {.cancelled = trial_cancelled, .enough = trial_enough, .user = e};
     sdm_error reason = {0};
     sdm_status s = trainer_set_up(r, &reason);
     if (s == SDM_E_UNSUPPORTED && e->kind != SDM_NETWORK_POD) {
+        snprintf(e->left_out, sizeof e->left_out, "%s", reason.text);
         trainer_message(t, "auto: %s is left out: %s", trainer_turn_name(e->kind), reason.text);
         s = SDM_OK;
     } else {
@@ -109,6 +123,7 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
     }
     e->seconds = trainer_seconds(r);
     e->ready = r->data.only_holdout;
+    e->cut = !e->ready && (int64_t)r->data.n_start < config->data.start;
     r->metrics = NULL;
     sdm_text_dispose(&metrics);
     return s;
@@ -126,7 +141,8 @@ static sdm_status try_kind(trainer *t, sdm_config *config, entrant *e, sdm_error
                         "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere (trial on "
                         "%lld maps, %.0f s)",
                         trainer_turn_name(e->kind), e->accuracy.rmse_near_mm, e->accuracy.rmse_mm,
-                        (long long)config->data.start, e->seconds);
+                        e->ready ? (long long)config->data.start : (long long)e->run.data.n_start,
+                        e->seconds);
     return s;
 }
 
@@ -140,7 +156,8 @@ static const char *decide(const entrant *carried, const entrant *pod, training_t
     }
     if (!pod->finished) return "hardly any error is left";
     const double ratio = trainer_score(&pod->accuracy) / trainer_score(&carried->accuracy);
-    if (ratio > HOPELESS) return "training does not make up for such a difference";
+    // a trial with fewer maps than planned rules nothing out
+    if (ratio > HOPELESS && !pod->cut) return "training does not make up for such a difference";
     if (ratio <= 1) {
         out->kind[0] = SDM_NETWORK_POD;
         return "the better one, and training improves it most";
@@ -163,7 +180,7 @@ static void hand_on(entrant *e, trial_gain *gain)
 sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, trial_gain gain[2],
                         sdm_error *err)
 {
-    entrant e[] = {{.kind = SDM_NETWORK_TEMPLATE}, {.kind = SDM_NETWORK_POD}};
+    entrant e[] = {{.kind = SDM_NETWORK_TEMPLATE, .race = t}, {.kind = SDM_NETWORK_POD, .race = t}};
     turn_figures figures[2];
     size_t n = 0;
     sdm_status s = try_kind(t, scratch, &e[0], err);
@@ -175,7 +192,10 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
         trainer_message(t, "auto: network.kind is %s: %s", trainer_turn_name(out->kind[0]), reason);
         for (size_t i = 0; i < 2; i++)
             if (e[i].finished) figures[n++] = (turn_figures){e[i].kind, &e[i].accuracy};
-        s = trainer_turns_record(t->metrics, out->kind[0], out->n > 1 ? &out->kind[1] : NULL,
+        char why[2 * SDM_ERROR_TEXT_MAX];
+        snprintf(why, sizeof why, "%s%s%s", reason,
+                 e[0].left_out[0] ? ": template is left out: " : "", e[0].left_out);
+        s = trainer_turns_record(t->metrics, out->kind[0], out->n > 1 ? &out->kind[1] : NULL, why,
                                  figures, n, err);
     }
     for (int i = 0; i < out->n && !s; i++) {

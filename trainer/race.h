@@ -14,7 +14,8 @@ typedef struct trial_gain {
    hundred exact maps (bases and least squares, no steps) and measured on held-out shapes; the
    results are sent to the message callback and appended to t->metrics. gain[i] = what the trial of
    out->kind[i] hands on; the caller owns the maps also after an error. The choice depends on
-   configuration, shape and seed only. t: config, shape, folder, hooks and n_threads are set;
+   configuration, shape and seed only; with a budget of time that ends before all maps of the trials
+   are made, on the machine, too. t: config, shape, folder, hooks, n_threads and started are set;
    scratch: memory for a configuration. SDM_E_CANCELLED and the errors of a training. */
 sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, trial_gain gain[2],
                         sdm_error *err);

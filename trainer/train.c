@@ -49,13 +49,20 @@ static void trainer_init(run *r, const sdm_instance *shape, const char *folder,
 /* Settles which kinds are trained: with network.kind: auto by a race, or as the checkpoint says. */
 static sdm_status settle(run *r, trainer *t, sdm_error *err)
 {
+    sdm_status s = SDM_OK;
     r->turns = (training_turns){.n = 1, .kind = {r->asked->network.kind}, .share = 1};
-    if (r->asked->network.kind != SDM_NETWORK_AUTO) return SDM_OK;
-    bool found = false;
-    const sdm_status s = r->resume ? trainer_checkpoint_turns(t, &r->turns, &found, err) : SDM_OK;
-    // the folder may have been moved
-    trainer_export_path(t, r->turns.first.model_path);
-    return s || found ? s : trainer_race(t, r->settled, &r->turns, r->gain, err);
+    if (r->asked->network.kind == SDM_NETWORK_AUTO) {
+        bool found = false;
+        if (r->resume) s = trainer_checkpoint_turns(t, &r->turns, &found, err);
+        // the folder may have been moved
+        trainer_export_path(t, r->turns.first.model_path);
+        if (!s && !found) {
+            s = trainer_race(t, r->settled, &r->turns, r->gain, err);
+            r->turns.tried = trainer_shared_seconds(t);
+        }
+    }
+    r->turns.budget = trainer_turns_budget(r->asked);
+    return s;
 }
 
 /* Trains the kind of the present turn. *unfit: as trainer_training() tells. */
@@ -88,7 +95,7 @@ static sdm_status begin_second(run *r, const trainer *t, sdm_error *err)
     }
     const turn_figures figures = {r->turns.kind[0], a};
     const sdm_status s =
-        trainer_turns_record(&r->metrics, r->turns.kind[1], NULL, &figures, 1, err);
+        trainer_turns_record(&r->metrics, r->turns.kind[1], NULL, NULL, &figures, 1, err);
     if (s) return s;
     trainer_message(t,
                     "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere; %s is trained "
@@ -117,7 +124,7 @@ static sdm_status keep_better(run *r, trainer *t, sdm_train_report *report, sdm_
     report->other = both[!best].accuracy;
     report->other_kind = r->turns.kind[!best];
     const sdm_status s =
-        trainer_turns_record(&r->metrics, r->turns.kind[best], NULL, figures, 2, err);
+        trainer_turns_record(&r->metrics, r->turns.kind[best], NULL, NULL, figures, 2, err);
     return s ? s : trainer_metrics_write(t, err);
 }
 

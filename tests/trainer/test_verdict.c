@@ -48,7 +48,8 @@ static sdm_verdict figures(void)
 static sdm_verdict decide(const char *override, sdm_cause cause, double fall, double modes_mm2)
 {
     const sdm_config c = config_of(&override, override ? 1 : 0);
-    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .asked = true};
+    const verdict_input in = {
+        .config = &c, .maps = 200, .steps = 1500, .asked = true, .budget = 1000};
     sdm_verdict v = figures();
     v.part_mm2[SDM_CAUSE_BASES] = v.part_mm2[SDM_CAUSE_NETWORK] = v.part_mm2[SDM_CAUSE_MAPS] = 1e-5;
     v.part_mm2[cause] = 8e-5;
@@ -105,17 +106,23 @@ static void length_of_the_training(void **state)
         sdm_verdict v = figures();
         v.part_mm2[SDM_CAUSE_NETWORK] = 1e-4;
         v.fall = k == 0 ? 0 : 0.5;
-        const verdict_input in = {
-            .config = &c, .maps = 200, .steps = k == 0 ? 60 : 1500, .ended_early = k == 2};
+        const verdict_input in = {.config = &c,
+                                  .maps = 200,
+                                  .steps = k == 0 ? 60 : 1500,
+                                  .ended_early = k == 2,
+                                  .budget = (double)c.train.steps};
         trainer_verdict_decide(&in, &v);
         assert_string_equal(v.key, k == 2 ? "network.width" : "train.steps");
     }
     // too little time for the maps is a matter of time
     sdm_verdict v = figures();
     v.part_mm2[SDM_CAUSE_MAPS] = 1e-4;
-    const verdict_input in = {.config = &c, .maps = 128, .steps = 1500, .cut = true};
+    const verdict_input in = {
+        .config = &c, .maps = 128, .steps = 1500, .cut = true, .budget = 1500};
     trainer_verdict_decide(&in, &v);
     assert_string_equal(v.key, "train.steps");
+    // the advice is about the budget of the run, not about the part that this kind had
+    assert_true(v.from == 1500 && v.to == 3000);
 }
 
 // After `auto` the other kind is a choice, not a remedy. An error of less than a voxel, or near the
@@ -194,7 +201,8 @@ static void inside_out_is_the_cause(void **state)
 {
     (void)state;
     const sdm_config c = config_of(NULL, 0);
-    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .asked = true};
+    const verdict_input in = {
+        .config = &c, .maps = 200, .steps = 1500, .asked = true, .budget = 1000};
     for (int good = 0; good < 2; good++) {
         sdm_verdict v = figures();
         v.inside_out = 1;

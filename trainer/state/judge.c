@@ -37,16 +37,14 @@ static bool advise_double(sdm_verdict *v, const char *key, double value, double 
     return true;
 }
 
-/* Twice the budget; four times the minutes that did not reach the first step. */
+/* Twice the budget of the run; four times the minutes that did not reach the first step. */
 static void advise_budget(const verdict_input *in, sdm_verdict *v)
 {
     const sdm_config *c = in->config;
     if (c->train.minutes > 0)
-        advise(v, "train.minutes", c->train.minutes, (in->steps > 0 ? 2 : 4) * c->train.minutes);
-    else if (c->train.steps > 0)
-        advise(v, "train.steps", (double)c->train.steps, 2 * (double)c->train.steps);
+        advise(v, "train.minutes", in->budget, (in->steps > 0 ? 2 : 4) * in->budget);
     else
-        advise(v, "train.samples", (double)c->train.samples, 2 * (double)c->train.samples);
+        advise(v, c->train.steps > 0 ? "train.steps" : "train.samples", in->budget, 2 * in->budget);
 }
 
 static bool has_bases(const sdm_config *c)
@@ -316,7 +314,8 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
         .cut = trainer_by_time(t) && !d->only_holdout &&
                (int64_t)d->n_start<t->config->data.start, .ended_early = t->saved_seconds> 0,
         .steps = (double)t->step,
-        .asked = !t->turns->chosen};
+        .asked = !t->turns->chosen,
+        .budget = t->turns->budget};
     trainer_verdict_decide(&in, out);
     trainer_history_dispose(&h);
     return SDM_OK;

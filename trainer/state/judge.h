@@ -28,6 +28,8 @@ typedef struct verdict_input {
     bool ended_early; /* by train.patience */
     double steps;     /* of the optimiser */
     bool asked;       /* the configuration gives the kind, `auto` has not chosen it */
+    double budget;    /* of the run, in the unit of the key that gives it; with `auto` this training
+                         may have had a part of it */
 } verdict_input;
 
 /* Sets grade, limit, key, values and sentence from the figures in *v. */

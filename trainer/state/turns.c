@@ -12,7 +12,7 @@ static double used_of(const training_turns *r, const sdm_config *asked)
     return asked->train.steps > 0 ? steps : steps * asked->train.batch;
 }
 
-static double budget_of(const sdm_config *c)
+double trainer_turns_budget(const sdm_config *c)
 {
     return c->train.minutes > 0 ? c->train.minutes
            : c->train.steps > 0 ? (double)c->train.steps
@@ -24,9 +24,14 @@ void trainer_turn_config(const training_turns *r, const sdm_config *asked, sdm_c
     *out = *asked;
     // a kind that the configuration names has its keys already
     if (asked->network.kind == SDM_NETWORK_AUTO) sdm_config_choose_kind(out, r->kind[r->at]);
-    const double all = budget_of(asked), mine = r->at      ? all - used_of(r, asked)
-                                                : r->n > 1 ? all * r->share
-                                                           : all;
+    const double all = trainer_turns_budget(asked);
+    double mine = all;
+    if (r->at) {
+        mine = all - used_of(r, asked);
+    } else if (r->n > 1) {
+        const double tried = asked->train.minutes > 0 ? fmin(r->tried / 60, all) : 0;
+        mine = tried + (all - tried) * r->share;
+    }
     if (asked->train.minutes > 0)
         out->train.minutes = mine;
     else if (asked->train.steps > 0)
@@ -37,7 +42,7 @@ void trainer_turn_config(const training_turns *r, const sdm_config *asked, sdm_c
 
 double trainer_turns_left(const training_turns *r, const sdm_config *asked)
 {
-    return 1 - used_of(r, asked) / budget_of(asked);
+    return 1 - used_of(r, asked) / trainer_turns_budget(asked);
 }
 
 const char *trainer_turn_name(sdm_network_kind kind)
@@ -56,8 +61,8 @@ bool trainer_second_wins(const training_turns *r, const sdm_accuracy *second)
 }
 
 sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
-                                const sdm_network_kind *then, const turn_figures *e, size_t n,
-                                sdm_error *err)
+                                const sdm_network_kind *then, const char *reason,
+                                const turn_figures *e, size_t n, sdm_error *err)
 {
     char key[64];
     sdm_json j = {0};
@@ -65,6 +70,7 @@ sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
     sdm_json_text(&j, "phase", "auto");
     sdm_json_text(&j, "kind", trainer_turn_name(kind));
     if (then) sdm_json_text(&j, "then", trainer_turn_name(*then));
+    if (reason) sdm_json_text(&j, "reason", reason);
     for (size_t i = 0; i < n; i++) {
         const char *name = trainer_turn_name(e[i].kind);
         snprintf(key, sizeof key, "%s_rmse_mm", name);

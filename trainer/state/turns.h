@@ -8,13 +8,20 @@ typedef struct training_turns {
     int n, at;                /* number of kinds to train, 1 or 2; the one in training */
     sdm_network_kind kind[2]; /* in the order of training */
     bool chosen;              /* by network.kind: auto */
-    double share;             /* part of the budget that the first of two may use, 0 .. 1 */
+    double budget;            /* of the run, in the unit of the key that gives it */
+    double tried;             /* s, time of the trials: the first training begins with it */
+    double share;             /* part of the budget left by the trials that the first of two may
+                                 use, 0 .. 1 */
     sdm_train_report first;   /* result of the first, while the second trains */
 } training_turns;
 
 /* *out = `asked` with the kind of the present turn, its defaults for all keys that have those of
-   `auto`, and its budget: the first of two has its share, the second has what is left. */
+   `auto`, and its budget: the first of two has its share (in minutes: after the time of the
+   trials), the second has what is left. */
 void trainer_turn_config(const training_turns *r, const sdm_config *asked, sdm_config *out);
+
+/* The budget of a configuration, in the unit of the key that it gives. */
+double trainer_turns_budget(const sdm_config *c);
 
 /* Part of the budget of `asked` that is left for the second of two. */
 double trainer_turns_left(const training_turns *r, const sdm_config *asked);
@@ -36,7 +43,8 @@ typedef struct turn_figures {
 } turn_figures;
 
 /* Appends a line with phase "auto" to *metrics: `kind` is trained next, or kept; then: the kind to
-   be trained after it, NULL: none; e[n]: the errors of the kinds so far. Writes no file. */
+   be trained after it, NULL: none; reason: why, in words, NULL: as the errors tell; e[n]: the
+   errors of the kinds so far. Writes no file. */
 sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
-                                const sdm_network_kind *then, const turn_figures *e, size_t n,
-                                sdm_error *err);
+                                const sdm_network_kind *then, const char *reason,
+                                const turn_figures *e, size_t n, sdm_error *err);

@@ -202,9 +202,12 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
   function show(slice, position, reach, fitted = null) {
     last = { slice, position, reach, fitted };
     const mm = grid.origin[axis] + position[axis] * grid.spacing[axis];
-    label.value = grid.straight ? `${AXES[axis]} = ${numberText(Math.round(mm * 100) / 100, 4)} mm` : `slice ${position[axis] + 1} of ${grid.size[axis]}`;
-    canvas.setAttribute('aria-label', `Slice across ${AXES[axis]} of the map, ${label.value}`);
-    range.value = position[axis];
+    const place = grid.straight ? `${AXES[axis]} = ${numberText(Math.round(mm * 100) / 100, 4)} mm` : `slice ${position[axis] + 1} of ${grid.size[axis]}`;
+    if (label.value !== place) {
+      label.value = place;
+      canvas.setAttribute('aria-label', `Slice across ${AXES[axis]} of the map, ${place}`);
+      range.value = position[axis];
+    }
     drawSoon();
   }
 

@@ -106,9 +106,11 @@ function hasGraphicsCard() {
   return !/swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
+const graphicsCard = hasGraphicsCard();
+
 // The view of the surface on a canvas; null without WebGL2. centre (mm) stands in the middle, a ball of `radius` is seen.
 function createSurfaceView(canvas, centre, radius) {
-  const fast = hasGraphicsCard(), gl = canvas.getContext('webgl2', { antialias: fast, alpha: false, preserveDrawingBuffer: true });
+  const gl = canvas.getContext('webgl2', { antialias: graphicsCard, alpha: false, preserveDrawingBuffer: true });
   if (!gl) return null;
   const home = { yaw: 0.55, pitch: 0.62, zoom: 1 };
   const at = { ...home };
@@ -178,7 +180,7 @@ function createSurfaceView(canvas, centre, radius) {
 
   // Called before a picture that others may follow soon.
   function move() {
-    if (fast) return;
+    if (graphicsCard) return;
     share = MOVING_SHARE;
     clearTimeout(resting);
     resting = setTimeout(() => {

@@ -50,8 +50,8 @@ typedef struct tracer {
     size_t nx, ny, nz;
     size_t words;        /* of the bits of a row of voxels */
     uint64_t *inside[2]; /* [layer & 1]: [ny][words], a bit a voxel: its value is below the level */
-    uint32_t *edge[2][2]; /* [layer & 1][axis]: [ny][nx], set where the level is crossed */
-    uint32_t *edge_z;     /* [ny][nx] */
+    uint32_t *edge[2][2];    /* [layer & 1][axis]: [ny][nx], set where the level is crossed */
+    uint32_t *edge_z;        /* [ny][nx] */
     size_t edge_slot[2][12]; /* [k & 1]: where edge_z has the vertex of an edge of cell (0, 0, k) */
     int faces[12];           /* edge_faces() */
     loops found[256];        /* of cells without an ambiguous face: [bits of the corners inside] */
@@ -192,7 +192,7 @@ static double fan_cost(const tracer *t, const cell *c, const int8_t *loop, int n
     double cost = 0;
     const double *x = t->b.mesh->vert + 3 * (size_t)c->vertex[loop[p]];
     for (int i = 2; i < n - 1; i++) {
-        const int q = loop[(p + i) % n];
+        const int8_t q = loop[(p + i) % n];
         if (t->faces[loop[p]] & t->faces[q]) return INFINITY;
         const double *y = t->b.mesh->vert + 3 * (size_t)c->vertex[q];
         for (int d = 0; d < 3; d++) cost += (x[d] - y[d]) * (x[d] - y[d]);
@@ -295,7 +295,8 @@ static uint64_t met_cells(const tracer *t, size_t j, size_t w)
     return some & ~all & have_next(t, w);
 }
 
-/* The loops of the cell with lower corner (i, j, k); *own: memory for those of an ambiguous cell. */
+/* The loops of the cell with lower corner (i, j, k); *own: memory for those of an ambiguous cell.
+ */
 static const loops *loops_of(tracer *t, size_t i, size_t j, size_t k, cell *c, loops *own)
 {
     int inside = 0;
@@ -307,8 +308,10 @@ static const loops *loops_of(tracer *t, size_t i, size_t j, size_t k, cell *c, l
     if (found->known) return found;
     for (size_t n = 0; n < 8; n++)
         c->v[n] = value_at(t, i + (n & 1), j + (n >> 1 & 1), k + (n >> 2));
-    if (is_ambiguous(inside)) found = own;
-    else found->known = true;
+    if (is_ambiguous(inside))
+        found = own;
+    else
+        found->known = true;
     find_loops(c, found);
     return found;
 }

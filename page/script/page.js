@@ -148,6 +148,7 @@ const sliders = parameters.map((p, i) => {
     if (!steps) return;
     event.preventDefault();
     setParameter(i, rounded(state.values[i] + steps * stepOf(p), stepOf(p)));
+    showSliders(); // the browser itself does not move it
   });
   number.addEventListener('change', () => { if (Number.isFinite(number.valueAsNumber)) setParameter(i, number.valueAsNumber); });
   range.addEventListener('dblclick', () => moveTo(state.values.map((v, k) => (k === i ? home[i] : v))));

@@ -97,8 +97,9 @@ int page_was_exact(void) { return result.source == SDM_SOURCE_EXACT; }
 const float *page_values(void) { return values; }
 size_t page_n_values(void) { return sdm_grid_count(&info->grid); }
 
-/* Adds weight times the gradient of the map, by central differences, at a voxel. */
-static void add_gradient(const int64_t at[3], double weight, double sum[3])
+/* Adds weight times the slopes of the map along the axes of the grid, by central differences, at a
+ * voxel. */
+static void add_slopes(const int64_t at[3], double weight, double sum[3])
 {
     const sdm_grid *g = &info->grid;
     const float *value = values + sdm_grid_voxel(g, at[0], at[1], at[2]);
@@ -106,9 +107,8 @@ static void add_gradient(const int64_t at[3], double weight, double sum[3])
     for (int a = 0; a < 3; a++) {
         const int64_t up = at[a] + 1 < g->n[a] ? step[a] : 0, down = at[a] > 0 ? step[a] : 0;
         if (!up && !down) continue; // one layer of voxels
-        const double slope =
-            ((double)value[up] - (double)value[-down]) / ((up && down ? 2 : 1) * g->spacing[a]);
-        for (int row = 0; row < 3; row++) sum[row] += weight * g->dir[3 * row + a] * slope;
+        const double span = (up && down ? 2 : 1) * g->spacing[a];
+        sum[a] += weight * ((double)value[up] - (double)value[-down]) / span;
     }
 }
 
@@ -117,14 +117,17 @@ static void add_gradient(const int64_t at[3], double weight, double sum[3])
 static void normal_at(const double x[3], float normal[3])
 {
     const sdm_grid *g = &info->grid;
-    double index[3], share[3], sum[3] = {0};
+    double index[3], share[3], sum[3] = {0}, n[3];
     int64_t low[3];
+    int between = 0; // bits of the axes along which x lies between two voxels: mostly one
     sdm_grid_index(g, x, index);
     for (int a = 0; a < 3; a++) {
         low[a] = (int64_t)fmin(fmax(floor(index[a] + NEAR), 0), (double)g->n[a] - 1);
         share[a] = fmin(fmax(index[a] - (double)low[a], 0), 1);
+        between |= (share[a] > NEAR) << a;
     }
     for (int corner = 0; corner < 8; corner++) {
+        if (corner & ~between) continue;
         int64_t at[3];
         double weight = 1;
         for (int a = 0; a < 3; a++) {
@@ -133,10 +136,12 @@ static void normal_at(const double x[3], float normal[3])
             weight *= high ? share[a] : 1 - share[a];
             if (at[a] >= g->n[a]) weight = 0;
         }
-        if (weight > NEAR) add_gradient(at, weight, sum);
+        if (weight > NEAR) add_slopes(at, weight, sum);
     }
-    const double length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
-    for (int a = 0; a < 3; a++) normal[a] = (float)(length > 0 ? sum[a] / length : 0);
+    for (int a = 0; a < 3; a++)
+        n[a] = g->dir[3 * a] * sum[0] + g->dir[3 * a + 1] * sum[1] + g->dir[3 * a + 2] * sum[2];
+    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int a = 0; a < 3; a++) normal[a] = (float)(length > 0 ? n[a] / length : 0);
 }
 
 /* Measures the map and its surface. */

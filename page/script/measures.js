@@ -16,10 +16,11 @@ const ownMeasures = (figures.measures ?? []).filter(m => !m.of_mesh).map(m => {
 
 // Shows the measures at the sliders; values null: those in the figures, at the default or at the fitted parameters.
 function showMeasures(values, depth) {
-  setText($('measures-note'), values ? 'of the shape at the sliders' : fit ? 'of the fitted shape' : 'at the default parameters');
+  const fixed = figures.live ? '; they do not follow the sliders: this page cannot run the code of the shape' : '';
+  setText($('measures-note'), values ? 'of the shape at the sliders' : (fit ? 'of the fitted shape' : 'at the default parameters') + fixed);
   ownMeasures.forEach((m, i) => {
     const value = values ? values[i] : m.value, known = Number.isFinite(value);
-    m.reading.set(known ? numberText(value, 5) : '–', known ? m.unit : '', !m.of_depth ? '' : !values ? 'of a depth' : known ? `at ${numberText(depth)} mm` : 'beyond the end');
+    m.reading.set(known ? numberText(value, 5) : '–', known ? m.unit : '', !m.of_depth ? (values || !figures.live ? '' : fit ? 'fitted shape' : 'default shape') : !values ? 'of a depth' : known ? `at ${numberText(depth)} mm` : 'beyond the end');
   });
 }
 

@@ -136,7 +136,8 @@ const clamped = (x, [low, high]) => Math.min(Math.max(x, low), high);
 const sliders = parameters.map((p, i) => {
   const range = element('input', { type: 'range', step: 'any', min: p.min, max: p.max, id: 'slider' + i, 'aria-describedby': 'range' + i });
   const number = element('input', { type: 'number', step: 'any', 'aria-label': `${p.name}, value` });
-  const note = element('span', { class: 'range', id: 'range' + i });
+  const note = element('span', { class: 'range', id: 'range' + i },
+    (fit ? fittedText(p) + '; ' : '') + `trained ${numberText(p.min)} … ${withUnit(p.max, p.unit)}, default ${numberText(p.default)}`);
   const row = element('div', { class: 'slider', title: p.help || '' },
     element('label', { for: 'slider' + i }, p.name, element('small', {}, p.help || '')),
     element('span', { class: 'value' }, number, element('small', {}, p.unit)), range, note);
@@ -147,24 +148,31 @@ const sliders = parameters.map((p, i) => {
     if (!steps) return;
     event.preventDefault();
     setParameter(i, rounded(state.values[i] + steps * stepOf(p), stepOf(p)));
+    showSliders(); // the browser itself does not move it
   });
   number.addEventListener('change', () => { if (Number.isFinite(number.valueAsNumber)) setParameter(i, number.valueAsNumber); });
   range.addEventListener('dblclick', () => moveTo(state.values.map((v, k) => (k === i ? home[i] : v))));
   $('sliders').append(row);
-  return { range, number, note, row };
+  return { range, number, row };
 });
 
+// What does not change is not set again: each setting makes the browser compute styles.
 function showSliders() {
   parameters.forEach((p, i) => {
-    const { range, number, note, row } = sliders[i], [low, high] = state.ranges[i], share = x => 100 * (x - low) / (high - low) + '%';
-    Object.assign(range, { min: low, max: high, value: state.values[i] });
-    if (document.activeElement !== number) number.value = numberText(state.values[i], 5).replace('\u2009', '');
+    const { range, number, row } = sliders[i], value = state.values[i], text = numberText(value, 5).replace('\u2009', '');
+    if (range.valueAsNumber !== value) range.value = value;
+    if (document.activeElement !== number && number.value !== text) number.value = text;
+    row.classList.toggle('beyond', value < p.min || value > p.max);
+  });
+}
+
+// Gives the sliders the ranges that the page can compute.
+function showRanges() {
+  parameters.forEach((p, i) => {
+    const { range, row } = sliders[i], [low, high] = state.ranges[i], share = x => 100 * (x - low) / (high - low) + '%';
+    Object.assign(range, { min: low, max: high });
     row.style.setProperty('--low', share(p.min));
     row.style.setProperty('--high', share(p.max));
-    row.style.setProperty('--value', share(state.values[i]));
-    row.style.setProperty('--default', (p.default - low) / (high - low));
-    row.classList.toggle('beyond', state.values[i] < p.min || state.values[i] > p.max);
-    setText(note, (fit ? fittedText(p) + '; ' : '') + `trained ${numberText(p.min)} … ${withUnit(p.max, p.unit)}, default ${numberText(p.default)}`);
   });
 }
 
@@ -206,11 +214,21 @@ document.querySelector('.buttons').append(...buttons);
 const WARM = 4;
 let worker = null;
 
+// The texts change with the picture, so that the browser lays out and paints once; where a map takes long, the sliders' own come first.
+const LONG = 60; // ms
+let slidersTimer = 0;
+
 // Asks for the map at the values of the sliders. While a map is computed, only the latest values wait.
 function request() {
-  showSliders();
+  if (!slidersTimer) slidersTimer = setTimeout(showSlidersNow, LONG);
   state.wanted = true;
   if (!state.busy) send();
+}
+
+function showSlidersNow() {
+  clearTimeout(slidersTimer);
+  slidersTimer = 0;
+  showSliders();
 }
 
 function send() {
@@ -222,8 +240,9 @@ function send() {
 function showMap(map) {
   state.map = map;
   if (document.documentElement.classList.contains('exact') !== map.exact) document.documentElement.classList.toggle('exact');
-  if (surfaceView) surfaceView.show(map.vertices, map.triangles);
+  if (surfaceView) surfaceView.show(map.vertices, map.triangles, !map.cut);
   drawSlices();
+  showSlidersNow();
   showReadings(map);
   showMeasures(map.own, state.depth);
   const extra = map.exact ? 'exact engine: beyond the trained range' : 'network';
@@ -272,6 +291,7 @@ function onReady({ ranges, knowsShape }) {
   $('legend').hidden = !parameters.some((p, i) => state.ranges[i][0] < p.min || state.ranges[i][1] > p.max);
   document.body.classList.add('ready');
   state.busy = false;
+  showRanges();
   request();
 }
 
@@ -340,11 +360,12 @@ startMeasures(state.depth, depth => {
   request();
 });
 if (figures.live) {
+  showRanges();
   showSliders();
   startWorker();
 } else {
   $('controls').hidden = true;
-  if (surfaceView) surfaceView.show(still.vertices, still.triangles);
+  if (surfaceView) surfaceView.show(still.vertices, still.triangles, !box.cut);
   drawSlices();
   showReadings({ volume: box.volume_mm3, area: box.area_mm2, box: [...box.min, ...box.max], cut: box.cut });
 }

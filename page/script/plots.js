@@ -68,7 +68,8 @@ function showHistory(history) {
     curve('training, one batch', 'loss', 'loss_mm2', false), curve('held-out shapes', 'heldout', 'heldout_mse_mm2', false),
     curve('finished network', 'end', 'heldout_mse_mm2', true)
   ].filter(({ points }) => points.length > 0);
-  if (!curves.length) return;
+  // a single point is no course
+  if (!curves.some(({ points }) => points.length > 1)) return;
   $('training').hidden = false;
   plot($('history'), { curves, xTitle: across === 'step' ? 'optimiser steps' : 'seconds', yTitle: 'Root mean square error, mm' });
 }

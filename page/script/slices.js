@@ -110,6 +110,7 @@ function createPainter(columns, rows, width, height, flipped, reach, pixel) {
 
 const PIXELS_OF_VOXEL = 8; // at most; larger pictures are stretched
 const UNSEEN_REST = 250; // ms
+const MOVING_SLICES = 0.5; // share of the pixels along a side while slices change on a machine without a graphics card
 // The processor makes the pixels and draws the contours: on canvases of the graphics card the same takes longer, most of all without a card.
 const SOFTWARE = { willReadFrequently: true };
 
@@ -126,32 +127,36 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
   figure.style.setProperty('--shape', `${grid.size[right] * grid.spacing[right]} / ${grid.size[up] * grid.spacing[up]}`);
   figure.style.flexGrow = grid.size[right] * grid.spacing[right] / (grid.size[up] * grid.spacing[up]);
   const context = canvas.getContext('2d', SOFTWARE), buffer = document.createElement('canvas'), columns = grid.size[right], rows = grid.size[up];
-  let last = null, painter = null, prepared = 0, x = [], y = [], seen = false, later = 0;
+  const tools = new Map(); // see prepare(), by the width of the canvas
+  let last = null, seen = false, later = 0, share = 1, resting = 0;
 
   const toRow = row => (flipped ? rows - 1 - row : row);
 
-  // Prepares what depends on the size of the canvas and on the colours.
+  // What depends on the size of the canvas and on the colours: {painter, x, y, width, height}, size of the image of the painter.
   function prepare(reach) {
-    prepared = canvas.width;
-    const share = Math.min(1, PIXELS_OF_VOXEL * columns / canvas.width);
-    Object.assign(buffer, { width: Math.round(canvas.width * share), height: Math.max(1, Math.round(canvas.height * share)) });
-    const pixel = columns * grid.spacing[right] / buffer.width;
-    painter = backdrop ? createBackdrop(pixel) : createPainter(columns, rows, buffer.width, buffer.height, flipped, reach, pixel);
-    x = Float64Array.from({ length: columns }, (_, column) => (column + 0.5) / columns * canvas.width);
-    y = Float64Array.from({ length: rows }, (_, row) => (toRow(row) + 0.5) / rows * canvas.height);
+    const part = Math.min(1, PIXELS_OF_VOXEL * columns / canvas.width);
+    const width = Math.round(canvas.width * part), height = Math.max(1, Math.round(canvas.height * part)), pixel = columns * grid.spacing[right] / width;
+    const made = {
+      width, height,
+      painter: backdrop ? createBackdrop(width, height, pixel) : createPainter(columns, rows, width, height, flipped, reach, pixel),
+      x: Float64Array.from({ length: columns }, (_, column) => (column + 0.5) / columns * canvas.width),
+      y: Float64Array.from({ length: rows }, (_, row) => (toRow(row) + 0.5) / rows * canvas.height)
+    };
+    tools.set(canvas.width, made);
+    return made;
   }
 
   // The picture behind the contours, made again only for another slice.
-  function createBackdrop(pixel) {
+  function createBackdrop(width, height, pixel) {
     let made = null, of = -1;
     return (_, index) => {
-      if (of !== index) made = backdrop(axis, index, buffer.width, buffer.height, flipped, pixel);
+      if (of !== index) made = backdrop(axis, index, width, height, flipped, pixel);
       of = index;
       return made;
     };
   }
 
-  function contour(slice, style, width) {
+  function contour(slice, { x, y }, style, width) {
     context.beginPath();
     traceContour(context, slice, x, y);
     Object.assign(context, { strokeStyle: style, lineWidth: width, lineCap: 'round' });
@@ -161,6 +166,14 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
   // Draws at once while the reader sees the slice, otherwise when the sliders rest.
   function drawSoon() {
     clearTimeout(later);
+    clearTimeout(resting);
+    if (seen && !graphicsCard) {
+      share = MOVING_SLICES;
+      resting = setTimeout(() => {
+        share = 1;
+        draw();
+      }, UNSEEN_REST);
+    }
     if (seen) draw();
     else later = setTimeout(draw, UNSEEN_REST);
   }
@@ -168,17 +181,17 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
   function draw() {
     clearTimeout(later);
     if (!last) return;
-    const { slice, position, reach, fitted } = last, ratio = sized();
-    if (!painter || prepared !== canvas.width) prepare(reach);
-    const picture = painter(slice.data, position[axis]);
-    if (buffer.width === canvas.width) {
+    const { slice, position, reach, fitted } = last, ratio = sized(share), tool = tools.get(canvas.width) ?? prepare(reach), { x, y, width, height } = tool;
+    const picture = tool.painter(slice.data, position[axis]);
+    if (width === canvas.width) {
       context.putImageData(picture, 0, 0);
     } else {
+      if (buffer.width !== width || buffer.height !== height) Object.assign(buffer, { width, height });
       buffer.getContext('2d', SOFTWARE).putImageData(picture, 0, 0);
       context.drawImage(buffer, 0, 0, canvas.width, canvas.height);
     }
-    if (fitted) contour(fitted, cssColour(colour('--fitted')), 1.5 * ratio);
-    if (fitted !== slice) contour(slice, cssColour(colour(fitted ? '--moved' : '--contour')), 2 * ratio);
+    if (fitted) contour(fitted, tool, cssColour(colour('--fitted')), 1.5 * ratio);
+    if (fitted !== slice) contour(slice, tool, cssColour(colour(fitted ? '--moved' : '--contour')), 2 * ratio);
     // where the other two slices are
     context.beginPath();
     context.moveTo(x[position[right]], 0);
@@ -190,7 +203,7 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
   }
 
   const sized = onChange(canvas, () => {
-    painter = null;
+    tools.clear();
     draw();
   });
   new IntersectionObserver(entries => {
@@ -202,9 +215,12 @@ function createSliceView(axis, grid, { moved, pointed, watched, backdrop }) {
   function show(slice, position, reach, fitted = null) {
     last = { slice, position, reach, fitted };
     const mm = grid.origin[axis] + position[axis] * grid.spacing[axis];
-    label.value = grid.straight ? `${AXES[axis]} = ${numberText(Math.round(mm * 100) / 100, 4)} mm` : `slice ${position[axis] + 1} of ${grid.size[axis]}`;
-    canvas.setAttribute('aria-label', `Slice across ${AXES[axis]} of the map, ${label.value}`);
-    range.value = position[axis];
+    const place = grid.straight ? `${AXES[axis]} = ${numberText(Math.round(mm * 100) / 100, 4)} mm` : `slice ${position[axis] + 1} of ${grid.size[axis]}`;
+    if (label.value !== place) {
+      label.value = place;
+      canvas.setAttribute('aria-label', `Slice across ${AXES[axis]} of the map, ${place}`);
+      range.value = position[axis];
+    }
     drawSoon();
   }
 

@@ -1,48 +1,65 @@
 // The surface, drawn by WebGL2: turned by dragging or by the arrow keys, about the z axis of the shape and the horizontal.
-const VERTEX_SHADER = `#version 300 es
+// The colour of the surface: m: normal, eye: direction to the eye.
+const LIGHT = `
+uniform vec3 front, back, sky;
+vec3 lit(vec3 m, vec3 eye, vec3 base) {
+  vec3 light = normalize(vec3(-0.45, 0.65, 0.75));
+  float key = max(dot(m, light), 0.0), fill = 0.5 + 0.5 * m.y;
+  float shine = pow(max(dot(m, normalize(light + eye)), 0.0), 42.0);
+  float rim = pow(1.0 - max(dot(m, eye), 0.0), 3.0);
+  return base * (0.34 + 0.62 * key + 0.24 * fill) + 0.16 * shine + rim * sky * 0.28;
+}`;
+
+const VERTEX_HEAD = `#version 300 es
 uniform mat4 camera;
 uniform mat3 turn;
 layout(location = 0) in vec3 position;
-layout(location = 1) in vec3 normal;
+layout(location = 1) in vec3 normal;`;
+const FRAGMENT_HEAD = `#version 300 es
+precision highp float;
+out vec4 result;`;
+
+// Light at each pixel.
+const FINE_SHADERS = [VERTEX_HEAD + `
 out vec3 n;
 out vec3 view;
 void main() {
   n = turn * normal;
   gl_Position = camera * vec4(position, 1.0);
   view = vec3(gl_Position.xy / gl_Position.w * 0.25, -1.0);
-}`;
-
-const FRAGMENT_SHADER = `#version 300 es
-precision highp float;
-uniform vec3 front, back, sky;
+}`, FRAGMENT_HEAD + LIGHT + `
 uniform float shaded;
 in vec3 n;
 in vec3 view;
-out vec4 result;
 void main() {
   if (shaded < 0.5) { result = vec4(front, 1.0); return; }
   vec3 m = normalize(n), eye = normalize(-view);
-  vec3 base = front;
-  if (!gl_FrontFacing) { m = -m; base = back; }
-  vec3 light = normalize(vec3(-0.45, 0.65, 0.75));
-  float key = max(dot(m, light), 0.0), fill = 0.5 + 0.5 * m.y;
-  float shine = pow(max(dot(m, normalize(light + eye)), 0.0), 42.0);
-  float rim = pow(1.0 - max(dot(m, eye), 0.0), 3.0);
-  vec3 lit = base * (0.34 + 0.62 * key + 0.24 * fill) + 0.16 * shine + rim * sky * 0.28;
-  result = vec4(lit, 1.0);
-}`;
+  result = vec4(gl_FrontFacing ? lit(m, eye, front) : lit(-m, eye, back), 1.0);
+}`];
 
-function surfaceProgram(gl) {
+// Light at the vertices of a surface that is seen from outside, for drawing by software: a triangle has few pixels.
+const QUICK_SHADERS = [VERTEX_HEAD + LIGHT + `
+out vec3 colour;
+void main() {
+  gl_Position = camera * vec4(position, 1.0);
+  colour = lit(normalize(turn * normal), normalize(vec3(gl_Position.xy / gl_Position.w * -0.25, 1.0)), front);
+}`, FRAGMENT_HEAD + `
+in vec3 colour;
+void main() { result = vec4(colour, 1.0); }`];
+
+// A program and the places of its uniforms: {program, camera, turn, ...}.
+function surfaceProgram(gl, texts) {
   const program = gl.createProgram();
-  for (const [type, text] of [[gl.VERTEX_SHADER, VERTEX_SHADER], [gl.FRAGMENT_SHADER, FRAGMENT_SHADER]]) {
+  [gl.VERTEX_SHADER, gl.FRAGMENT_SHADER].forEach((type, i) => {
     const shader = gl.createShader(type);
-    gl.shaderSource(shader, text);
+    gl.shaderSource(shader, texts[i]);
     gl.compileShader(shader);
     gl.attachShader(program, shader);
-  }
+  });
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
-  return program;
+  const names = ['camera', 'turn', 'front', 'back', 'sky', 'shaded'];
+  return { program, ...Object.fromEntries(names.map(name => [name, gl.getUniformLocation(program, name)])) };
 }
 
 // The camera: matrices in the order of columns. yaw, pitch: rad; zoom 1 shows a ball of this radius around the centre.
@@ -74,9 +91,10 @@ function withNormals(positions, triangles) {
   return out;
 }
 
-// Without a graphics card the browser draws by software: there pictures have fewer pixels while they change, and when they have come to rest
-// so many that edges are smooth, since the smoothing of WebGL itself takes most of the time.
+// Without a graphics card the browser draws by software: there pictures have fewer pixels and light at the vertices while they change, and when
+// they have come to rest so many pixels that edges are smooth, since the smoothing of WebGL itself takes most of the time.
 const MOVING_SHARE = 0.5, RESTING_SHARE = 2, REST = 250;
+const QUICK_ZOOM = 2; // up to this zoom the eye is outside of twice the radius
 
 function hasGraphicsCard() {
   const gl = document.createElement('canvas').getContext('webgl2', { failIfMajorPerformanceCaveat: true });
@@ -88,19 +106,21 @@ function hasGraphicsCard() {
   return !/swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
+const graphicsCard = hasGraphicsCard();
+
 // The view of the surface on a canvas; null without WebGL2. centre (mm) stands in the middle, a ball of `radius` is seen.
 function createSurfaceView(canvas, centre, radius) {
-  const fast = hasGraphicsCard(), gl = canvas.getContext('webgl2', { antialias: fast, alpha: false, preserveDrawingBuffer: true });
+  const gl = canvas.getContext('webgl2', { antialias: graphicsCard, alpha: false, preserveDrawingBuffer: true });
   if (!gl) return null;
   const home = { yaw: 0.55, pitch: 0.62, zoom: 1 };
   const at = { ...home };
   const paints = colours('card', 'surface', 'surface-back', 'surface-rim', 'accent');
-  let n = 0, program, place, lines = 0, buffers, frame = 0;
+  let n = 0, whole = false, fine, quick, lines = 0, buffers, frame = 0;
   let share = 1, resting = 0;
 
   function prepare() {
-    program = surfaceProgram(gl);
-    place = Object.fromEntries(['camera', 'turn', 'front', 'back', 'sky', 'shaded'].map(name => [name, gl.getUniformLocation(program, name)]));
+    fine = surfaceProgram(gl, FINE_SHADERS);
+    quick = surfaceProgram(gl, QUICK_SHADERS);
     buffers = { surface: gl.createVertexArray(), frames: gl.createVertexArray(), vertices: gl.createBuffer(), triangles: gl.createBuffer(), lines: gl.createBuffer() };
     gl.bindVertexArray(buffers.surface);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.vertices);
@@ -116,34 +136,51 @@ function createSurfaceView(canvas, centre, radius) {
     gl.bindVertexArray(null);
   }
 
+  // Takes a program into use.
+  function use(place, front) {
+    const { camera, turn } = cameraMatrices(at.yaw, at.pitch, at.zoom, centre, radius, canvas.width / canvas.height), paint = paints();
+    gl.useProgram(place.program);
+    gl.uniformMatrix4fv(place.camera, false, camera);
+    gl.uniformMatrix3fv(place.turn, false, turn);
+    gl.uniform3fv(place.front, paint[front]);
+    gl.uniform3fv(place.back, paint['surface-back']);
+    gl.uniform3fv(place.sky, paint['surface-rim']);
+  }
+
+  function drawSurface() {
+    // nobody sees the back of a whole surface
+    const hurried = share === MOVING_SHARE && whole && at.zoom <= QUICK_ZOOM;
+    if (hurried) gl.enable(gl.CULL_FACE);
+    use(hurried ? quick : fine, 'surface');
+    if (!hurried) gl.uniform1f(fine.shaded, 1);
+    gl.bindVertexArray(buffers.surface);
+    gl.drawElements(gl.TRIANGLES, n, gl.UNSIGNED_INT, 0);
+    gl.disable(gl.CULL_FACE);
+  }
+
+  function drawFrames() {
+    use(fine, 'accent');
+    gl.uniform1f(fine.shaded, 0);
+    gl.bindVertexArray(buffers.frames);
+    for (let i = 0; i < lines; i += 4) gl.drawArrays(gl.LINE_LOOP, i, 4);
+  }
+
   function draw() {
     cancelAnimationFrame(frame);
     frame = 0;
     sized(share);
-    const { camera, turn } = cameraMatrices(at.yaw, at.pitch, at.zoom, centre, radius, canvas.width / canvas.height), paint = paints();
     gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.clearColor(...paint.card, 1);
+    gl.clearColor(...paints().card, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
-    gl.useProgram(program);
-    gl.uniformMatrix4fv(place.camera, false, camera);
-    gl.uniformMatrix3fv(place.turn, false, turn);
-    gl.uniform3fv(place.front, paint.surface);
-    gl.uniform3fv(place.back, paint['surface-back']);
-    gl.uniform3fv(place.sky, paint['surface-rim']);
-    gl.uniform1f(place.shaded, 1);
-    gl.bindVertexArray(buffers.surface);
-    gl.drawElements(gl.TRIANGLES, n, gl.UNSIGNED_INT, 0);
-    gl.uniform1f(place.shaded, 0);
-    gl.uniform3fv(place.front, paint.accent);
-    gl.bindVertexArray(buffers.frames);
-    for (let i = 0; i < lines; i += 4) gl.drawArrays(gl.LINE_LOOP, i, 4);
+    drawSurface();
+    if (lines) drawFrames();
     gl.bindVertexArray(null);
   }
 
   // Called before a picture that others may follow soon.
   function move() {
-    if (fast) return;
+    if (graphicsCard) return;
     share = MOVING_SHARE;
     clearTimeout(resting);
     resting = setTimeout(() => {
@@ -157,14 +194,15 @@ function createSurfaceView(canvas, centre, radius) {
     if (!frame) frame = requestAnimationFrame(draw);
   }
 
-  // vertices[n][6]: position and normal
-  function show(vertices, triangles) {
+  // vertices[n][6]: position and normal; closed: the surface has no edge
+  function show(vertices, triangles, closed) {
     gl.bindVertexArray(buffers.surface);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.vertices);
     gl.bufferData(gl.ARRAY_BUFFER, vertices, gl.DYNAMIC_DRAW);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.DYNAMIC_DRAW);
     gl.bindVertexArray(null);
     n = triangles.length;
+    whole = closed;
     move();
     draw();
   }

@@ -24,6 +24,20 @@ static int edge_start(int edge)
     return u << (a + 1) % 3 | v << (a + 2) % 3;
 }
 
+/* Bit mask of the two faces of the cell on which an edge lies. */
+static int edge_faces(int edge)
+{
+    const int a = edge >> 2;
+    return 1 << (2 * ((a + 1) % 3) + (edge & 1)) | 1 << (2 * ((a + 2) % 3) + (edge >> 1 & 1));
+}
+
+/* The closed loops of a cell, each a row of edges: loop after loop in edge[]. */
+typedef struct loops {
+    bool known;
+    int8_t n, size[4]; // a loop has three edges at least
+    int8_t edge[12];
+} loops;
+
 /* State of the extraction, which goes through the grid layer by layer in z. Vertex indices are kept
  * for the edges along x and y in two layers, and for the edges along z between them. Bits say which
  * voxels are inside: so words of bits find the few edges and cells that the surface meets. */
@@ -36,8 +50,11 @@ typedef struct tracer {
     size_t nx, ny, nz;
     size_t words;        /* of the bits of a row of voxels */
     uint64_t *inside[2]; /* [layer & 1]: [ny][words], a bit a voxel: its value is below the level */
-    uint32_t *edge[2][2]; /* [layer & 1][axis]: [ny][nx], set where the level is crossed */
-    uint32_t *edge_z;     /* [ny][nx] */
+    uint32_t *edge[2][2];    /* [layer & 1][axis]: [ny][nx], set where the level is crossed */
+    uint32_t *edge_z;        /* [ny][nx] */
+    size_t edge_slot[2][12]; /* [k & 1]: where edge_z has the vertex of an edge of cell (0, 0, k) */
+    int faces[12];           /* edge_faces() */
+    loops found[256];        /* of cells without an ambiguous face: [bits of the corners inside] */
     sdm_builder b;
 } tracer;
 
@@ -167,23 +184,16 @@ static void join_face(cell *c, int axis, int side)
     for (int i = 0; i < 2; i++) c->next[enter[i]] = leave[(i + (starts_inside != joined)) % 2];
 }
 
-/* Bit mask of the two faces of the cell on which an edge lies. */
-static int edge_faces(int edge)
-{
-    const int a = edge >> 2;
-    return 1 << (2 * ((a + 1) % 3) + (edge & 1)) | 1 << (2 * ((a + 2) % 3) + (edge >> 1 & 1));
-}
-
 /* Cost of triangulating loop[n] as a fan around its corner p: the sum of the squared lengths of its
  * diagonals. INFINITY when a diagonal lies on a face of the cell: the neighbouring cell could use
  * the same diagonal, which would then be an edge of four triangles. */
-static double fan_cost(const tracer *t, const cell *c, const int *loop, int n, int p)
+static double fan_cost(const tracer *t, const cell *c, const int8_t *loop, int n, int p)
 {
     double cost = 0;
     const double *x = t->b.mesh->vert + 3 * (size_t)c->vertex[loop[p]];
     for (int i = 2; i < n - 1; i++) {
-        const int q = loop[(p + i) % n];
-        if (edge_faces(loop[p]) & edge_faces(q)) return INFINITY;
+        const int8_t q = loop[(p + i) % n];
+        if (t->faces[loop[p]] & t->faces[q]) return INFINITY;
         const double *y = t->b.mesh->vert + 3 * (size_t)c->vertex[q];
         for (int d = 0; d < 3; d++) cost += (x[d] - y[d]) * (x[d] - y[d]);
     }
@@ -198,7 +208,7 @@ static sdm_status add_triangle(tracer *t, uint32_t a, uint32_t b, uint32_t c, sd
 
 /* Triangulates the loop as a fan around its centroid, a new vertex, for the few loops on which
  * every other fan costs INFINITY. */
-static sdm_status fill_around_middle(tracer *t, const cell *c, const int *loop, int n,
+static sdm_status fill_around_middle(tracer *t, const cell *c, const int8_t *loop, int n,
                                      sdm_error *err)
 {
     double middle[3] = {0};
@@ -213,11 +223,15 @@ static sdm_status fill_around_middle(tracer *t, const cell *c, const int *loop, 
 }
 
 /* Triangulates the loop as the cheapest fan. */
-static sdm_status fill_loop(tracer *t, const cell *c, const int *loop, int n, sdm_error *err)
+static sdm_status fill_loop(tracer *t, const cell *c, const int8_t *loop, int n, sdm_error *err)
 {
+    if (n == 3)
+        return add_triangle(t, c->vertex[loop[0]], c->vertex[loop[1]], c->vertex[loop[2]], err);
     int best = 0;
     double best_cost = INFINITY;
-    for (int p = 0; p < n; p++) {
+    // corners that are opposite to each other in a loop of four have the same fan
+    const int n_fans = n == 4 ? 2 : n;
+    for (int p = 0; p < n_fans; p++) {
         const double cost = fan_cost(t, c, loop, n, p);
         if (!(cost < best_cost)) continue;
         best_cost = cost;
@@ -231,35 +245,40 @@ static sdm_status fill_loop(tracer *t, const cell *c, const int *loop, int n, sd
     return s;
 }
 
-/* Adds the triangles of one cell. */
-static sdm_status trace_cell(tracer *t, cell *c, sdm_error *err)
+/* Finds the loops of a cell from the values at its corners. */
+static void find_loops(cell *c, loops *out)
 {
+    int8_t *edge = out->edge;
+    out->n = 0;
     for (int e = 0; e < 12; e++) c->next[e] = -1;
     for (int face = 0; face < 6; face++) join_face(c, face >> 1, face & 1);
     for (int start = 0; start < 12; start++) {
         // follow the loop through this edge, and delete its segments
-        int loop[12], n = 0;
+        int size = 0;
         for (int e = start; c->next[e] >= 0;) {
-            loop[n++] = e;
+            *edge++ = (int8_t)e;
+            size++;
             const int next = c->next[e];
             c->next[e] = -1;
             e = next;
         }
-        const sdm_status s = n ? fill_loop(t, c, loop, n, err) : SDM_OK;
-        if (s) return s;
+        if (size) out->size[out->n++] = (int8_t)size;
     }
-    return SDM_OK;
 }
 
-/* Fills c->vertex for the cell with lower corner (i, j, k). */
-static void collect_vertices(const tracer *t, size_t i, size_t j, size_t k, cell *c)
+/* Whether a face of the cell has two corners inside that lie across from each other, and no other
+ * one; inside: bits of the corners. */
+static bool is_ambiguous(int inside)
 {
-    for (int e = 0; e < 12; e++) {
-        const int at = edge_start(e), axis = e >> 2;
-        const size_t slot = (j + (size_t)(at >> 1 & 1)) * t->nx + i + (size_t)(at & 1),
-                     layer = k + (size_t)(at >> 2);
-        c->vertex[e] = axis == 2 ? t->edge_z[slot] : t->edge[layer & 1][axis][slot];
+    for (int axis = 0; axis < 3; axis++) {
+        const int one = 1 << (axis + 1) % 3, two = 1 << (axis + 2) % 3;
+        for (int base = 0; base <= 1 << axis; base += 1 << axis) {
+            const int first = (inside >> base & 1) | (inside >> (base | one | two) & 1) << 1,
+                      second = (inside >> (base | one) & 1) | (inside >> (base | two) & 1) << 1;
+            if ((first == 3 && second == 0) || (first == 0 && second == 3)) return true;
+        }
     }
+    return false;
 }
 
 /* Bits of the cells that the surface passes through: with lower corners in word w of row j, between
@@ -276,14 +295,43 @@ static uint64_t met_cells(const tracer *t, size_t j, size_t w)
     return some & ~all & have_next(t, w);
 }
 
+/* The loops of the cell with lower corner (i, j, k); *own: memory for those of an ambiguous cell.
+ */
+static const loops *loops_of(tracer *t, size_t i, size_t j, size_t k, cell *c, loops *own)
+{
+    int inside = 0;
+    for (size_t n = 0; n < 8; n++) {
+        const size_t at = i + (n & 1), row = (j + (n >> 1 & 1)) * t->words;
+        inside |= (int)(t->inside[(k + (n >> 2)) & 1][row + at / 64] >> at % 64 & 1) << n;
+    }
+    loops *found = &t->found[inside];
+    if (found->known) return found;
+    for (size_t n = 0; n < 8; n++)
+        c->v[n] = value_at(t, i + (n & 1), j + (n >> 1 & 1), k + (n >> 2));
+    if (is_ambiguous(inside))
+        found = own;
+    else
+        found->known = true;
+    find_loops(c, found);
+    return found;
+}
+
 /* Adds the triangles of the cell with lower corner (i, j, k). */
 static sdm_status add_cell(tracer *t, size_t i, size_t j, size_t k, sdm_error *err)
 {
     cell c;
-    for (size_t n = 0; n < 8; n++)
-        c.v[n] = value_at(t, i + (n & 1), j + (n >> 1 & 1), k + (n >> 2));
-    collect_vertices(t, i, j, k, &c);
-    return trace_cell(t, &c, err);
+    loops own;
+    const loops *of = loops_of(t, i, j, k, &c, &own);
+    const uint32_t *vertices = t->edge_z + j * t->nx + i;
+    const int8_t *edge = of->edge;
+    sdm_status s = SDM_OK;
+    for (int n = 0; n < of->n && !s; n++) {
+        for (int e = 0; e < of->size[n]; e++)
+            c.vertex[edge[e]] = vertices[t->edge_slot[k & 1][edge[e]]];
+        s = fill_loop(t, &c, edge, of->size[n], err);
+        edge += of->size[n];
+    }
+    return s;
 }
 
 /* Adds the triangles of the cells between layers k and k + 1. */
@@ -334,6 +382,15 @@ static sdm_status make_layers(tracer *t, sdm_error *err)
     if (s) return s;
     for (size_t i = 0; i < 4; i++) t->edge[i >> 1][i & 1] = t->edge_z + (i + 1) * area;
     t->inside[1] = t->inside[0] + bits;
+    for (int e = 0; e < 12; e++) {
+        const int at = edge_start(e), axis = e >> 2;
+        const size_t slot = (size_t)(at >> 1 & 1) * t->nx + (size_t)(at & 1);
+        for (size_t odd = 0; odd < 2; odd++) {
+            const size_t layer = (odd + (size_t)(at >> 2)) & 1;
+            t->edge_slot[odd][e] = axis == 2 ? slot : slot + (1 + 2 * layer + (size_t)axis) * area;
+        }
+        t->faces[e] = edge_faces(e);
+    }
     return SDM_OK;
 }
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "cohort.h"
+#include "inputs/input_checksum.h"
 #include "report/files.h"
 #include "sdm/internal/heap.h"
 #include "slicer/slicer.h"

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "fit_command.h"
-#include "report/files.h"
+#include "inputs/input_checksum.h"
 
 /* Appends a word as a shell reads it: in quotes where it holds more than plain characters. */
 static void add_word(sdm_text *t, const char *word)

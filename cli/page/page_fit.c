@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "fit/fit_command.h"
-#include "report/files.h"
+#include "inputs/input_checksum.h"
 #include "report/terminal.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/map.h"

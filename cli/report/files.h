@@ -21,7 +21,3 @@ bool cli_ends_with_any(const char *path, const char *endings);
  * an input or another output, also under a different name or through a link. outputs NULL: all
  * outputs of the command line. SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_check_files(const cli_args *args, const cli_list *outputs, sdm_error *err);
-
-/* CRC-64/XZ of an input: of the bytes of the file and, if it is the header of an image whose voxels
- * are in a second file, of the values behind them. Errors of reading. */
-sdm_status cli_input_checksum(const char *path, uint64_t *crc, sdm_error *err);

@@ -32,7 +32,7 @@ static atomic_long allocations;
 static atomic_bool started; /* main() runs */
 static long fail_at;
 static bool lasting;
-static const char *where; /* FAIL_IN; NULL: everywhere */
+static const char *where;            /* FAIL_IN; NULL: everywhere */
 static uintptr_t first_byte, beyond; /* addresses of that object */
 
 static bool fails(const void *caller)

@@ -339,8 +339,7 @@ void sdm_canvas_line(sdm_canvas *c, double x0, double y0, double x1, double y1, 
 static void image_keep(sdm_canvas *c, cairo_surface_t *image)
 {
     drawn_image *kept = NULL;
-    if (c->format != FORMAT_PNG && !c->error.status)
-        SDM_ALLOC(&kept, 1, "picture", &c->error);
+    if (c->format != FORMAT_PNG && !c->error.status) SDM_ALLOC(&kept, 1, "picture", &c->error);
     if (kept) {
         *kept = (drawn_image){.next = c->images, .surface = image};
         c->images = kept;

@@ -1,7 +1,9 @@
 /* The checksum of an input, as results of fits and cohorts state it. */
+#include "input_checksum.h"
+
 #include <sys/stat.h>
 
-#include "files.h"
+#include "report/files.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/volume.h"
 

@@ -78,7 +78,7 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "map, if the shape is a built-in one without data files. FIT.json (of `sdmgen fit`):\n"
      "the image with the contour of the fit and its standard deviation, the verdict, and\n"
      "what the image does not determine; model and image are read from where the fit found\n"
-     "them, or from the folder of the file.",
+     "them, or from the folder of the file, if they have the checksums that it states.",
      "sdmgen report runs/cochlea -o cochlea.html", 1, 1},
     {"shapes", "[NAME] | new NAME | check NAME|CONFIG | test NAME|PLUGIN",
      "list the shapes, describe one, begin a new one, check or test one",
@@ -304,6 +304,9 @@ const cli_option cli_options[] = {
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_REPORT), AT(outputs), "the page: .html"},
     {"no-model", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_REPORT), AT(no_model),
      "leave out the model and the runtime: pictures alone"},
+    {"changed-files", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_REPORT), AT(changed_files),
+     "FIT.json: take the model and the image although their checksums are not those that the file "
+     "states"},
     {"report", 0, CLI_TEXT, "FILE.html", NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_FIT), AT(report),
      "also write a page of the result for a browser (see `sdmgen report`)"},
     {"output", 'o', CLI_LIST, "FILE", NULL, 0, 0, ON(CLI_IMPORT), AT(outputs), "output: .ssm"},

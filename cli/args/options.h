@@ -163,7 +163,7 @@ struct cli_args {
     const char *points, *columns;    /* generate, exact: file of points, columns */
     double narrow;                   /* exact: voxels; 0: option missing */
     double tolerance;                /* exact: mm; 0: option missing */
-    bool no_model;                   /* report */
+    bool no_model, changed_files;    /* report */
     const char *report;              /* train, fit: file of a page */
     bool dump;                       /* config */
     bool keys;                       /* config, experiment */

@@ -5,10 +5,9 @@
 #include <unistd.h>
 
 #include "cohort.h"
+#include "inputs/input_checksum.h"
 #include "report/files.h"
-#include "sdm/internal/checksum.h"
 #include "sdm/internal/heap.h"
-#include "sdm/volume.h"
 #include "slicer/slicer.h"
 
 /* ---- lists of words ---- */
@@ -212,19 +211,13 @@ sdm_status cli_words_make(const cli_cohort *c, size_t i, cli_words *out, sdm_err
 
 /* ---- the key ---- */
 
-/* Appends the checksum of a file. An image whose voxels lie in a second file has them, too. */
 static void add_checksum(sdm_text *t, const char *path)
 {
     uint64_t crc = 0;
-    sdm_volume v = {0};
-    if (sdm_file_checksum(path, &crc, NULL)) {
+    if (cli_input_checksum(path, &crc, NULL))
         sdm_text_add(t, "no file\n");
-        return;
-    }
-    if (cli_ends_with_any(path, ".mhd .nhdr") && !sdm_volume_read(path, &v, NULL))
-        crc = sdm_crc64(crc, v.values, sdm_grid_count(&v.grid) * sizeof *v.values);
-    sdm_volume_dispose(&v);
-    sdm_text_add(t, "%016" PRIx64 "\n", crc);
+    else
+        sdm_text_add(t, "%016" PRIx64 "\n", crc);
 }
 
 sdm_status cli_words_key(const cli_words *w, char key[SDM_SHA256_TEXT], sdm_error *err)

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "fit_command.h"
-#include "sdm/internal/checksum.h"
+#include "inputs/input_checksum.h"
 
 /* Appends a word as a shell reads it: in quotes where it holds more than plain characters. */
 static void add_word(sdm_text *t, const char *word)
@@ -25,7 +25,7 @@ static void add_file(sdm_json *j, const char *path)
 {
     uint64_t crc = 0;
     char text[20];
-    if (!path || sdm_file_checksum(path, &crc, NULL)) return;
+    if (!path || cli_input_checksum(path, &crc, NULL)) return;
     snprintf(text, sizeof text, "%016" PRIx64, crc);
     sdm_json_open(j, NULL, '{');
     sdm_json_text(j, "file", path);

@@ -367,6 +367,11 @@ sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const dou
     const double longest = fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
     const double margin = 0.1 * longest;
     const bool has_size = args->size[0] > 0, has_spacing = args->spacing[0] > 0;
+    if (!has_spacing && !(longest > 0))
+        return sdm_fail(err, SDM_E_ARG,
+                        "the surface is the single point (%g, %g, %g), and there is no voxel size "
+                        "that suits it: give --spacing and --size",
+                        min[0], min[1], min[2]);
     // spacing
     double spacing[3];
     int64_t n[3];

@@ -8,8 +8,8 @@
 #include <unistd.h>
 
 #include "fit/fit_command.h"
+#include "inputs/input_checksum.h"
 #include "report/terminal.h"
-#include "sdm/internal/checksum.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
@@ -30,49 +30,107 @@ void cli_page_fit_dispose(cli_page_fit *f)
 
 /* ---- the file ---- */
 
-/* name = the text of the member `key`, "" if it is none; path = the file of this name, from the
- * working folder or beside the result; "" if it is in neither. */
-static void find_file(const cli_page_fit *f, const char *key, char name[SDM_PATH_TEXT_MAX],
-                      char path[SDM_PATH_TEXT_MAX])
-{
-    if (!sdm_json_word(&f->json, sdm_json_member(&f->json, 0, key), name, SDM_PATH_TEXT_MAX))
-        *name = '\0';
-    const char *last = strrchr(name, '/'), *slash = strrchr(f->name, '/');
-    const int folder = slash ? (int)(slash - f->name) + 1 : 0;
-    snprintf(path, SDM_PATH_TEXT_MAX, "%s", name);
-    if (access(path, R_OK) && *name != '/')
-        snprintf(path, SDM_PATH_TEXT_MAX, "%.*s%s", folder, f->name, name);
-    if (access(path, R_OK) && last)
-        snprintf(path, SDM_PATH_TEXT_MAX, "%.*s%s", folder, f->name, last + 1);
-    if (access(path, R_OK)) *path = '\0';
-}
+/* A file that the result names. */
+typedef struct named_file {
+    char name[SDM_PATH_TEXT_MAX]; /* in the result; "": none */
+    char path[SDM_PATH_TEXT_MAX]; /* where it is; "": nowhere */
+    bool is_same;                 /* it has the checksum that the result states */
+} named_file;
 
-/* A notice if the file has another checksum than the fit states. */
-static void compare_checksum(const cli_page_fit *f, const char *name, const char *path)
+/* text = the checksum that the result states for the file; "" if it states none. */
+static void get_checksum(const cli_page_fit *f, const char *name, char text[20])
 {
     const sdm_json_document *d = &f->json;
     const size_t inputs = sdm_json_member(d, 0, "inputs");
-    uint64_t crc = 0;
-    char now[20], file[SDM_PATH_TEXT_MAX];
-    if (!inputs || !*path || sdm_file_checksum(path, &crc, NULL)) return;
-    snprintf(now, sizeof now, "%016" PRIx64, crc);
+    char file[SDM_PATH_TEXT_MAX];
+    *text = '\0';
+    if (!inputs || d->values[inputs].kind != '[') return;
     for (size_t i = inputs + 1; i < d->values[inputs].next; i = d->values[i].next) {
         const size_t given = sdm_json_member(d, i, "file"), sum = sdm_json_member(d, i, "crc64");
         if (!given || !sum || !sdm_json_word(d, given, file, sizeof file)) continue;
         if (strcmp(file, name)) continue;
-        if (!sdm_json_is(d, sum, now)) cli_notice("%s has changed since the fit", path);
+        if (!sdm_json_word(d, sum, text, 20)) *text = '\0';
         return;
     }
 }
 
-sdm_status cli_page_fit_take(const char *name, char *text, size_t size, cli_page_fit *f,
-                             sdm_error *err)
+/* Takes the path for the file, unless one was found before, or this one cannot be read. */
+static void try_path(const char *path, const char *checksum, named_file *file)
+{
+    uint64_t crc = 0;
+    char now[20];
+    if (file->is_same || strlen(path) >= sizeof file->path || access(path, R_OK)) return;
+    if (cli_input_checksum(path, &crc, NULL)) return;
+    snprintf(now, sizeof now, "%016" PRIx64, crc);
+    file->is_same = !strcmp(now, checksum);
+    if (file->is_same || !*file->path) snprintf(file->path, sizeof file->path, "%s", path);
+}
+
+/* Finds the file that the member `key` names: from the working folder, from the folder of the
+ * result, or beside the result. The first one with the right checksum is taken, or else the first
+ * one. */
+static void find_file(const cli_page_fit *f, const char *key, named_file *file)
+{
+    *file = (named_file){.is_same = false};
+    if (!sdm_json_word(&f->json, sdm_json_member(&f->json, 0, key), file->name, sizeof file->name))
+        *file->name = '\0';
+    if (!*file->name) return;
+    const char *last = strrchr(file->name, '/'), *slash = strrchr(f->name, '/');
+    const int folder = slash ? (int)(slash - f->name) + 1 : 0;
+    char checksum[20], path[2 * SDM_PATH_TEXT_MAX];
+    get_checksum(f, file->name, checksum);
+    try_path(file->name, checksum, file);
+    snprintf(path, sizeof path, "%.*s%s", folder, f->name, file->name);
+    if (folder && *file->name != '/') try_path(path, checksum, file);
+    snprintf(path, sizeof path, "%.*s%s", folder, f->name, last ? last + 1 : file->name);
+    if (last) try_path(path, checksum, file);
+}
+
+static sdm_status find_model(bool changed, cli_page_fit *f, sdm_error *err)
+{
+    named_file model;
+    find_file(f, "model", &model);
+    if (!*model.path)
+        return sdm_fail(err, SDM_E_IO,
+                        "%s: its model '%s' is gone: put it there, or into the folder of this "
+                        "file",
+                        f->name, model.name);
+    if (!model.is_same && !changed)
+        return sdm_fail(err, SDM_E_FORMAT,
+                        "%s: its model %s has changed since the fit, or is another file: it has "
+                        "not the checksum that the result states; --changed-files takes it",
+                        f->name, model.path);
+    if (!model.is_same) cli_notice("%s has changed since the fit", model.path);
+    snprintf(f->model_path, sizeof f->model_path, "%s", model.path);
+    return SDM_OK;
+}
+
+static void find_image(bool changed, cli_page_fit *f)
+{
+    named_file image;
+    find_file(f, "image", &image);
+    const bool taken = *image.path && (image.is_same || changed);
+    if (!*image.path)
+        cli_notice("%s: its image '%s' is gone: the page shows none (put it there, or into the "
+                   "folder of this file)",
+                   f->name, image.name);
+    else if (!taken)
+        cli_notice("%s: its image %s has changed since the fit, or is another file: it has not "
+                   "the checksum that the result states, and the page shows none "
+                   "(--changed-files shows it)",
+                   f->name, image.path);
+    else if (!image.is_same)
+        cli_notice("%s has changed since the fit", image.path);
+    snprintf(f->image_path, sizeof f->image_path, "%s", taken ? image.path : "");
+}
+
+sdm_status cli_page_fit_take(const char *name, char *text, size_t size, bool changed,
+                             cli_page_fit *f, sdm_error *err)
 {
     f->name = name;
     f->text = text;
-    char model[SDM_PATH_TEXT_MAX], image[SDM_PATH_TEXT_MAX];
     while (size && text[size - 1] == '\n') text[--size] = '\0';
-    const sdm_status s = sdm_json_parse(name, text, size, &f->json, err);
+    sdm_status s = sdm_json_parse(name, text, size, &f->json, err);
     if (s) return s;
     static const char *const members[] = {"image", "parameters", "pose", "unknowns", "covariance"};
     for (size_t i = 0; i < sizeof members / sizeof *members; i++)
@@ -84,20 +142,9 @@ sdm_status cli_page_fit_take(const char *name, char *text, size_t size, cli_page
     if (!sdm_json_member(&f->json, 0, "model"))
         return sdm_fail(err, SDM_E_UNSUPPORTED,
                         "%s: a fit without a model (--shape) has no page: fit a MODEL", name);
-    find_file(f, "model", model, f->model_path);
-    find_file(f, "image", image, f->image_path);
-    if (!*f->model_path)
-        return sdm_fail(err, SDM_E_IO,
-                        "%s: its model '%s' is gone: put it there, or into the folder of this "
-                        "file",
-                        name, model);
-    if (!*f->image_path)
-        cli_notice("%s: its image '%s' is gone: the page shows none (put it there, or into the "
-                   "folder of this file)",
-                   name, image);
-    compare_checksum(f, model, f->model_path);
-    compare_checksum(f, image, f->image_path);
-    return SDM_OK;
+    s = find_model(changed, f, err);
+    if (!s) find_image(changed, f);
+    return s;
 }
 
 /* ---- the estimate ---- */

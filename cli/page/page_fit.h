@@ -31,10 +31,13 @@ typedef struct cli_page_fit {
 } cli_page_fit;
 
 /* Takes the JSON of a fit, text[size] with a zero byte behind it, and finds the files that it
- * names: from the working folder or beside `name`. SDM_E_FORMAT: it is no result of a fit;
- * SDM_E_UNSUPPORTED: a fit without a model; SDM_E_IO: the model is gone. */
-sdm_status cli_page_fit_take(const char *name, char *text, size_t size, cli_page_fit *f,
-                             sdm_error *err);
+ * names: from the working folder or beside `name`. Only a file with the checksum that the result
+ * states for it is taken, unless `changed`: a result of a stranger thereby opens no file whose
+ * content the stranger does not know. Without its image the page has none, and a notice says so.
+ * SDM_E_FORMAT: it is no result of a fit, or the model has another checksum; SDM_E_UNSUPPORTED: a
+ * fit without a model; SDM_E_IO: the model is gone. */
+sdm_status cli_page_fit_take(const char *name, char *text, size_t size, bool changed,
+                             cli_page_fit *f, sdm_error *err);
 
 /* Computes the maps at the estimate, samples the image if it is there, and packs them. shape: of
  * the model; NULL: not known, then the estimate must lie in the trained range. */

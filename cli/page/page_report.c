@@ -40,16 +40,17 @@ static void source_dispose(source *s)
 }
 
 /* Takes the result of a fit, text[size]; it belongs to the source then. */
-static sdm_status take_fit(const char *name, char *text, size_t size, source *out, sdm_error *err)
+static sdm_status take_fit(const char *name, char *text, size_t size, bool changed, source *out,
+                           sdm_error *err)
 {
     out->of_fit = true;
-    const sdm_status s = cli_page_fit_take(name, text, size, &out->fit, err);
+    const sdm_status s = cli_page_fit_take(name, text, size, changed, &out->fit, err);
     snprintf(out->model_path, sizeof out->model_path, "%s", out->fit.model_path);
     return s;
 }
 
 /* Finds the files of the model and, in the folder of a run, of its training. */
-static sdm_status find_files(const char *path, source *out, sdm_error *err)
+static sdm_status find_files(const char *path, bool changed, source *out, sdm_error *err)
 {
     struct stat st;
     if (strlen(path) >= SDM_PATH_TEXT_MAX)
@@ -58,7 +59,7 @@ static sdm_status find_files(const char *path, source *out, sdm_error *err)
         char *text = NULL;
         size_t size, lines;
         const sdm_status s = sdm_file_read_text(path, FIT_BYTES_MAX, &text, &size, &lines, err);
-        return s ? s : take_fit(path, text, size, out, err);
+        return s ? s : take_fit(path, text, size, changed, out, err);
     }
     if (stat(path, &st) || !S_ISDIR(st.st_mode)) {
         strcpy(out->model_path, path);
@@ -162,7 +163,7 @@ sdm_status cli_page_report(const cli_args *args, const char *source_path, bool l
                            const char *path, sdm_error *err)
 {
     source src = {.model = NULL};
-    sdm_status s = find_files(source_path, &src, err);
+    sdm_status s = find_files(source_path, args->changed_files, &src, err);
     if (!s) s = make_page(args, &src, live, path, err);
     source_dispose(&src);
     return s;
@@ -177,7 +178,7 @@ sdm_status cli_page_report_fit(const cli_args *args, const sdm_json *fit, const 
                                     : SDM_ALLOC(&text, fit->text.size + 1, "page", err);
     if (!s) {
         memcpy(text, fit->text.data, fit->text.size + 1);
-        s = take_fit("the fit", text, fit->text.size, &src, err);
+        s = take_fit("the fit", text, fit->text.size, false, &src, err);
     }
     if (!s) s = make_page(args, &src, cli_page_has_runtime(), path, err);
     source_dispose(&src);

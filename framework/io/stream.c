@@ -70,6 +70,7 @@ sdm_status sdm_stream_detach(sdm_stream *in, const char *name, sdm_error *err)
     memcpy(header, in->path, sizeof header);
     sdm_stream_close(in);
     const sdm_status s = open_file(in, path, O_NOFOLLOW, err);
+    in->detached = true;
     return s ? sdm_fail_in(err, s, "%s", header) : SDM_OK;
 }
 

@@ -20,8 +20,9 @@ typedef struct sdm_stream {
     /* the unread part of the buffer */
     const uint8_t *at, *end;
     z_stream z;
-    /* zip: the data are compressed; ended: all data have been read */
-    bool zip, ended;
+    /* zip: the data are compressed; ended: all data have been read; detached: sdm_stream_detach()
+     * opened this file */
+    bool zip, ended, detached;
     uint8_t bytes[1 << 15];
     /* the line that was read last */
     char line[SDM_LINE_MAX];

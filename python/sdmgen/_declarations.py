@@ -139,7 +139,7 @@ typedef enum sdm_voxel_type { SDM_VOXEL_UINT8 = 0, SDM_VOXEL_INT8 = 1, SDM_VOXEL
 size_t sdm_voxel_size(sdm_voxel_type type);
 const char *sdm_voxel_name(sdm_voxel_type type);
 typedef struct sdm_segment { char name[96]; char id[96]; int64_t value; size_t layer; } sdm_segment;
-typedef struct sdm_volume { sdm_grid grid; bool placed; bool checked; size_t n_layers; float *values; sdm_voxel_type stored; float min, max; size_t n_nan, n_inf; sdm_segment *segments; size_t n_segments; char text[256]; double frames_differ_mm; bool frames_mirrored; } sdm_volume;
+typedef struct sdm_volume { sdm_grid grid; bool placed; bool checked; size_t n_layers; float *values; sdm_voxel_type stored; float min, max; size_t n_nan, n_inf; sdm_segment *segments; size_t n_segments; char text[256]; double frames_differ_mm; bool frames_mirrored; bool detached; } sdm_volume;
 sdm_status sdm_volume_read(const char *path, sdm_volume *out, sdm_error *err);
 void sdm_volume_dispose(sdm_volume *v);
 bool sdm_volume_knows(const char *path);

@@ -111,6 +111,8 @@ fi
 # Mistakes: one line on stderr, the right exit code, no file.
 expect 2 'either --shape NAME or --mesh FILE' sdmgen exact -o x.npy
 expect 2 'either --shape NAME or --mesh FILE' sdmgen exact --shape torus --mesh cube.off -o x.npy
+printf 'v 1 2 3\nv 1 2 3\nv 1 2 3\nf 1 2 3\n' >point.obj
+expect 2 'the surface is the single point \(1, 2, 3\).*give --spacing and --size' sdmgen exact --mesh point.obj -o x.npy
 expect 2 'belong to --shape' sdmgen exact --mesh cube.off -p a=1 -o x.npy
 expect 2 'an output is needed' sdmgen exact --shape torus
 expect 2 "output 'x.xyz': its name must end in" sdmgen exact --shape torus -o x.xyz

@@ -2,7 +2,7 @@
 # Pages of models, runs and fits: their files, their text, and the page itself in chromium (page.mjs), where the model must give the same map as
 # the program for the same kernels (third argument). The part in the browser is skipped without chromium or Node.js; fourth argument: whether
 # this build has the runtime for pages.
-# Tests: cmd_report.c page_errors.c page_figures.c page_fit.c page_history.c page_report.c page_still.c page_write.c
+# Tests: cmd_report.c page_errors.c page_figures.c page_fit.c page_history.c page_report.c page_still.c page_write.c input_checksum.c
 baseline=$3
 runtime=$4
 . "$(dirname "$0")/common.sh"
@@ -86,7 +86,8 @@ expect 0 "its image 'ct's\.nii\.gz' is gone: the page shows none" sdmgen report 
 figures page.html
 ! grep -q '"image": *{' out || bad 'an image that is gone is in the page'
 printf x >>model.sdm
-sdmgen report fit.json --no-model -o page.html >out 2>err && bad 'a damaged model makes a page'
+expect 3 'its model model\.sdm has changed since the fit, or is another file.*--changed-files takes it' sdmgen report fit.json --no-model -o page.html
+sdmgen report fit.json --changed-files --no-model -o page.html >out 2>err && bad 'a damaged model makes a page'
 grep -q 'model\.sdm has changed since the fit' err || bad "no word about a model that has changed: $(cat err)"
 rm model.sdm
 expect 1 "its model 'run/model\.sdm' is gone: put it there, or into the folder of this file" sdmgen report fit.json --no-model -o page.html
@@ -95,6 +96,41 @@ sed 's/"model": *"[^"]*", *//' fit.json >exact.json
 expect 1 'a fit without a model \(--shape\) has no page' sdmgen report exact.json --no-model -o page.html
 sed 's/"rx": /"qx": /' fit.json >other.json
 expect 3 "no value of the model's parameter 'rx'" sdmgen report other.json --no-model -o page.html
+# A result opens no file whose checksum it does not state: neither another image than that of the fit, nor one without a checksum.
+mkdir private
+sdmgen phantom --shape ellipsoid -p rx=2.2 -p ry=2.4 -p rz=2.1 --spacing 0.3 --seed 4 -o private/scan.nii.gz >/dev/null
+sed "s|ct's.nii.gz|$PWD/private/scan.nii.gz|g" fit.json >stranger.json
+expect 0 'private/scan\.nii\.gz has changed since the fit, or is another file.*the page shows none \(--changed-files shows it\)' \
+    sdmgen report stranger.json --no-model -o page.html
+figures page.html
+! grep -q '"image": *{' out || bad 'a file that the fit did not read is in the page'
+expect 0 'private/scan\.nii\.gz has changed since the fit$' sdmgen report stranger.json --changed-files --no-model -o page.html
+figures page.html
+has '"image": *\{"size"'
+sed 's/"inputs"/"outputs"/' fit.json >unstated.json
+expect 3 'model\.sdm has changed since the fit, or is another file' sdmgen report unstated.json --no-model -o page.html
+# the file of the fit in another place, which the result names; an empty name; a device
+cp "ct's.nii.gz" private/same.nii.gz
+sed "s|ct's.nii.gz|$PWD/private/same.nii.gz|g" fit.json >moved.json
+expect 0 - sdmgen report moved.json --no-model -o page.html
+[ ! -s err ] || bad "the same image elsewhere: $(cat err)"
+figures page.html
+has '"image": *\{"size"'
+sed "s|\"image\": *\"ct's.nii.gz\"|\"image\": \"/dev/zero\"|" fit.json >device.json
+expect 0 "its image '/dev/zero' is gone" sdmgen report device.json --changed-files --no-model -o page.html
+# voxels in a second file count as part of the image
+sdmgen phantom --shape ellipsoid --spacing 0.3 --seed 5 -o private/ct.mha >/dev/null
+start=$(($(grep -abm1 '^ElementDataFile' private/ct.mha | cut -d: -f1)))
+{ head -c "$start" private/ct.mha && echo 'ElementDataFile = ct.raw'; } >private/ct.mhd
+tail -c "+$((start + 1))" private/ct.mha | sed 1d >private/ct.raw
+sdmgen fit $model private/ct.mhd --rotation 0,0,0 --force -o detached.json >/dev/null 2>&1
+expect 0 - sdmgen report detached.json --no-model -o page.html
+[ ! -s err ] || bad "an image of two files: $(cat err)"
+figures page.html
+has '"image": *\{"size"'
+sdmgen phantom --shape ellipsoid --spacing 0.3 --seed 6 -o private/ct.mha >/dev/null
+tail -c "+$((start + 1))" private/ct.mha | sed 1d >private/ct.raw
+expect 0 'private/ct\.mhd has changed since the fit, or is another file' sdmgen report detached.json --no-model -o page.html
 # texts of a result cannot become code
 sed 's/"converged": /"doubt": "<\/script><script>alert(1)<\/script>\\u0007<!--", "converged": /' fit.json >hostile.json
 expect 0 - sdmgen report hostile.json --no-model -o hostile.html

@@ -3,7 +3,8 @@
    operator new, from the beginning of main() on.
      FAIL_AT=n         the n-th allocation, from 1, fails; 0: none
      FAIL_MODE=lasting all later ones fail, too
-     FAIL_OWN=1        only calls from the program itself count, none of shared libraries
+     FAIL_IN=name      only calls from this shared library count, e.g. libcairo.so; "program": only
+                       those from the program itself
      FAIL_COUNT=file   file.memory receives the number of allocations at the exit */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -30,13 +31,14 @@ int __libc_start_main(int (*begin)(int, char **, char **), int argc, char **argv
 static atomic_long allocations;
 static atomic_bool started; /* main() runs */
 static long fail_at;
-static bool lasting, own;
-static uintptr_t program_begin, program_end;
+static bool lasting;
+static const char *where;            /* FAIL_IN; NULL: everywhere */
+static uintptr_t first_byte, beyond; /* addresses of that object */
 
 static bool fails(const void *caller)
 {
     const uintptr_t at = (uintptr_t)caller;
-    if (!started || (own && (at < program_begin || at >= program_end))) return false;
+    if (!started || (where && (at < first_byte || at >= beyond))) return false;
     const long n = atomic_fetch_add(&allocations, 1) + 1;
     if (!fail_at || n < fail_at || (n > fail_at && !lasting)) return false;
     errno = ENOMEM;
@@ -59,17 +61,19 @@ int posix_memalign(void **block, size_t alignment, size_t n)
     return new ? 0 : ENOMEM;
 }
 
-/* Finds the first object of the list, the program itself. */
-static int find_program(struct dl_phdr_info *info, size_t size, void *user)
+/* Finds the addresses of the object that FAIL_IN names; the program itself is the first one of the
+ * list. */
+static int find_object(struct dl_phdr_info *info, size_t size, void *user)
 {
     (void)size, (void)user;
-    program_begin = UINTPTR_MAX;
+    if (strcmp(where, "program") && !strstr(info->dlpi_name, where)) return 0;
+    first_byte = UINTPTR_MAX;
     for (int i = 0; i < info->dlpi_phnum; i++) {
         const ElfW(Phdr) *part = &info->dlpi_phdr[i];
         const uintptr_t begin = info->dlpi_addr + part->p_vaddr;
         if (part->p_type != PT_LOAD) continue;
-        if (begin < program_begin) program_begin = begin;
-        if (begin + part->p_memsz > program_end) program_end = begin + part->p_memsz;
+        if (begin < first_byte) first_byte = begin;
+        if (begin + part->p_memsz > beyond) beyond = begin + part->p_memsz;
     }
     return 1;
 }
@@ -93,8 +97,8 @@ static int counted_main(int argc, char **argv, char **environment)
     const char *n = getenv("FAIL_AT"), *mode = getenv("FAIL_MODE");
     fail_at = n ? atol(n) : 0;
     lasting = mode && !strcmp(mode, "lasting");
-    own = getenv("FAIL_OWN") != NULL;
-    dl_iterate_phdr(find_program, NULL);
+    where = getenv("FAIL_IN");
+    if (where) dl_iterate_phdr(find_object, NULL);
     started = true;
     return program_main(argc, argv, environment);
 }

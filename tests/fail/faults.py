@@ -3,8 +3,9 @@
     faults.py PROGRAM SOURCE OUTPUT_SHIM MEMORY_SHIM [--sample N] [--only CASE] [--seed S]
 
 Each case is a command that writes files, some of which were there before. It is run once without a fault, and then with a fault at the
-n-th operation: by the shims fail_output.c and fail_memory.c. Without --sample all n up to 40 are tried, and 40 random ones beyond; with it,
-N random faults for each case and fewer cases. Whatever fails:
+n-th operation: by the shims fail_output.c and fail_memory.c. Without --sample all n up to 40 are tried, and 40 random ones beyond; of single
+allocations inside cairo and OpenVDB all n up to 1,000 and the primes beyond. With --sample N N random faults for each case, 4 N inside
+libraries, and fewer cases. Whatever fails:
   - the program does not crash, and it ends: with the exit code 0 and every output complete, or with 1 and a message;
   - a file under its final name is the old one or a complete new one, and no temporary file stays (but after a kill);
   - a training that was killed goes on with --resume to a model of the same bits.
@@ -40,25 +41,30 @@ methods:
 """
 POINTS = "x,y,z\n0,0,5\n0,0,-5\n" + "".join(f"{x},{y},{z}\n" for z in (0, 2, -2) for x, y in ((2, 0), (-2, 0), (0, 2), (0, -2)))
 OLD = b"the old file\n"
-FORMATS_SAMPLED = ("npy", "nrrd", "vdb", "ply", "pdf")
+PICTURES = ("png", "svg", "pdf")
+FORMATS_SAMPLED = ("npy", "nrrd", "vdb", "ply", "svg", "pdf")
 FORMATS = ("npy", "nii", "nii.gz", "nrrd", "mha", "vdb", "ply", "stl", "obj", "off", "vtk", "vtp", "png", "svg", "pdf")
 TIME_LIMIT = 200
 EVERY, BEYOND, RANDOM_KILLS = 40, 40, 40
+DENSE = 1000
 
 
 class Case:
     """A command, the outputs that it promises, and those that it may leave out."""
 
-    def __init__(self, name, *command, outputs=(), extra=(), own=False):
+    def __init__(self, name, *command, outputs=(), extra=(), where=None):
         self.name, self.command, self.outputs, self.extra = name, command, outputs, extra
-        self.own = own  # failed allocations: those of the program alone, without those in shared libraries
+        self.where = where  # allocations that fail: of the "program" itself, or of a shared library; None: all
+        self.of_libraries = where not in (None, "program") or name == "libraries vdb"
         self.reference = {}
 
 
 def cases(golden, formats):
     model = str(golden / "pod_i8.sdm")
-    # the system's own libraries and cairo do not survive that all allocations fail
-    made = [Case(f"generate {e}", "generate", model, "-o", f"x.{e}", outputs=(f"x.{e}",), own=e in ("vdb", "png", "svg", "pdf")) for e in formats]
+    # the system's own libraries do not survive that all allocations fail
+    foreign = ("vdb", "png", "svg", "pdf")
+    made = [Case(f"generate {e}", "generate", model, "-o", f"x.{e}", outputs=(f"x.{e}",), where="program" if e in foreign else None) for e in formats]
+    made += [Case(f"cairo {e}", "generate", model, "-o", f"x.{e}", outputs=(f"x.{e}",), where="libcairo.so") for e in formats if e in PICTURES]
     return made + [
         Case("libraries vdb", "generate", model, "-o", "x.vdb", outputs=("x.vdb",)),
         Case("exact", "exact", "--shape", "capsule", "--size", "9,9,9", "--spacing", "1.5", "-o", "x.nrrd", "-o", "x.ply",
@@ -67,10 +73,10 @@ def cases(golden, formats):
              outputs=("x.stl", "x.json")),
         Case("report", "report", model, "-o", "x.html", outputs=("x.html",)),
         Case("train", "train", "train.yaml", "--out", "run", outputs=("run/model.sdm", "run/metrics.jsonl", "run/config.yaml"),
-             extra=("run/loss.png", "run/slices.png", "run/checkpoint.sdmc"), own=True),
+             extra=("run/loss.png", "run/slices.png", "run/checkpoint.sdmc"), where="program"),
         Case("experiment", "experiment", "experiment.yaml", "--out", "run", "--peers", "none",
              outputs=("run/table.md", "run/table.csv", "run/table.json", "run/pod/model.sdm"),
-             extra=("run/pod/loss.png", "run/pod/slices.png", "run/pod/surfaces.png"), own=True),
+             extra=("run/pod/loss.png", "run/pod/slices.png", "run/pod/surfaces.png"), where="program"),
     ]  # fmt: skip
 
 
@@ -94,8 +100,8 @@ class Runner:
         environment = dict(os.environ, LC_ALL="C", OMP_NUM_THREADS="1")
         if shims:
             environment.update(LD_PRELOAD=":".join(self.shims[name] for name in shims), FAIL_AT=str(at), FAIL_MODE=mode, FAIL_COUNT=str(folder / "count"))
-            if case.own:
-                environment["FAIL_OWN"] = "1"
+            if case.where:
+                environment["FAIL_IN"] = case.where
         return subprocess.run([self.program, *case.command, "--quiet", "--threads", "1", *more], cwd=folder, env=environment, timeout=TIME_LIMIT,
                               capture_output=True, text=True, errors="replace")  # fmt: skip
 
@@ -111,7 +117,7 @@ class Runner:
             return bool(json.loads(text))
         if name.endswith((".md", ".csv")):  # a row that failed has no figures
             return text.split("\n")[0] == case.reference[name].decode().split("\n")[0] and text.endswith("\n")
-        if name.endswith(("pod/model.sdm", ".html", ".pdf", ".svg", ".png")):
+        if name.endswith(("pod/model.sdm", ".html")) or (name.startswith("run/") and name.endswith(".png")):
             return abs(len(content) - len(case.reference[name])) < 200 and content[-4:] == case.reference[name][-4:]
         return False
 
@@ -201,16 +207,23 @@ def places(n, chance):
     return list(range(1, min(n, EVERY) + 1)) + sorted(chance.sample(range(EVERY + 1, n + 1), min(BEYOND, max(0, n - EVERY))))
 
 
+def places_in_libraries(n, _):
+    """All allocations up to DENSE; beyond, those whose number is a prime."""
+    return [at for at in range(1, n + 1) if at <= DENSE or all(at % k for k in range(2, int(at**0.5) + 1))]
+
+
 def choose(case, counts, sample, chance):
     """The faults of a case: (shim, mode, place)."""
     modes = [("output", mode) for mode in ("once", "lasting", "kill", "half")] + [("memory", mode) for mode in ("once", "lasting")]
-    if case.name == "libraries vdb":  # single allocations of OpenVDB and others
-        modes = [("memory", "once")]
+    if case.of_libraries:  # the output operations are those of "generate"; OpenVDB does not survive that all allocations fail
+        modes = [("memory", "once")] + ([("memory", "lasting")] if case.where else [])
     if sample:
         # cairo forgets that a write of a PDF file failed if later ones succeed
         known = [("output", "once", at) for at in range(1, counts["output"] + 1)] if case.name == "generate pdf" else []
-        return known + [(shim, mode, chance.randint(1, counts[shim])) for shim, mode in (chance.choice(modes) for _ in range(sample))]
-    faults = [(shim, mode, at) for shim, mode in modes for at in places(counts[shim], chance)]
+        n = 4 * sample if case.of_libraries else sample
+        return known + [(shim, mode, chance.randint(1, counts[shim])) for shim, mode in (chance.choice(modes) for _ in range(n))]
+    faults = [(shim, mode, at) for shim, mode in modes
+              for at in (places_in_libraries if case.of_libraries and mode == "once" else places)(counts[shim], chance)]  # fmt: skip
     return faults + [("output", "random", seed) for seed in range(RANDOM_KILLS if case.name == "train" else 0)]
 
 
@@ -222,7 +235,7 @@ def main():
     parser.add_argument("--only", action="append", default=[])
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    chance, wrong, total = random.Random(options.seed), [], 0
+    chance, wrong, total, start = random.Random(options.seed), [], 0, time.monotonic()
     print(f"{'command':16} {'operations':>10} {'allocations':>11} {'output faults':>13} {'kills':>6} {'memory faults':>13} {'broken':>6}")
     with tempfile.TemporaryDirectory(prefix="faults.") as work, ThreadPoolExecutor(os.cpu_count()) as pool:
         runner = Runner(options, work)
@@ -240,7 +253,7 @@ def main():
             total += len(jobs)
     for line in wrong:
         print("BROKEN:", line)
-    print(f"{total} faults, {len(wrong)} broken promises")
+    print(f"{total} faults, {len(wrong)} broken promises, {time.monotonic() - start:.0f} s")
     sys.exit(1 if wrong or total == 0 else 0)
 
 

@@ -73,6 +73,8 @@ typedef struct sdm_volume {
     double frames_differ_mm;
     /* true: one of the two frames is a mirror image of the other */
     bool frames_mirrored;
+    /* true: the file is a header, and the voxels are in a second file */
+    bool detached;
 } sdm_volume;
 
 /* Reads one three-dimensional image of one channel, in either byte order. The ending of `path`

@@ -129,6 +129,7 @@ static sdm_status read_voxels(sdm_stream *in, const sdm_image_header *h, sdm_vol
     if (!s) s = sdm_stream_end(in, err);
     if (v->min > v->max) v->min = v->max = 0;
     v->checked = in->zip;
+    v->detached = in->detached;
     v->n_layers = h->layers;
     v->stored = h->type;
     return s;

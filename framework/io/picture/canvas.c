@@ -5,6 +5,7 @@
 #include <cairo-svg.h>
 #include <cairo.h>
 #include <ctype.h>
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,6 +26,12 @@ static const char *const ENDINGS[N_FORMATS] = {".png", ".svg", ".pdf"};
 /* Font size over the height of a capital letter, for common sans-serif fonts. */
 static const double EM_PER_CAPITAL = 1.37;
 
+/* An image that was drawn. */
+typedef struct drawn_image {
+    struct drawn_image *next;
+    cairo_surface_t *surface;
+} drawn_image;
+
 struct sdm_canvas {
     /* name of the file, owned by the caller */
     const char *path;
@@ -34,9 +41,32 @@ struct sdm_canvas {
     sdm_outfile *file;
     /* SVG: the document by cairo, and the text elements to put at its end */
     sdm_text document, labels;
-    /* first error in writing the file */
+    /* the images of SVG and PDF files, which live as long as the surface: cairo 1.16 would copy an
+     * image that it has not written yet when the image is freed, and crashes if there is no memory
+     * for the copy */
+    drawn_image *images;
+    /* first error in drawing and writing; nothing is drawn after it */
     sdm_error error;
+    /* an allocation of cairo failed */
+    bool starved;
 };
+
+/* Before calls of cairo: false if there was an error and nothing may be drawn any more. */
+static bool cairo_begin(const sdm_canvas *c)
+{
+    errno = 0;
+    return !c->error.status;
+}
+
+/* After calls of cairo: notes an allocation that failed. cairo forgets some of them and leaves out
+ * what it had to draw, but malloc() has set errno. */
+static void cairo_end(sdm_canvas *c)
+{
+    if (errno != ENOMEM) return;
+    c->starved = true;
+    if (!c->error.status)
+        sdm_fail(&c->error, SDM_E_NOMEM, "%s: out of memory for the picture", c->path);
+}
 
 /* ---- the file ---- */
 
@@ -69,7 +99,7 @@ static cairo_status_t write_bytes(void *user, const unsigned char *data, unsigne
     return c->error.status ? CAIRO_STATUS_WRITE_ERROR : CAIRO_STATUS_SUCCESS;
 }
 
-/* Reports the error in writing the file; if there was none, the error of cairo. */
+/* Reports the first error in drawing and writing; if there was none, the error of cairo. */
 static sdm_status canvas_fail(const sdm_canvas *c, cairo_status_t status, sdm_error *err)
 {
     if (c->error.status) return sdm_fail(err, c->error.status, "%s", c->error.text);
@@ -94,6 +124,21 @@ static void create_surface(sdm_canvas *c, int w, int h)
     }
 }
 
+/* Text and lines of all pictures. */
+static void set_style(cairo_t *cr)
+{
+    // without hinting, text has the same width in every format
+    cairo_font_options_t *options = cairo_font_options_create();
+    cairo_font_options_set_antialias(options, CAIRO_ANTIALIAS_GRAY);
+    cairo_font_options_set_hint_style(options, CAIRO_HINT_STYLE_NONE);
+    cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);
+    cairo_set_font_options(cr, options);
+    cairo_font_options_destroy(options);
+    // round line ends
+    cairo_set_line_cap(cr, CAIRO_LINE_CAP_ROUND);
+    cairo_set_line_join(cr, CAIRO_LINE_JOIN_ROUND);
+}
+
 sdm_status sdm_canvas_create(const char *path, int w, int h, sdm_canvas **out, sdm_error *err)
 {
     // name and size
@@ -111,25 +156,18 @@ sdm_status sdm_canvas_create(const char *path, int w, int h, sdm_canvas **out, s
     c->format = format_of(path);
     s = sdm_outfile_open(path, &c->file, err);
     if (!s) {
+        cairo_begin(c);
         create_surface(c, w, h);
         c->cr = cairo_create(c->surface);
         const cairo_status_t status = cairo_status(c->cr);
-        if (status) s = canvas_fail(c, status, err);
+        if (!status) set_style(c->cr);
+        cairo_end(c);
+        if (status || c->error.status) s = canvas_fail(c, status, err);
     }
     if (s) {
         sdm_canvas_discard(c);
         return s;
     }
-    // without hinting, text has the same width in every format
-    cairo_font_options_t *options = cairo_font_options_create();
-    cairo_font_options_set_antialias(options, CAIRO_ANTIALIAS_GRAY);
-    cairo_font_options_set_hint_style(options, CAIRO_HINT_STYLE_NONE);
-    cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);
-    cairo_set_font_options(c->cr, options);
-    cairo_font_options_destroy(options);
-    // round line ends, a white ground
-    cairo_set_line_cap(c->cr, CAIRO_LINE_CAP_ROUND);
-    cairo_set_line_join(c->cr, CAIRO_LINE_JOIN_ROUND);
     sdm_canvas_fill(c, (sdm_box){0, 0, w, h}, (sdm_colour){255, 255, 255}, 1);
     *out = c;
     return SDM_OK;
@@ -178,10 +216,13 @@ static sdm_status write_svg(sdm_canvas *c, sdm_error *err)
 sdm_status sdm_canvas_finish(sdm_canvas *c, sdm_error *err)
 {
     cairo_status_t status = cairo_status(c->cr);
-    if (!status && c->format == FORMAT_PNG)
-        status = cairo_surface_write_to_png_stream(c->surface, write_bytes, c);
-    cairo_surface_finish(c->surface);
-    if (!status) status = cairo_surface_status(c->surface);
+    if (!status && cairo_begin(c)) {
+        if (c->format == FORMAT_PNG)
+            status = cairo_surface_write_to_png_stream(c->surface, write_bytes, c);
+        cairo_surface_finish(c->surface);
+        if (!status) status = cairo_surface_status(c->surface);
+        cairo_end(c);
+    }
     // cairo forgets errors of write_bytes() in PDF files
     sdm_status s = status || c->error.status ? canvas_fail(c, status, err) : SDM_OK;
     if (!s && c->format == FORMAT_SVG) s = write_svg(c, err);
@@ -190,11 +231,24 @@ sdm_status sdm_canvas_finish(sdm_canvas *c, sdm_error *err)
     return s;
 }
 
+/* Frees what cairo holds. An SVG or PDF file is finished by that, which takes memory: cairo 1.16
+ * crashes if there is none, so the drawing is left as it is then. */
+static void free_drawing(sdm_canvas *c)
+{
+    const bool leave = c->starved && c->format != FORMAT_PNG;
+    if (!leave) cairo_destroy(c->cr);
+    if (!leave) cairo_surface_destroy(c->surface);
+    for (drawn_image *image = c->images, *next; image; image = next) {
+        next = image->next;
+        if (!leave) cairo_surface_destroy(image->surface);
+        sdm_free(image);
+    }
+}
+
 void sdm_canvas_discard(sdm_canvas *c)
 {
     if (!c) return;
-    cairo_destroy(c->cr);
-    cairo_surface_destroy(c->surface);
+    free_drawing(c);
     sdm_outfile_discard(&c->file);
     sdm_text_dispose(&c->document);
     sdm_text_dispose(&c->labels);
@@ -210,54 +264,93 @@ static void set_colour(sdm_canvas *c, sdm_colour colour, double alpha)
 
 void sdm_canvas_clip(sdm_canvas *c, sdm_box box)
 {
+    if (!cairo_begin(c)) return;
     cairo_rectangle(c->cr, box.x, box.y, box.w, box.h);
     cairo_clip(c->cr);
+    cairo_end(c);
 }
 
-void sdm_canvas_unclip(sdm_canvas *c) { cairo_reset_clip(c->cr); }
+void sdm_canvas_unclip(sdm_canvas *c)
+{
+    if (!cairo_begin(c)) return;
+    cairo_reset_clip(c->cr);
+    cairo_end(c);
+}
 
 void sdm_canvas_fill(sdm_canvas *c, sdm_box box, sdm_colour colour, double alpha)
 {
+    if (!cairo_begin(c)) return;
     set_colour(c, colour, alpha);
     cairo_rectangle(c->cr, box.x, box.y, box.w, box.h);
     cairo_fill(c->cr);
+    cairo_end(c);
 }
 
 void sdm_canvas_frame(sdm_canvas *c, sdm_box box, sdm_colour colour)
 {
+    if (!cairo_begin(c)) return;
     set_colour(c, colour, 1);
     cairo_set_line_width(c->cr, 1);
     cairo_rectangle(c->cr, box.x - 0.5, box.y - 0.5, box.w + 1, box.h + 1);
     cairo_stroke(c->cr);
+    cairo_end(c);
 }
 
-void sdm_canvas_move_to(sdm_canvas *c, double x, double y) { cairo_move_to(c->cr, x, y); }
+void sdm_canvas_move_to(sdm_canvas *c, double x, double y)
+{
+    if (!cairo_begin(c)) return;
+    cairo_move_to(c->cr, x, y);
+    cairo_end(c);
+}
 
-void sdm_canvas_line_to(sdm_canvas *c, double x, double y) { cairo_line_to(c->cr, x, y); }
+void sdm_canvas_line_to(sdm_canvas *c, double x, double y)
+{
+    if (!cairo_begin(c)) return;
+    cairo_line_to(c->cr, x, y);
+    cairo_end(c);
+}
 
 void sdm_canvas_stroke_keep(sdm_canvas *c, double width, sdm_colour colour, double alpha)
 {
+    if (!cairo_begin(c)) return;
     set_colour(c, colour, alpha);
     cairo_set_line_width(c->cr, width);
     cairo_stroke_preserve(c->cr);
+    cairo_end(c);
 }
 
 void sdm_canvas_stroke(sdm_canvas *c, double width, sdm_colour colour)
 {
     sdm_canvas_stroke_keep(c, width, colour, 1);
+    if (!cairo_begin(c)) return;
     cairo_new_path(c->cr);
+    cairo_end(c);
 }
 
 void sdm_canvas_line(sdm_canvas *c, double x0, double y0, double x1, double y1, double width,
                      sdm_colour colour)
 {
-    cairo_move_to(c->cr, x0, y0);
-    cairo_line_to(c->cr, x1, y1);
+    sdm_canvas_move_to(c, x0, y0);
+    sdm_canvas_line_to(c, x1, y1);
     sdm_canvas_stroke(c, width, colour);
+}
+
+/* Keeps the image until the surface is freed, or frees it now where nothing needs it any more. */
+static void image_keep(sdm_canvas *c, cairo_surface_t *image)
+{
+    drawn_image *kept = NULL;
+    if (c->format != FORMAT_PNG && !c->error.status) SDM_ALLOC(&kept, 1, "picture", &c->error);
+    if (kept) {
+        *kept = (drawn_image){.next = c->images, .surface = image};
+        c->images = kept;
+    } else {
+        cairo_surface_destroy(image);
+    }
 }
 
 void sdm_canvas_image(sdm_canvas *c, sdm_box box, sdm_canvas_pixel *pixel, const void *user)
 {
+    if (!cairo_begin(c)) return;
     cairo_surface_t *image = cairo_image_surface_create(CAIRO_FORMAT_RGB24, box.w, box.h);
     unsigned char *data = cairo_image_surface_get_data(image);
     // out of memory: data is NULL, and c->cr takes over the error of the image
@@ -268,12 +361,14 @@ void sdm_canvas_image(sdm_canvas *c, sdm_box box, sdm_canvas_pixel *pixel, const
             row[x] = (uint32_t)v.r << 16 | (uint32_t)v.g << 8 | v.b;
         }
     }
+    errno = 0; // pixel() may have set it
     cairo_surface_mark_dirty(image);
     cairo_set_source_surface(c->cr, image, box.x, box.y);
     cairo_pattern_set_filter(cairo_get_source(c->cr), CAIRO_FILTER_NEAREST);
     cairo_rectangle(c->cr, box.x, box.y, box.w, box.h);
     cairo_fill(c->cr);
-    cairo_surface_destroy(image);
+    cairo_end(c);
+    image_keep(c, image);
 }
 
 /* ---- text ---- */
@@ -314,11 +409,13 @@ static void clean_text(const char *text, char out[TEXT_MAX + 4])
 /* Sets the font; returns the width of the clean text. */
 static double set_font(sdm_canvas *c, double size, bool bold, const char *clean)
 {
-    cairo_text_extents_t extents;
+    cairo_text_extents_t extents = {0};
+    if (!cairo_begin(c)) return 0;
     cairo_select_font_face(c->cr, "sans-serif", CAIRO_FONT_SLANT_NORMAL,
                            bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
     cairo_set_font_size(c->cr, size * EM_PER_CAPITAL);
     cairo_text_extents(c->cr, clean, &extents);
+    cairo_end(c);
     return extents.x_advance;
 }
 
@@ -361,6 +458,7 @@ void sdm_canvas_text(sdm_canvas *c, double x, double y, sdm_type type, const cha
         return;
     }
     const double left = -set_font(c, type.size, type.bold, clean) * (int)type.align / 2;
+    if (!cairo_begin(c)) return;
     cairo_save(c->cr);
     cairo_translate(c->cr, x, y);
     if (type.upwards) cairo_rotate(c->cr, -acos(0));
@@ -368,12 +466,14 @@ void sdm_canvas_text(sdm_canvas *c, double x, double y, sdm_type type, const cha
     if (type.halo) {
         cairo_move_to(c->cr, left, 0);
         cairo_text_path(c->cr, clean);
-        sdm_canvas_stroke_keep(c, 3, (sdm_colour){255, 255, 255}, 0.75);
-        cairo_new_path(c->cr);
+        set_colour(c, (sdm_colour){255, 255, 255}, 0.75);
+        cairo_set_line_width(c->cr, 3);
+        cairo_stroke(c->cr);
     }
     set_colour(c, type.colour, 1);
     cairo_move_to(c->cr, left, 0);
     cairo_show_text(c->cr, clean);
     cairo_new_path(c->cr);
     cairo_restore(c->cr);
+    cairo_end(c);
 }

@@ -20,10 +20,4 @@ started() {
 }
 
 # ranks_of FOLDER: the processes of the training with --out FOLDER
-ranks_of() {
-    local exe
-    for exe in /proc/[0-9]*/exe; do
-        [ "$(readlink "$exe")" = "$(readlink -f "$program")" ] || continue
-        tr '\0' ' ' <"${exe%exe}cmdline" | grep -q -- "--out $1 " && basename "${exe%/exe}"
-    done
-}
+ranks_of() { pgrep -f "^$program train .* --out $1 "; }

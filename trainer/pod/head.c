@@ -189,14 +189,14 @@ sdm_status trainer_head_solve(const pod_state *pod, const head_equations *e, dou
                           .prior = prior,
                           .pull = ridge * (double)e->maps,
                           .head = head};
-        sdm_team_run(trainer_threads(pod->t),
-                     (q.own.end - q.own.first + COLUMNS - 1) / COLUMNS, substitute_columns, &q);
+        sdm_team_run(trainer_threads(pod->t), (q.own.end - q.own.first + COLUMNS - 1) / COLUMNS,
+                     substitute_columns, &q);
         if (atomic_load(&q.short_of_memory))
             s = sdm_fail(err, SDM_E_NOMEM, "no memory for the head");
     }
     sdm_free(factor);
     s = sdm_comm_agree(comm, s, err);
     return s ? s
-             : sdm_comm_gather_shares(comm, head, pod->arch.n_coefficients,
-                                      latents * sizeof *head, err);
+             : sdm_comm_gather_shares(comm, head, pod->arch.n_coefficients, latents * sizeof *head,
+                                      err);
 }

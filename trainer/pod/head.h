@@ -18,7 +18,8 @@ typedef struct head_equations {
                     sdm_comm_own(K) of the rank alone */
 } head_equations;
 
-/* Sets *e for the MLP weights w. All ranks call it together, as trainer_head_solve(). Call trainer_head_equations_dispose() also after an error. */
+/* Sets *e for the MLP weights w. All ranks call it together, as trainer_head_solve(). Call
+ * trainer_head_equations_dispose() also after an error. */
 sdm_status trainer_head_equations(const pod_state *pod, const float *w, head_equations *e,
                                   sdm_error *err);
 void trainer_head_equations_dispose(head_equations *e);

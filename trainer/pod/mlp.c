@@ -164,8 +164,8 @@ void trainer_mlp_backward_rows(const sdm_pod_arch *a, const float *weights, size
     }
 }
 
-void trainer_mlp_gradient_units(const sdm_pod_arch *a, size_t batch, sdm_comm_part units, const float *x,
-                                float *workspace, float *gradient, int n_threads)
+void trainer_mlp_gradient_units(const sdm_pod_arch *a, size_t batch, sdm_comm_part units,
+                                const float *x, float *workspace, float *gradient, int n_threads)
 {
     const size_t w = a->width;
     for (size_t l = a->depth; l-- > 0;) {
@@ -194,7 +194,8 @@ const float *trainer_mlp_forward(const sdm_pod_arch *a, const float *weights, si
 void trainer_mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x,
                           float *workspace, const float *dh, float *gradient, int n_threads)
 {
-    trainer_mlp_backward_rows(a, weights, batch, (sdm_comm_part){0, batch}, workspace, dh, n_threads);
+    trainer_mlp_backward_rows(a, weights, batch, (sdm_comm_part){0, batch}, workspace, dh,
+                              n_threads);
     trainer_mlp_gradient_units(a, batch, (sdm_comm_part){0, a->width}, x, workspace, gradient,
                                n_threads);
 }

@@ -43,15 +43,16 @@ const float *trainer_mlp_forward_rows(const sdm_pod_arch *a, const float *weight
 
 /* The part of trainer_mlp_backward() down to the inputs, for some rows. */
 void trainer_mlp_backward_rows(const sdm_pod_arch *a, const float *weights, size_t batch,
-                               sdm_comm_part rows, float *workspace, const float *dh, int n_threads);
+                               sdm_comm_part rows, float *workspace, const float *dh,
+                               int n_threads);
 
 /* Gives all ranks all rows, after the two functions above. */
 sdm_status trainer_mlp_gather_rows(const sdm_pod_arch *a, sdm_comm *comm, size_t batch,
                                    float *workspace, sdm_error *err);
 
 /* The rest of trainer_mlp_backward(): the gradient by the weights of some units of each layer. */
-void trainer_mlp_gradient_units(const sdm_pod_arch *a, size_t batch, sdm_comm_part units, const float *x,
-                                float *workspace, float *gradient, int n_threads);
+void trainer_mlp_gradient_units(const sdm_pod_arch *a, size_t batch, sdm_comm_part units,
+                                const float *x, float *workspace, float *gradient, int n_threads);
 
 /* Gives all ranks the gradient by the weights of all units. */
 sdm_status trainer_mlp_gather_units(const sdm_pod_arch *a, sdm_comm *comm, float *gradient,

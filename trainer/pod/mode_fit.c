@@ -57,8 +57,8 @@ static sdm_status mode_batch_create(const pod_state *pod, size_t rows, mode_batc
 
 /* predicted[B][R] = MLP and readout at x with weights w, in some rows. Returns h[B][W], the output
  * of the MLP. */
-static const float *predict_rows(const pod_state *pod, const float *w, size_t batch, sdm_comm_part rows,
-                                 mode_batch *b)
+static const float *predict_rows(const pod_state *pod, const float *w, size_t batch,
+                                 sdm_comm_part rows, mode_batch *b)
 {
     const sdm_pod_arch *a = &pod->arch;
     const int threads = trainer_threads(pod->t);

@@ -15,7 +15,7 @@ told() {
     case $1 in
     fork) text="^sdmgen: error: rank $2 of $3 was killed by signal 9 \(Killed\): all ranks end$" ;;
     openmpi) text="process rank $2 with PID .* exited on signal 9" ;;
-    mpich) text='EXIT CODE: 9$' ;;
+    mpich) text='EXIT CODE: 9$|process manager error waiting for completion$' ;; # the latter before all ranks have met
     esac
     [ "$(tr -d '\r' <err | grep -Ec "$text")" = 1 ] || bad "$1: rank $2 of $3 was killed, but the message is: $(cat err)"
     [ "$1" != fork ] || [ "$(wc -l <err)" = 1 ] || bad "not one line: $(cat err)"

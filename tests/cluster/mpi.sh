@@ -37,7 +37,7 @@ done
 few=(train.minutes=0 train.samples=0 train.steps=30 train.batch=8 data.start=48 data.static=2 data.online=32 data.holdout=8)
 compare error "$tiny" data.sampling=error train.steps=100
 compare auto "$tiny" network.kind=auto "${few[@]}"
-compare template "$tiny" network.kind=template "${few[@]}"
+compare template "$source_folder/configs/ellipsoid.yaml" grid.spacing=0.9 'grid.size=[16,14,12]' network.kind=template "${few[@]}"
 compare fine "$tiny" network.fine=8 "${few[@]}"
 for kind in deepsdf imnet sdmnn; do
     compare $kind "$source_folder/configs/$kind.yaml" grid.spacing=1.2 'grid.size=[12,10,10]' "${few[@]}"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Training by several processes on one machine: the bits of the model, errors, the end of all after one is killed, --resume with another
 # number of them.
-# Tests: cmd_train.c ranks.c comm.c comm_fork.c comm_mpi.c pod_ranks.c mlp.c dataset_fill.c producer.c
+# Tests: cmd_train.c ranks.c comm.c comm_fork.c comm_mpi.c pod_ranks.c mlp.c head.c point_mlp.c export_model.c dataset_fill.c producer.c
 . "$(dirname "$0")/common.sh"
 coarse_grids=yes
 export OMP_WAIT_POLICY=passive
@@ -22,6 +22,17 @@ same three
 grep -qx '{"phase": "ranks", "ranks": 3, "by": "fork"}' three/metrics.jsonl || bad 'the metrics do not tell the ranks'
 grep -q ranks one/metrics.jsonl && bad 'one process tells of ranks'
 [ "$(ls three)" = "$(ls one)" ] || bad "other files: $(ls three)"
+
+# Networks that learn points: ranks share their steps and the measurement of the model. No width is a multiple of a vector's length.
+for kind in deepsdf imnet; do
+    points=("$source_folder/configs/$kind.yaml" grid.spacing=1.2 'grid.size=[12,10,10]' network.width=43 network.activation=silu
+        train.minutes=0 train.steps=8 train.points=77 train.eikonal=0.1 data.start=48 data.static=2 data.online=8 data.holdout=5)
+    expect 0 - sdmgen train "${points[@]}" --out one-$kind --threads 1 -q
+    for n in 2 3; do
+        expect 0 - sdmgen train "${points[@]}" --out many-$kind --force --ranks $n -q
+        cmp one-$kind/model.sdm many-$kind/model.sdm || bad "$kind: $n ranks give another model"
+    done
+done
 
 # children PID: the processes that PID has made
 children() {

@@ -122,4 +122,5 @@ cmp whole.csv snake.csv || bad 'the table of Snakemake differs'
 snakemake -s "$examples/Snakefile" --cores 2 --config $sdmgen_config "model=--shape ellipsoid" "options=$options" >snake.log 2>&1
 grep -q 'Nothing to be done' snake.log || bad "snakemake again: $(tail -n 5 snake.log)"
 rm -rf .snakemake
+echo "12 cases: an array of five Slurm jobs and four parts by Snakemake give the table of one call; a job that was stopped went on; $SECONDS s"
 finish

@@ -43,7 +43,8 @@ static double loss(const sdm_point_arch *a, const float *w, const float *u, cons
 {
     float value[BATCH];
     double sum = 0;
-    trainer_point_forward(a, w, BATCH, u, workspace, value, 1);
+    const point_pass p = {a, w, BATCH, u, workspace, NULL, 1};
+    assert_int_equal(trainer_point_forward(&p, value, NULL), 0);
     for (int i = 0; i < BATCH; i++) sum += (double)slope[i] * value[i];
     return sum;
 }
@@ -63,8 +64,9 @@ static void gradient_matches_differences(void **state)
         trainer_point_init(&a, 3, w);
         random_fill(u, BATCH * U, 1, 1);
         random_fill(slope, BATCH, 2, 0.1);
-        trainer_point_forward(&a, w, BATCH, u, workspace, value, 1);
-        trainer_point_backward(&a, w, BATCH, u, workspace, slope, gradient, 1);
+        point_pass p = {&a, w, BATCH, u, workspace, NULL, 1};
+        assert_int_equal(trainer_point_forward(&p, value, NULL), 0);
+        assert_int_equal(trainer_point_backward(&p, slope, gradient, NULL), 0);
         double size = 0;
         for (size_t i = 0; i < n; i++) size = fmax(size, fabs((double)gradient[i]));
         for (size_t i = 0; i < n; i++) {
@@ -81,11 +83,14 @@ static void gradient_matches_differences(void **state)
         assert_int_equal(SDM_ALLOC(&twice, 2 * n, "g", NULL), 0);
         for (int threads = 2; threads <= 3; threads++) {
             memset(twice, 0, 2 * n * sizeof *twice);
-            trainer_point_forward(&a, w, BATCH, u, workspace, value, threads);
-            trainer_point_backward(&a, w, BATCH, u, workspace, slope, twice, threads);
+            p.n_threads = threads;
+            assert_int_equal(trainer_point_forward(&p, value, NULL), 0);
+            assert_int_equal(trainer_point_backward(&p, slope, twice, NULL), 0);
             assert_memory_equal(twice, gradient, n * sizeof *twice);
         }
-        trainer_point_backward(&a, w, BATCH, u, workspace, slope, twice, 1);
+        p.n_threads = 1;
+        assert_int_equal(trainer_point_forward(&p, value, NULL), 0);
+        assert_int_equal(trainer_point_backward(&p, slope, twice, NULL), 0);
         for (size_t i = 0; i < n; i++)
             assert_true(fabs((double)twice[i] - 2 * (double)gradient[i]) < 1e-5 * size);
         sdm_free(twice);
@@ -329,7 +334,8 @@ static void file_equals_the_trained_network(void **state)
                             spec.arch.radius);
         }
         sdm_model_forward(m, p, 1, map, scratch);
-        trainer_point_forward(&spec.arch, w, 60, u, workspace, value, 1);
+        const point_pass pass = {&spec.arch, w, 60, u, workspace, NULL, 1};
+        assert_int_equal(trainer_point_forward(&pass, value, NULL), 0);
         for (int v = 0; v < 60; v++) assert_true(fabsf(map[v] - value[v]) < 1e-5f * 2.5f);
         sdm_model_free(m);
         sdm_free(scratch);

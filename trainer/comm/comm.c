@@ -16,6 +16,12 @@ size_t sdm_comm_first(const sdm_comm *c, size_t n, int rank)
     return r * (n / size) + (r < left ? r : left);
 }
 
+sdm_comm_part sdm_comm_own(const sdm_comm *c, size_t n)
+{
+    const int rank = sdm_comm_rank(c);
+    return (sdm_comm_part){sdm_comm_first(c, n, rank), sdm_comm_first(c, n, rank + 1)};
+}
+
 static sdm_status result(sdm_comm *c, bool done, sdm_error *err)
 {
     c->agreed = false;

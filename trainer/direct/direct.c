@@ -188,7 +188,8 @@ static void direct_dispose(trainer *t)
     t->state = NULL;
 }
 
-const train_kind trainer_kind_direct = {.block = direct_block,
+const train_kind trainer_kind_direct = {.slow = true,
+                                        .block = direct_block,
                                         .begin = direct_begin,
                                         .run = direct_run,
                                         .weights = direct_weights,

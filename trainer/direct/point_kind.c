@@ -142,6 +142,18 @@ static void points_gather(const trainer *t, point_trainer *p, const direct_batch
     sdm_team_run(trainer_threads(t), (n + SLICE - 1) / SLICE, gather_slice, &g);
 }
 
+/* The passes of n points with weights w. */
+static point_pass pass_of(const trainer *t, const point_trainer *p, const float *w, size_t n)
+{
+    return (point_pass){.arch = &p->arch,
+                        .w = w,
+                        .batch = n,
+                        .u = p->u,
+                        .workspace = p->workspace,
+                        .comm = t->hooks.comm,
+                        .n_threads = trainer_threads(t)};
+}
+
 static sdm_status point_gradient(const trainer *t, void *network, const float *w,
                                  const direct_batch *b, float *out, double *mse, sdm_error *err)
 {
@@ -151,21 +163,21 @@ static sdm_status point_gradient(const trainer *t, void *network, const float *w
                  all = b->n * each;
     const float share = 1.0f / (float)all;
     double square = 0;
-    (void)err;
+    sdm_status s = SDM_OK;
     memset(out, 0, sdm_point_count(&p->arch) * sizeof *out);
-    for (size_t first = 0; first < all; first += CHUNK) {
+    for (size_t first = 0; first < all && !s; first += CHUNK) {
         const size_t n = all - first < CHUNK ? all - first : CHUNK;
+        const point_pass pass = pass_of(t, p, w, n);
         points_gather(t, p, b, each, first, n);
-        trainer_point_forward(&p->arch, w, n, p->u, p->workspace, p->value, trainer_threads(t));
+        if ((s = trainer_point_forward(&pass, p->value, err))) break;
         for (size_t i = 0; i < n; i++)
             p->slope[i] = share * trainer_loss_slope_drawn(c, p->value[i], p->target[i], &square);
         for (size_t i = 0; i + 3 < n && p->group > 1; i += 4)
             trainer_loss_eikonal(c, p->value + i, 4 * share, p->slope + i);
-        trainer_point_backward(&p->arch, w, n, p->u, p->workspace, p->slope, out,
-                               trainer_threads(t));
+        s = trainer_point_backward(&pass, p->slope, out, err);
     }
     *mse = square / (double)all;
-    return SDM_OK;
+    return s ? s : trainer_point_gather(&p->arch, t->hooks.comm, out, err);
 }
 
 static sdm_status point_evaluate(const trainer *t, void *network, const float *w, bool training,
@@ -176,9 +188,9 @@ static sdm_status point_evaluate(const trainer *t, void *network, const float *w
     const size_t maps = training ? trainer_dataset_measured(d) : d->n_holdout,
                  all = maps * EVALUATED;
     double square = 0;
-    (void)err;
     for (size_t first = 0; first < all; first += CHUNK) {
         const size_t n = all - first < CHUNK ? all - first : CHUNK;
+        const point_pass pass = pass_of(t, p, w, n);
         for (size_t i = 0; i < n; i++) {
             const size_t map = (first + i) / EVALUATED;
             const size_t voxel =
@@ -192,7 +204,8 @@ static sdm_status point_evaluate(const trainer *t, void *network, const float *w
                 point_set_input(t, p, i, d->holdout_params + map * d->n_params, voxel);
             }
         }
-        trainer_point_forward(&p->arch, w, n, p->u, p->workspace, p->value, trainer_threads(t));
+        const sdm_status s = trainer_point_forward(&pass, p->value, err);
+        if (s) return s;
         for (size_t i = 0; i < n; i++) {
             const double e = (double)p->value[i] - (double)p->target[i];
             square += e * e;

@@ -32,18 +32,33 @@ static sdm_status all_latent(const pod_state *pod, const float *w, size_t n, flo
 {
     enum { CHUNK = 512 };
     const sdm_pod_arch *a = &pod->arch;
+    sdm_comm *comm = pod->t->hooks.comm;
+    const sdm_comm_part own = sdm_comm_own(comm, n);
     float *x = NULL, *workspace = NULL;
     sdm_status s = SDM_ALLOC(&x, CHUNK * a->n_inputs, "head", err);
     if (!s) s = SDM_ALLOC(&workspace, trainer_mlp_workspace(a, CHUNK), "head", err);
-    for (size_t at = 0; at < n && !s; at += CHUNK) {
-        const size_t rows = n - at < CHUNK ? n - at : CHUNK;
+    for (size_t at = own.first; at < own.end && !s; at += CHUNK) {
+        const size_t rows = own.end - at < CHUNK ? own.end - at : CHUNK;
         const float *phi[CHUNK];
         for (size_t i = 0; i < rows; i++) phi[i] = pod->phi + (at + i) * pod->n_poly;
         trainer_head_latent(pod, w, rows, phi, x, z + at * a->n_latent, workspace);
     }
     sdm_free(workspace);
     sdm_free(x);
-    return s;
+    return s ? s : sdm_comm_gather_shares(comm, z, n, a->n_latent * sizeof *z, err);
+}
+
+/* e->gram, of whose rows each rank computes some, from the latent variables z[n][L]. */
+static sdm_status find_gram(const pod_state *pod, size_t n, const float *z, head_equations *e,
+                            sdm_error *err)
+{
+    const size_t latents = pod->arch.n_latent;
+    const sdm_comm_part own = sdm_comm_own(pod->t->hooks.comm, latents);
+    sdm_gemm(own.end - own.first, latents, n, (sdm_view){z + own.first, 1, latents},
+             (sdm_view){z, latents, 1}, false, e->gram + own.first * latents, latents,
+             trainer_threads(pod->t));
+    return sdm_comm_gather_shares(pod->t->hooks.comm, e->gram, latents, latents * sizeof *e->gram,
+                                  err);
 }
 
 sdm_status trainer_head_equations(const pod_state *pod, const float *w, head_equations *e,
@@ -52,6 +67,7 @@ sdm_status trainer_head_equations(const pod_state *pod, const float *w, head_equ
     enum { CHUNK = 1024 };
     const size_t n = pod->t->data.n_static + trainer_dataset_random_slots(&pod->t->data);
     const size_t latents = pod->arch.n_latent, k = pod->arch.n_coefficients;
+    const sdm_comm_part own = sdm_comm_own(pod->t->hooks.comm, k);
     float *z = NULL, *y = NULL;
     size_t *slots = NULL;
     e->maps = n;
@@ -65,12 +81,11 @@ sdm_status trainer_head_equations(const pod_state *pod, const float *w, head_equ
     for (size_t at = 0; at < n && !s; at += CHUNK) {
         const size_t rows = n - at < CHUNK ? n - at : CHUNK;
         if ((s = trainer_coefficients_project(pod, false, slots + at, rows, y, err))) break;
-        sdm_gemm(latents, k, rows, (sdm_view){z + at * latents, 1, latents}, (sdm_view){y, k, 1},
-                 at > 0, e->right, k, trainer_threads(pod->t));
+        sdm_gemm(latents, own.end - own.first, rows, (sdm_view){z + at * latents, 1, latents},
+                 (sdm_view){y + own.first, k, 1}, at > 0, e->right + own.first, k,
+                 trainer_threads(pod->t));
     }
-    if (!s)
-        sdm_gemm(latents, latents, n, (sdm_view){z, 1, latents}, (sdm_view){z, latents, 1}, false,
-                 e->gram, latents, trainer_threads(pod->t));
+    if (!s) s = find_gram(pod, n, z, e, err);
     sdm_free(slots);
     sdm_free(y);
     sdm_free(z);
@@ -123,6 +138,7 @@ static sdm_status head_factorise(size_t latents, const head_equations *e, double
 /* A substitution: the arguments of substitute_columns(). */
 typedef struct substitution {
     size_t latents, k;
+    sdm_comm_part own; // columns of this rank
     const double *factor;
     const float *right;
     const float *prior; // NULL: zeros
@@ -137,8 +153,8 @@ enum { COLUMNS = 64 };
 static void substitute_columns(void *user, size_t index, int member)
 {
     substitution *q = user;
-    const size_t latents = q->latents, k = q->k, at = index * COLUMNS,
-                 n = k - at < COLUMNS ? k - at : COLUMNS;
+    const size_t latents = q->latents, k = q->k, at = q->own.first + index * COLUMNS,
+                 n = q->own.end - at < COLUMNS ? q->own.end - at : COLUMNS;
     double *x = NULL;
     (void)member;
     if (SDM_ALLOC(&x, latents * n, "head", NULL)) {
@@ -160,22 +176,27 @@ sdm_status trainer_head_solve(const pod_state *pod, const head_equations *e, dou
                               const float *prior, float *head, sdm_error *err)
 {
     const size_t latents = pod->arch.n_latent;
+    sdm_comm *comm = pod->t->hooks.comm;
     double *factor = NULL;
     sdm_status s = SDM_ALLOC(&factor, latents * latents, "head", err);
     if (!s) s = head_factorise(latents, e, &ridge, factor, err);
     if (!s) {
         substitution q = {.latents = latents,
                           .k = pod->arch.n_coefficients,
+                          .own = sdm_comm_own(comm, pod->arch.n_coefficients),
                           .factor = factor,
                           .right = e->right,
                           .prior = prior,
                           .pull = ridge * (double)e->maps,
                           .head = head};
-        sdm_team_run(trainer_threads(pod->t), (q.k + COLUMNS - 1) / COLUMNS, substitute_columns,
-                     &q);
+        sdm_team_run(trainer_threads(pod->t), (q.own.end - q.own.first + COLUMNS - 1) / COLUMNS,
+                     substitute_columns, &q);
         if (atomic_load(&q.short_of_memory))
             s = sdm_fail(err, SDM_E_NOMEM, "no memory for the head");
     }
     sdm_free(factor);
-    return s;
+    s = sdm_comm_agree(comm, s, err);
+    return s ? s
+             : sdm_comm_gather_shares(comm, head, pod->arch.n_coefficients, latents * sizeof *head,
+                                      err);
 }

@@ -14,10 +14,12 @@ void trainer_head_latent(const pod_state *pod, const float *w, size_t rows, cons
 typedef struct head_equations {
     size_t maps;  /* number of maps */
     float *gram;  /* [L][L] z^T z */
-    float *right; /* [L][K] z^T y, y the coefficients of the highest level */
+    float *right; /* [L][K] z^T y, y the coefficients of the highest level; of these, the columns
+                    sdm_comm_own(K) of the rank alone */
 } head_equations;
 
-/* Sets *e for the MLP weights w. Call trainer_head_equations_dispose() also after an error. */
+/* Sets *e for the MLP weights w. All ranks call it together, as trainer_head_solve(). Call
+ * trainer_head_equations_dispose() also after an error. */
 sdm_status trainer_head_equations(const pod_state *pod, const float *w, head_equations *e,
                                   sdm_error *err);
 void trainer_head_equations_dispose(head_equations *e);

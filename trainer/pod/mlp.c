@@ -117,7 +117,7 @@ static float *slopes_of(const sdm_pod_arch *a, size_t batch, float *workspace, s
 }
 
 const float *trainer_mlp_forward_rows(const sdm_pod_arch *a, const float *weights, size_t batch,
-                                      mlp_part rows, const float *x, float *workspace,
+                                      sdm_comm_part rows, const float *x, float *workspace,
                                       int n_threads)
 {
     const size_t w = a->width;
@@ -140,7 +140,7 @@ const float *trainer_mlp_forward_rows(const sdm_pod_arch *a, const float *weight
 }
 
 void trainer_mlp_backward_rows(const sdm_pod_arch *a, const float *weights, size_t batch,
-                               mlp_part rows, float *workspace, const float *dh, int n_threads)
+                               sdm_comm_part rows, float *workspace, const float *dh, int n_threads)
 {
     const size_t w = a->width, first = rows.first * w;
     // two buffers in turn, [B][W]
@@ -164,8 +164,8 @@ void trainer_mlp_backward_rows(const sdm_pod_arch *a, const float *weights, size
     }
 }
 
-void trainer_mlp_gradient_units(const sdm_pod_arch *a, size_t batch, mlp_part units, const float *x,
-                                float *workspace, float *gradient, int n_threads)
+void trainer_mlp_gradient_units(const sdm_pod_arch *a, size_t batch, sdm_comm_part units,
+                                const float *x, float *workspace, float *gradient, int n_threads)
 {
     const size_t w = a->width;
     for (size_t l = a->depth; l-- > 0;) {
@@ -187,22 +187,17 @@ void trainer_mlp_gradient_units(const sdm_pod_arch *a, size_t batch, mlp_part un
 const float *trainer_mlp_forward(const sdm_pod_arch *a, const float *weights, size_t batch,
                                  const float *x, float *workspace, int n_threads)
 {
-    return trainer_mlp_forward_rows(a, weights, batch, (mlp_part){0, batch}, x, workspace,
+    return trainer_mlp_forward_rows(a, weights, batch, (sdm_comm_part){0, batch}, x, workspace,
                                     n_threads);
 }
 
 void trainer_mlp_backward(const sdm_pod_arch *a, const float *weights, size_t batch, const float *x,
                           float *workspace, const float *dh, float *gradient, int n_threads)
 {
-    trainer_mlp_backward_rows(a, weights, batch, (mlp_part){0, batch}, workspace, dh, n_threads);
-    trainer_mlp_gradient_units(a, batch, (mlp_part){0, a->width}, x, workspace, gradient,
+    trainer_mlp_backward_rows(a, weights, batch, (sdm_comm_part){0, batch}, workspace, dh,
+                              n_threads);
+    trainer_mlp_gradient_units(a, batch, (sdm_comm_part){0, a->width}, x, workspace, gradient,
                                n_threads);
-}
-
-mlp_part trainer_mlp_part(const sdm_comm *comm, size_t n)
-{
-    const int rank = sdm_comm_rank(comm);
-    return (mlp_part){sdm_comm_first(comm, n, rank), sdm_comm_first(comm, n, rank + 1)};
 }
 
 sdm_status trainer_mlp_gather_rows(const sdm_pod_arch *a, sdm_comm *comm, size_t batch,

@@ -57,8 +57,8 @@ static sdm_status mode_batch_create(const pod_state *pod, size_t rows, mode_batc
 
 /* predicted[B][R] = MLP and readout at x with weights w, in some rows. Returns h[B][W], the output
  * of the MLP. */
-static const float *predict_rows(const pod_state *pod, const float *w, size_t batch, mlp_part rows,
-                                 mode_batch *b)
+static const float *predict_rows(const pod_state *pod, const float *w, size_t batch,
+                                 sdm_comm_part rows, mode_batch *b)
 {
     const sdm_pod_arch *a = &pod->arch;
     const int threads = trainer_threads(pod->t);
@@ -73,7 +73,7 @@ static const float *predict_rows(const pod_state *pod, const float *w, size_t ba
 /* The same in all rows. */
 static void modes_predict(const pod_state *pod, const float *w, size_t batch, mode_batch *b)
 {
-    predict_rows(pod, w, batch, (mlp_part){0, batch}, b);
+    predict_rows(pod, w, batch, (sdm_comm_part){0, batch}, b);
 }
 
 /* Mean square error (mm^2) on the held-out maps: the error of the mode coefficients plus the error
@@ -123,7 +123,7 @@ typedef struct mode_loop {
     const pod_state *pod;
     mode_batch *batch;
     size_t rows;
-    mlp_part own; // rows of this rank
+    sdm_comm_part own; // rows of this rank
 } mode_loop;
 
 /* Rows of a batch that a thread computes at a time. */
@@ -186,12 +186,12 @@ static sdm_status weight_gradient(const pod_state *pod, mode_batch *b, size_t ba
     sdm_comm *comm = pod->t->hooks.comm;
     const size_t r = pod->n_modes;
     const int threads = trainer_threads(pod->t);
-    const mlp_part modes = trainer_mlp_part(comm, r);
+    const sdm_comm_part modes = sdm_comm_own(comm, r);
     float *readout = b->gradient + trainer_mlp_count(a);
     sdm_gemm(modes.end - modes.first, a->width, batch, (sdm_view){b->predicted + modes.first, 1, r},
              (sdm_view){h, a->width, 1}, false, readout + modes.first * a->width, a->width,
              threads);
-    trainer_mlp_gradient_units(a, batch, trainer_mlp_part(comm, a->width), b->x, b->workspace,
+    trainer_mlp_gradient_units(a, batch, sdm_comm_own(comm, a->width), b->x, b->workspace,
                                b->gradient, threads);
     const sdm_status s = sdm_comm_gather_shares(comm, readout, r, a->width * sizeof *readout, err);
     return s ? s : trainer_mlp_gather_units(a, comm, b->gradient, err);
@@ -202,7 +202,7 @@ static sdm_status mode_fit_step(pod_state *pod, mode_batch *b, size_t batch, dou
                                 sdm_error *err)
 {
     const sdm_pod_arch *a = &pod->arch;
-    const mlp_part own = trainer_mlp_part(pod->t->hooks.comm, batch);
+    const sdm_comm_part own = sdm_comm_own(pod->t->hooks.comm, batch);
     const size_t r = pod->n_modes, n = own.end - own.first, readout = trainer_mlp_count(a);
     const int threads = trainer_threads(pod->t);
     mode_loop loop = {pod, b, batch, own};

@@ -113,7 +113,7 @@ void trainer_checkpoint_if_due(trainer *t, double now)
 {
     sdm_error reason = {0};
     if (!(now - t->last_checkpoint > t->config->train.checkpoint_seconds)) return;
-    if (trainer_checkpoint_write(t, &reason))
+    if (trainer_checkpoint_write(t, &reason) && !sdm_comm_broken(t->hooks.comm))
         trainer_warn(t, "no checkpoint, training goes on and tries again: %s", reason.text);
 }
 

@@ -33,18 +33,44 @@ static double quantile(const double *sorted, size_t n, double q)
     return sorted[i ? i - 1 : 0];
 }
 
+/* The ranks that share the maps of the measurement of the model; NULL: each makes all. */
+static sdm_comm *measurers(const trainer *t) { return t->kind->slow ? t->hooks.comm : NULL; }
+
+/* The maps that the ranks make together: number i / ranks * ranks + rank by each of them. */
+typedef struct model_maps {
+    float *made, *map; // of this rank; that of the shape asked for last
+    void *scratch;
+} model_maps;
+
+/* maps->map = that of the model for held-out shape i of n. All ranks call it for i = 0, 1, ... */
+static sdm_status make_map(const trainer *t, const sdm_model *m, size_t i, size_t n,
+                           const model_maps *maps, sdm_error *err)
+{
+    sdm_comm *comm = measurers(t);
+    const dataset *d = &t->data;
+    const size_t ranks = (size_t)sdm_comm_size(comm), v = sdm_grid_count(d->grid);
+    const int rank = sdm_comm_rank(comm), maker = (int)(i % ranks);
+    const size_t own = i - (size_t)maker + (size_t)rank;
+    if (maker == 0 && own < n)
+        sdm_model_forward_threads(m, d->holdout_params + own * d->n_params, 1, maps->made,
+                                  maps->scratch, t->n_threads);
+    if (maker == rank) memcpy(maps->map, maps->made, v * sizeof *maps->map);
+    return sdm_comm_broadcast(comm, maker, maps->map, v * sizeof *maps->map, err);
+}
+
 /* Errors of the model on the first n held-out maps. */
 static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, sdm_accuracy *out,
                                 model_errors *more, sdm_error *err)
 {
     const dataset *d = &t->data;
-    float *map = NULL, *blocked = NULL;
-    void *scratch = NULL;
+    float *blocked = NULL;
+    model_maps maps = {0};
     double *each = NULL;
-    sdm_status s = SDM_ALLOC(&map, sdm_grid_count(d->grid), "evaluation", err);
+    sdm_status s = SDM_ALLOC(&maps.map, sdm_grid_count(d->grid), "evaluation", err);
+    if (!s) s = SDM_ALLOC(&maps.made, sdm_grid_count(d->grid), "evaluation", err);
     if (!s) s = SDM_ALLOC(&blocked, d->n_voxels, "evaluation", err);
     if (!s)
-        s = sdm_alloc(&scratch, sdm_model_scratch_bytes_threads(m, 1, t->n_threads), 1,
+        s = sdm_alloc(&maps.scratch, sdm_model_scratch_bytes_threads(m, 1, t->n_threads), 1,
                       "evaluation", err);
     if (!s) s = SDM_ALLOC(&each, n, "evaluation", err);
     // a network that learns other maps is compared with exact maps, which are made again
@@ -58,15 +84,14 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     size_t n_near = 0, n_at_surface = 0, n_far[2] = {0, 0};
     // sum the errors over maps and voxels
     for (size_t i = 0; i < n && !s; i++) {
-        sdm_model_forward_threads(m, d->holdout_params + i * d->n_params, 1, map, scratch,
-                                  t->n_threads);
+        if ((s = make_map(t, m, i, n, &maps, err))) break;
         const float *truth = d->holdout + i * d->n_voxels, *values = blocked;
         if (d->target.make) {
             s = trainer_workbench_exact(&w, d, d->holdout_params + i * d->n_params, err);
             if (s) break;
-            truth = w.exact, values = map;
+            truth = w.exact, values = maps.map;
         } else {
-            sdm_pod_gather(d->grid, t->blocks, d->n_blocks, map, blocked);
+            sdm_pod_gather(d->grid, t->blocks, d->n_blocks, maps.map, blocked);
         }
         double here = 0;
         size_t inside = 0, both = 0; // voxels inside: of the two maps together, and of both
@@ -115,9 +140,10 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     }
     trainer_workbench_dispose(&w);
     sdm_free(each);
-    sdm_free(scratch);
+    sdm_free(maps.scratch);
     sdm_free(blocked);
-    sdm_free(map);
+    sdm_free(maps.made);
+    sdm_free(maps.map);
     return s;
 }
 
@@ -285,7 +311,8 @@ sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err)
     if (!s) s = model_open(t, "model", d, &model, err);
     const double start = trainer_seconds(t);
     if (!s) s = measure_model(t, model, 1, &one, &more, err);
-    *seconds = (trainer_seconds(t) - start) * (double)t->data.n_holdout;
+    const size_t ranks = (size_t)sdm_comm_size(measurers(t)), n = t->data.n_holdout;
+    *seconds = (trainer_seconds(t) - start) * (double)((n + ranks - 1) / ranks);
     if (!s) s = sdm_comm_broadcast(t->hooks.comm, 0, seconds, sizeof *seconds, err);
     sdm_model_free(model);
     description_free(d);

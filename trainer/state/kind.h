@@ -22,6 +22,8 @@ typedef struct error_measures {
 } error_measures;
 
 struct train_kind {
+    /* A map takes long: ranks share those of the measurement of the model. */
+    bool slow;
     /* Called before any map is made: may allocate t->design and set data.target or
        data.only_holdout. NULL: nothing to do. t->design may be that of another run of this kind,
        of the same shape, ranges, grid and seed: it is then taken over. */

@@ -39,6 +39,14 @@ const char *sdm_comm_name(const sdm_comm *c);
    rank + 1. Every rank has n / size units, rounded down or up. */
 size_t sdm_comm_first(const sdm_comm *c, size_t n, int rank);
 
+/* Units of work first .. end - 1. */
+typedef struct sdm_comm_part {
+    size_t first, end;
+} sdm_comm_part;
+
+/* Those of this rank, of n. */
+sdm_comm_part sdm_comm_own(const sdm_comm *c, size_t n);
+
 /* data[bytes] becomes that of rank `root` on all ranks. */
 sdm_status sdm_comm_broadcast(sdm_comm *c, int root, void *data, size_t bytes, sdm_error *err);
 

@@ -40,6 +40,8 @@
 // steps, and of steps with the averaged gradient
 #define EPS_FIRST 1e-2
 #define EPS_FIRST_AVERAGED 1e-4
+// least eps of the steps with the averaged gradient in a fit that is only a rival of another one
+#define EPS_RIVAL 1e-3
 // relative changes of the prior weights up to this size are ignored: always; where flat steps ended
 // the iterations
 #define WEIGHT_EPS 1e-3
@@ -301,7 +303,8 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
 {
     const sdm_fit_opts *o = p->opts;
     const bool exact = p->maps.exact, average = !o->keep_params;
-    const double eps = exact ? o->polish_eps : o->eps;
+    const double polish = p->is_rival ? fmax(o->polish_eps, EPS_RIVAL) : o->polish_eps,
+                 eps = exact ? polish : o->eps;
     const size_t max_iterations = newton->max_iterations;
     // plain Newton steps
     newton->averaged = p->use_tissue_field = false;
@@ -313,7 +316,7 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
     sdm_status s = maximise_settled(p, newton, end, err);
     // where kinks keep plain steps from converging, averaged ones may
     const bool near = end->converged || end->step <= STEP_NEAR;
-    if (s || !near || !average || p->is_rival || !(exact || end->flat)) return s;
+    if (s || !near || !average || !(exact || end->flat)) return s;
     // averaged gradient
     newton->averaged = true;
     newton->max_iterations = max_iterations;

@@ -508,8 +508,8 @@ SDM_API sdm_status sdm_fit_surface_points(const sdm_mesh *mesh, size_t n, int n_
    from the start pose reflected in the shape's y about the centroid of the shape. Parameters,
    evidence and verdict are those of the mirrored shape; the pose belongs to the reflected world. A
    rival for shapes with a left and a right form, see sdm_fit_compare(): it is fitted only as far as
-   that comparison needs, without averaged gradients and without SDM_FIT_CHECK_NEXT_POSE. Errors as
-   sdm_fit(). [any thread] */
+   that comparison needs, with a polish_eps of at least 1e-3 and without SDM_FIT_CHECK_NEXT_POSE.
+   Errors as sdm_fit(). [any thread] */
 SDM_API sdm_status sdm_fit_mirrored(const sdm_fit_source *source, const sdm_fit_target *target,
                                     const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err);
 

@@ -456,7 +456,9 @@ static void test_a_joint_in_the_wrong_place_is_refused(void **state)
     (void)state;
     const sdm_named_text options[] = {
         {"links", "2"}, {"length", "2.5"}, {"base", "2"}, {"edge", "0.4"}};
-    const sdm_grid image = sdm_grid_centred((int64_t[3]){32, 32, 22}, 0.35, (double[3]){1, 0, 0});
+    const sdm_grid image =
+        sdm_grid_centred((int64_t[3]){19, 17, 16}, 0.35, (double[3]){1.63, 1.3, -1});
+    const sdm_pose pose = {{0.1, -0.05, 0.2}, {0.1, 0.2, -0.1}};
     const double truth[2] = {0, 0.9}, starts[2][2] = {{0, -0.9}, {0, 0.5}};
     sdm_instance *arm = NULL;
     sdm_error err = {0};
@@ -467,7 +469,7 @@ static void test_a_joint_in_the_wrong_place_is_refused(void **state)
     if (!v) abort();
     sdm_phantom_opts phantom = sdm_phantom_defaults();
     phantom.seed = 5;
-    if (sdm_phantom_make(arm, truth, &POSE, &phantom, &image, v, NULL, &err))
+    if (sdm_phantom_make(arm, truth, &pose, &phantom, &image, v, NULL, &err))
         fail_msg("%s", err.text);
     const sdm_fit_target t = {.kind = SDM_FIT_IMAGE, .grid = image, .values = v};
     const sdm_fit_source source = {
@@ -475,7 +477,7 @@ static void test_a_joint_in_the_wrong_place_is_refused(void **state)
         .grid = sdm_grid_centred((int64_t[3]){32, 36, 18}, 0.35, (double[3]){2, 0, -0.7})};
     for (int right = 0; right < 2; right++) {
         sdm_fit_opts o = sdm_fit_defaults();
-        o.start_pose = POSE;
+        o.start_pose = pose;
         o.start_params = starts[right];
         o.eps = o.polish_eps = 1e-3;
         o.tolerance = 0.4;

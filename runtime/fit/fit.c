@@ -1,5 +1,4 @@
-/* A fit from beginning to end: sdm_fit(), the last function of this file, lists its steps in
- * order. */
+/* A fit from beginning to end: run(), near the end of this file, lists its steps in order. */
 #include "sdm/fit.h"
 
 #include <math.h>
@@ -28,6 +27,7 @@
 #include "fit/trust/pose_params.h"
 #include "fit/trust/posterior.h"
 #include "fit_check.h"
+#include "fit_rival.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/rotation.h"
 #include "sdm/internal/text.h"
@@ -41,6 +41,8 @@
 // steps, and of steps with the averaged gradient
 #define EPS_FIRST 1e-2
 #define EPS_FIRST_AVERAGED 1e-4
+// least eps of the steps with the averaged gradient in a fit that is only a rival of another one
+#define EPS_RIVAL 1e-3
 // relative changes of the prior weights up to this size are ignored: always; where flat steps ended
 // the iterations
 #define WEIGHT_EPS 1e-3
@@ -306,7 +308,8 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
 {
     const sdm_fit_opts *o = p->opts;
     const bool exact = p->maps.exact, average = !o->keep_params;
-    const double eps = exact ? o->polish_eps : o->eps;
+    const double polish = p->is_rival ? fmax(o->polish_eps, EPS_RIVAL) : o->polish_eps,
+                 eps = exact ? polish : o->eps;
     const size_t max_iterations = newton->max_iterations;
     // plain Newton steps
     newton->averaged = p->use_tissue_field = false;
@@ -487,7 +490,7 @@ static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
     if (!s) s = sdm_fit_judge(p, r, &factor, err);
     if (s && s != SDM_E_QUALITY) return s;
     sdm_fit_name_restless(p, r, s ? err : NULL);
-    if (!s) s = sdm_fit_judge_next_pose(p, factor, &r->verdict, err);
+    if (!s && !p->is_rival) s = sdm_fit_judge_next_pose(p, factor, &r->verdict, err);
     const sdm_status kept = p->opts->keep_pose ? sdm_fit_judge_kept_pose(p, r, err) : SDM_OK;
     return kept ? kept : s;
 }
@@ -507,13 +510,14 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     return s;
 }
 
-sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
-                   const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err)
+static sdm_status run(const sdm_fit_source *source, const sdm_fit_target *target,
+                      const sdm_fit_opts *opts, bool is_rival, sdm_fit_result *out, sdm_error *err)
 {
     if (!out) return sdm_fail(err, SDM_E_ARG, "fit: a place for the result is needed");
     *out = (sdm_fit_result){0};
     const double from = sdm_clock();
-    fit_problem p = {.source = source, .target = target, .opts = opts, .noise_factor = 1};
+    fit_problem p = {
+        .source = source, .target = target, .opts = opts, .is_rival = is_rival, .noise_factor = 1};
     for (size_t k = 0; k < FIT_PARAMS_MAX + 6; k++) p.prior_weight[k] = 1;
 
     // 1. check the arguments
@@ -554,4 +558,16 @@ sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
     sdm_free(values);
     if (s && s != SDM_E_QUALITY) sdm_fit_dispose(out);
     return s;
+}
+
+sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target,
+                   const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err)
+{
+    return run(source, target, opts, false, out, err);
+}
+
+sdm_status sdm_fit_rival(const sdm_fit_source *source, const sdm_fit_target *target,
+                         const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err)
+{
+    return run(source, target, opts, true, out, err);
 }

@@ -1,5 +1,5 @@
-/* Other poses of the fitted shape: a list of rotations, the likelihood of each on a part of the
- * samples, and the maximum next to the best ones. */
+/* Rivals of the fit: the fitted shape in other poses (a list of rotations), and the shape with
+ * another value of one parameter; the likelihood of each, and the maximum next to the best ones. */
 #include "next_pose.h"
 
 #include <math.h>
@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "finding.h"
+#include "fit/data/source_params.h"
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
 #include "fit/solver/open_motions.h"
@@ -32,13 +33,26 @@
 // turns that are tried: the rotations of a cube, and those evenly over all rotations
 #define N_CUBE 24
 #define N_EVEN 72
+// values of a parameter that are tried: the middles of this many equal parts of its range, without
+// those nearer to the value of the fit than half of a part
+#define N_PARTS 3
+// parameters with another value of which rivals start
+#define PARAMS_TRIED 2
 
 /* A start of a rival. */
 typedef struct start {
     fit_state state;
     double log_likelihood;
     bool keep_params;
+    size_t
+        param; /* the parameter that has another value, from 1; 0: the shape is that of the fit */
 } start;
+
+/* The rival with the least gain of the fit over it; NaN: there is none. */
+typedef struct nearest {
+    double gain;
+    size_t param; /* as start.param */
+} nearest;
 
 /* The fit, with which its rivals are compared. */
 typedef struct own_fit {
@@ -188,30 +202,89 @@ static sdm_status challenge(fit_problem *p, const own_fit *own, const start *fro
     return s ? s : sdm_fit_stand(p, own->factor, standing, err);
 }
 
-// the least gain over the runner-up of the search and over the best turn; NaN: there is no rival
-static sdm_status least_gain(fit_problem *p, own_fit *own, double *least, sdm_error *err)
+// replaces the worst of the *n starts, at most `most`, by one that is better; the best first
+static void start_insert(start *list, size_t *n, size_t most, const start *one)
 {
-    start *list = NULL;
+    if (*n == most && !(one->log_likelihood > list[most - 1].log_likelihood)) return;
+    size_t at = *n < most ? (*n)++ : most - 1;
+    for (; at > 0 && list[at - 1].log_likelihood < one->log_likelihood; at--)
+        list[at] = list[at - 1];
+    list[at] = *one;
+}
+
+// *best = the value of parameter k, of those that are tried, with which the shape explains the
+// samples best, in the pose of the fit; best->param 0: none gives another surface
+static sdm_status value_find(fit_problem *p, const own_fit *own, size_t k, start *best,
+                             sdm_error *err)
+{
+    const double range = p->high[k] - p->low[k], here = own->state.params[k];
+    *best = (start){.log_likelihood = -INFINITY};
+    for (int i = 0; i < N_PARTS; i++) {
+        start one = {.state = own->state, .param = k + 1};
+        one.state.params[k] = p->low[k] + (i + 0.5) / N_PARTS * range;
+        if (fabs(one.state.params[k] - here) < 0.5 / N_PARTS * range) continue;
+        const sdm_status s = sdm_fit_log_likelihood(p, one.state.params, &one.log_likelihood, err);
+        if (s == SDM_E_NOMEM || s == SDM_E_CANCELLED) return s;
+        // parameters without a shape are no rival
+        if (s || likeness(own, p->maps.distance, &one.state) > ALIKE) continue;
+        if (one.log_likelihood > best->log_likelihood) *best = one;
+    }
+    return SDM_OK;
+}
+
+// list[PARAMS_TRIED] = the parameters whose best other values explain the samples best; *n: how
+// many. The state of *p is that of the fit
+static sdm_status values_rank(fit_problem *p, const own_fit *own, start *list, size_t *n,
+                              sdm_error *err)
+{
+    sdm_status s = SDM_OK;
+    *n = 0;
+    for (size_t k = 0; k < p->n_params && !s && !p->opts->keep_params; k++) {
+        start one;
+        s = value_find(p, own, k, &one, err);
+        if (!s && one.param) start_insert(list, n, PARAMS_TRIED, &one);
+    }
+    return s;
+}
+
+static void nearest_take(nearest *least, const fit_standing *fit, const fit_standing *rival,
+                         size_t param)
+{
+    const double gain = sdm_fit_gain(fit, rival);
+    if (!(least->gain <= gain) && !isnan(gain)) *least = (nearest){gain, param};
+}
+
+// the least gain over the runner-up of the search, over the best turn, and over the best values
+static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_error *err)
+{
+    start *list = NULL, *value = NULL;
     fit_standing fit, rival;
     bool other;
+    size_t n_values = 0;
     sdm_status s = SDM_ALLOC(&list, N_CUBE + N_EVEN, "rival of the fit", err);
+    if (!s) s = SDM_ALLOC(&value, PARAMS_TRIED, "rival of the fit", err);
     const size_t n = s ? 0 : turns_rank(own, list);
-    const bool any = n || p->has_runner_up;
     // the tissues of the fit on these samples, as those of its rivals
-    if (!s && any) s = climb(p, true, STEPS_OF_FIT, err);
-    if (!s && any) s = sdm_fit_stand(p, own->factor, &fit, err);
-    *least = NAN;
+    if (!s) s = climb(p, true, STEPS_OF_FIT, err);
+    if (!s) s = sdm_fit_stand(p, own->factor, &fit, err);
+    if (!s) s = values_rank(p, own, value, &n_values, err);
+    *least = (nearest){NAN, 0};
     if (!s && p->has_runner_up) {
         const start from = {.state = p->runner_up};
         s = challenge(p, own, &from, &other, &rival, err);
-        if (!s && other) *least = sdm_fit_gain(&fit, &rival);
+        if (!s && other) nearest_take(least, &fit, &rival, 0);
     }
     other = false;
     for (size_t i = 0; i < n && i < TRIES_MAX && !s && !other; i++) {
         s = challenge(p, own, &list[i], &other, &rival, err);
-        if (!s && other) *least = fmin(*least, sdm_fit_gain(&fit, &rival));
+        if (!s && other) nearest_take(least, &fit, &rival, 0);
+    }
+    for (size_t i = 0; i < n_values && !s; i++) {
+        s = challenge(p, own, &value[i], &other, &rival, err);
+        if (!s && other) nearest_take(least, &fit, &rival, value[i].param);
     }
     sdm_free(list);
+    sdm_free(value);
     return s;
 }
 
@@ -221,7 +294,7 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     const sdm_fit_opts *given = p->opts;
     sdm_fit_opts quiet = *given;
     own_fit own = {0};
-    double gain = NAN;
+    nearest least = {NAN, 0};
     if (given->keep_pose || v->grade == SDM_FIT_FAILED) return SDM_OK;
     quiet.progress = NULL;
     p->opts = &quiet;
@@ -232,19 +305,23 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     // of every `stride`-th voxel fewer count as one; where the shape does not explain the image,
     // the likelihood is less certain (Wedderburn 1974)
     own.factor = fmax(factor / pow((double)p->stride, 3), 1) * fmax(v->chi_square, 1);
-    if (!s) s = least_gain(p, &own, &gain, err);
+    if (!s) s = least_gain(p, &own, &least, err);
     sdm_free(own.distance);
     p->opts = given;
-    if (s || isnan(gain)) return s;
-    const bool passed = gain > SDM_FIT_PREFERRED, points = p->target->kind == SDM_FIT_POINTS;
-    char text[200];
+    if (s || isnan(least.gain)) return s;
+    const bool passed = least.gain > SDM_FIT_PREFERRED, points = p->target->kind == SDM_FIT_POINTS;
+    const char *name = NULL;
+    double low, high;
+    char where[100] = "in another pose", text[300];
+    if (least.param) sdm_fit_bounds(p->source, least.param - 1, &low, &high, &name);
+    if (name) snprintf(where, sizeof where, "with another value of %.60s", name);
     snprintf(text, sizeof text,
-             "the shape in another pose explains the data %s (log-likelihood of the fit less that "
-             "of the other: %.2g): give a nearer start, or more turns",
-             gain < 0 ? "better" : "as well", gain);
+             "the shape %s explains the data %s (log-likelihood of the fit less that of the other: "
+             "%.2g): give a nearer start, or more turns",
+             where, least.gain < 0 ? "better" : "as well", least.gain);
     // errors of coarse maps at sharp edges weigh more in fits to points than such a gain
     sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, passed,
-                      points ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED, gain, SDM_FIT_PREFERRED, "%s",
-                      text);
+                      points ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED, least.gain, SDM_FIT_PREFERRED,
+                      "%s", text);
     return passed || points ? SDM_OK : sdm_fail(err, SDM_E_QUALITY, "%s", text);
 }

@@ -1,7 +1,9 @@
 /* Compares the fit with the shape in its next best pose: the runner-up of the search for the start,
    and the best of 96 rotations of the fitted shape, 24 that exchange its principal axes and 72
    spread evenly. If the shape explains the data as well in another pose, they do not
-   determine its pose. */
+   determine its pose. The same with another value of one parameter, such as a joint of an arm: the
+   best of three values, spread evenly over the range, of the two parameters for which it explains
+   the data best. */
 #pragma once
 
 #include "fit/solver/problem.h"
@@ -9,9 +11,9 @@
 /* Adds the finding "next pose" to a verdict that has not failed. Some iterations lead from each
    rival start to the nearest maximum; fit and rival are compared on voxels of the ball that holds
    both, with the tissues of each. A rival whose surface is nearly that of the fit is none. No
-   finding where the pose is kept, where no other pose remains, as for a ball, or where points lie
-   too far apart to tell. factor: how many correlated voxels of an image count as one independent
-   one. *p is left at a rival, with samples from that ball. SDM_E_QUALITY: the finding failed;
-   SDM_E_NOMEM, SDM_E_CANCELLED. */
+   finding where the pose is kept, where no rival remains, as for a ball of given size, or where
+   points lie too far apart to tell. factor: how many correlated voxels of an image count as one
+   independent one. *p is left at a rival, with samples from that ball. SDM_E_QUALITY: the finding
+   failed; SDM_E_NOMEM, SDM_E_CANCELLED. */
 sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdict *v,
                                    sdm_error *err);

@@ -95,6 +95,8 @@ typedef struct fit_problem {
     size_t n_recent;
     /* number of iterations so far, including those of the search */
     size_t n_steps;
+    /* true: the fit only has to be good enough to be compared with another one, see fit_rival.h */
+    bool is_rival;
     /* the second best of several starts of the search; its objective */
     bool has_runner_up;
     double runner_up_objective;

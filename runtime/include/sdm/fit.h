@@ -314,10 +314,12 @@ typedef enum sdm_fit_check_kind {
     SDM_FIT_CHECK_VOXELS,
     /* Gain over the shape in its next best pose: the better one of the runner-up of the search for
        the start and the best of 96 rotations of the fitted shape, each improved to the nearest
-       maximum. In units of log-likelihood of independent samples, as sdm_fit_compare(). Poses in
-       which the surface is nearly the same (Dice coefficient above 0.9) do not count. Left out
-       where every such rotation leads back to the fit, where the pose is kept, where a check
-       failed, and where points lie too far apart to be tested. Points: doubtful at most */
+       maximum; or, if it is less, over the shape with another value of one parameter, such as a
+       joint of an arm, improved in the same way. In units of log-likelihood of independent samples,
+       as sdm_fit_compare(). Poses in which the surface is nearly the same (Dice coefficient above
+       0.9) do not count. Left out where every such start leads back to the fit, where the pose is
+       kept, where a check failed, and where points lie too far apart to be tested. Points: doubtful
+       at most */
     SDM_FIT_CHECK_NEXT_POSE,
     /* points: share of those that lie on no surface of the shape but form one, neighbours in a thin
        layer; at most 0.05 or sdm_fit_opts.tolerance, and 0.01 where SDM_FIT_CHECK_COVERED does not
@@ -508,8 +510,9 @@ SDM_API sdm_status sdm_fit_surface_points(const sdm_mesh *mesh, size_t n, int n_
 /* Fits the mirror image of the shape: the shape of source to the target reflected in the world's x,
    from the start pose reflected in the shape's y about the centroid of the shape. Parameters,
    evidence and verdict are those of the mirrored shape; the pose belongs to the reflected world. A
-   rival for shapes with a left and a right form, see sdm_fit_compare(). Errors as sdm_fit(). [any
-   thread] */
+   rival for shapes with a left and a right form, see sdm_fit_compare(): it is fitted only as far as
+   that comparison needs, with a polish_eps of at least 1e-3 and without SDM_FIT_CHECK_NEXT_POSE.
+   Errors as sdm_fit(). [any thread] */
 SDM_API sdm_status sdm_fit_mirrored(const sdm_fit_source *source, const sdm_fit_target *target,
                                     const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err);
 

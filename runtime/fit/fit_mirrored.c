@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "sdm/fit.h"
+#include "fit_rival.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/rotation.h"
 
@@ -70,7 +70,7 @@ sdm_status sdm_fit_mirrored(const sdm_fit_source *source, const sdm_fit_target *
         pose_reflect(&opts->start_pose, centre, &o.start_pose);
         o.box_min[0] = -opts->box_max[0];
         o.box_max[0] = -opts->box_min[0];
-        s = sdm_fit(source, &reflected, &o, out, err);
+        s = sdm_fit_rival(source, &reflected, &o, out, err);
     }
     sdm_free(values);
     sdm_free(points);

@@ -223,11 +223,12 @@ static sdm_status value_find(fit_problem *p, const own_fit *own, size_t k, start
         start one = {.state = own->state, .param = k + 1};
         one.state.params[k] = p->low[k] + (i + 0.5) / N_PARTS * range;
         if (fabs(one.state.params[k] - here) < 0.5 / N_PARTS * range) continue;
-        const sdm_status s = sdm_fit_log_likelihood(p, one.state.params, &one.log_likelihood, err);
+        sdm_status s = sdm_fit_log_likelihood(p, one.state.params, &one.log_likelihood, err);
+        if (!s && !(one.log_likelihood > best->log_likelihood)) continue;
+        if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
         if (s == SDM_E_NOMEM || s == SDM_E_CANCELLED) return s;
         // parameters without a shape are no rival
-        if (s || likeness(own, p->maps.distance, &one.state) > ALIKE) continue;
-        if (one.log_likelihood > best->log_likelihood) *best = one;
+        if (!s && likeness(own, p->maps.distance, &one.state) <= ALIKE) *best = one;
     }
     return SDM_OK;
 }

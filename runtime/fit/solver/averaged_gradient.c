@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "newton.h"
 #include "objective.h"
 
 // rms motion of the surface over the half width, in voxels of the map: large enough to cross many
@@ -24,7 +25,7 @@ static double motion_on_map(const fit_maps *m, size_t k)
     return n > 0 ? sum / n : 0;
 }
 
-// the same over the points
+// the same per unit of column k, over the points
 static double motion_at_points(const fit_samples *s, size_t k)
 {
     double sum = 0;
@@ -45,9 +46,32 @@ void sdm_fit_averaging_widths(const fit_problem *p, double *half_width)
     }
 }
 
+// the same difference quotients by rotation and translation. The surface of the state is at hand
+static void average_pose_gradient(fit_problem *p)
+{
+    const double step = fit_longest_edge(&p->maps.grid);
+    for (size_t k = p->n_params; k < p->n_params + 6; k++) {
+        const double square = motion_at_points(&p->samples, k);
+        if (!(square > 0)) continue;
+        const double width = MOTION * step / sqrt(square);
+        double change = 0;
+        for (int side = -1; side <= 1; side += 2) {
+            double move[FIT_UNKNOWNS_MAX] = {0};
+            fit_state to;
+            move[k] = side * width;
+            sdm_fit_state_move(p, &p->state, move, &to);
+            change += side * sdm_fit_samples_log_likelihood(&p->samples, &p->maps,
+                                                            &p->observation, &to);
+        }
+        p->information.gradient[k] = change / (2 * width);
+    }
+}
+
 sdm_status sdm_fit_average_gradient(fit_problem *p, const double *half_width, sdm_error *err)
 {
     double params[FIT_PARAMS_MAX];
+    // on a map the interpolation makes the likelihood smooth in the pose
+    if (fit_maps_direct(&p->maps) && !p->opts->keep_pose) average_pose_gradient(p);
     for (size_t k = 0; k < p->n_params; k++) params[k] = p->state.params[k];
     for (size_t k = 0; k < p->n_params; k++) {
         const double here = params[k], low = fmax(here - half_width[k], p->low[k]),

@@ -4,7 +4,8 @@
    parameter changes, creases sweep over the samples, and the log-likelihood has a kink each time.
    Its gradient jumps there, and steps along it oscillate. The mean of the derivative over an
    interval is a difference quotient of the log-likelihood, which is continuous (Ermoliev, Norkin
-   and Wets 1995). Pose and tissues cause no such kinks: their derivatives are not averaged. */
+   and Wets 1995). On a map, pose and tissues cause no such kinks: their derivatives are not
+   averaged. Distances of points from the surface itself have them in the pose, too. */
 #pragma once
 
 #include "problem.h"
@@ -17,6 +18,7 @@
 void sdm_fit_averaging_widths(const fit_problem *p, double *half_width);
 
 /* Replaces the derivatives by the parameters in problem->information.gradient by their means over
-   +-half_width, cut off at the bounds of the parameters. Computes two maps for each parameter, and
-   leaves problem->maps out of date. */
+   +-half_width, cut off at the bounds of the parameters; of points measured on the surface itself
+   also those by the pose, over as large a motion. The problem must be evaluated at its state.
+   Computes two maps for each parameter, and leaves problem->maps out of date. */
 sdm_status sdm_fit_average_gradient(fit_problem *p, const double *half_width, sdm_error *err);

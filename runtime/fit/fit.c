@@ -446,6 +446,19 @@ static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     return s;
 }
 
+// standard deviation of the distances of the points on the surface, each by its probability to be
+// none of the outliers; the scale of Student's t is smaller
+static double scatter_of_points(const fit_problem *p)
+{
+    double sum = 0, n = 0;
+    for (size_t i = 0; i < p->samples.n; i++) {
+        const double x = p->samples.field[i], w = sdm_fit_point_belongs(&p->observation, x);
+        sum += w * x * x;
+        n += w;
+    }
+    return n > 0 ? sqrt(sum / n) : 0;
+}
+
 // writes the estimate and the counts to *out, which holds covariance and evidence already
 static void report(fit_problem *p, sdm_fit_result *out)
 {
@@ -467,7 +480,7 @@ static void report(fit_problem *p, sdm_fit_result *out)
     out->n_nan = p->samples.n_nan;
     out->blur = p->maps.share ? s->blur : 0;
     out->appearance = s->appearance;
-    out->point_sd = p->target->kind == SDM_FIT_POINTS ? s->point_sd : 0;
+    out->point_sd = p->target->kind == SDM_FIT_POINTS ? scatter_of_points(p) : 0;
     out->outliers = p->target->kind == SDM_FIT_POINTS ? s->outliers : 0;
     sdm_fit_open_motions_describe(p, out->open_motions, sizeof out->open_motions);
 }

@@ -201,19 +201,20 @@ static int brick_mesh(const void *self, const sdm_host *host, const sdm_option_v
     return failed;
 }
 
+static const sdm_param brick_params[] = {{"length", "mm", 3, 6, 5, ""},
+                                         {"width", "mm", 2, 5, 4, ""},
+                                         {"height", "mm", 0.8, 3, 1, ""}};
+static const sdm_shape brick = {.abi = SDM_SHAPE_ABI,
+                                .size = sizeof(sdm_shape),
+                                .name = "brick",
+                                .summary = "brick",
+                                .params = brick_params,
+                                .n_params = 3,
+                                .mesh = brick_mesh};
+
 static void test_sharp_edges_are_met(void **state)
 {
     (void)state;
-    static const sdm_param params[] = {{"length", "mm", 3, 6, 5, ""},
-                                       {"width", "mm", 2, 5, 4, ""},
-                                       {"height", "mm", 0.8, 3, 1, ""}};
-    static const sdm_shape brick = {.abi = SDM_SHAPE_ABI,
-                                    .size = sizeof(sdm_shape),
-                                    .name = "brick",
-                                    .summary = "brick",
-                                    .params = params,
-                                    .n_params = 3,
-                                    .mesh = brick_mesh};
     const double truth[3] = {4.87, 3.71, 1.13};
     sdm_instance *shape = NULL;
     assert_int_equal(sdm_instance_create(&brick, NULL, 0, NULL, &shape, NULL), SDM_OK);
@@ -229,6 +230,31 @@ static void test_sharp_edges_are_met(void **state)
     sdm_instance_free(shape);
 }
 
+/* Where only two or three points lie in a neighbourhood, their scatter about their own mean is
+ * corrected for it: the residuals of a right fit are noise, and the standard deviation that is
+ * reported is that of the points. */
+static void test_few_points_in_a_neighbourhood_raise_no_doubt(void **state)
+{
+    (void)state;
+    enum { N = 900 };
+    const double truth[3] = {4.9, 3.8, 0.95}, noise = 0.05;
+    sdm_instance *shape = NULL;
+    assert_int_equal(sdm_instance_create(&brick, NULL, 0, NULL, &shape, NULL), SDM_OK);
+    double *x = points_of(shape, truth, 0, N);
+    for (size_t i = 0; i < N; i++)
+        for (size_t k = 0; k < 3; k++) x[3 * i + k] += noise * sdm_rng_normal(31, k, i);
+    sdm_fit_result r = fit_points(shape, x, N);
+    for (size_t i = 0; i < r.verdict.n_findings; i++) {
+        const sdm_fit_finding *f = &r.verdict.findings[i];
+        if (f->kind == SDM_FIT_CHECK_RESIDUALS && f->grade != SDM_FIT_PASSED)
+            fail_msg("residuals %g, limit %g", f->figure, f->limit);
+    }
+    if (!(fabs(r.point_sd / noise - 1) < 0.08)) fail_msg("standard deviation %g", r.point_sd);
+    sdm_fit_dispose(&r);
+    free(x);
+    sdm_instance_free(shape);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -238,6 +264,7 @@ int main(void)
         cmocka_unit_test(test_shapes_are_found),
         cmocka_unit_test(test_deviations_count_independent_points),
         cmocka_unit_test(test_sharp_edges_are_met),
+        cmocka_unit_test(test_few_points_in_a_neighbourhood_raise_no_doubt),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

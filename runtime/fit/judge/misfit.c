@@ -92,23 +92,25 @@ static double contradicted(const unit_mean *u)
     return u->mean < 0 ? fmin(-u->mean, u->expected) : u->mean;
 }
 
-/* Points: the sd of every distance is the robust scatter within the units, which a displacement of
- * a whole unit does not change. */
+/* Points: the sd of every distance is the robust scatter about the means of the units, which a
+ * displacement of a whole unit does not change. Of n points the scatter about their own mean is
+ * smaller by sqrt((n - 1) / n). */
 static sdm_status points_scatter(fit_residuals *r, const member *m, size_t n, sdm_error *err)
 {
-    double *list = NULL, *all = NULL;
-    sdm_status s = SDM_ALLOC(&list, n, "residuals of the fit", err);
-    if (!s) s = SDM_ALLOC(&all, n, "residuals of the fit", err);
+    double *list = NULL;
+    size_t count = 0;
+    const sdm_status s = SDM_ALLOC(&list, n, "residuals of the fit", err);
     for (size_t from = 0, to; from < n && !s; from = to) {
+        double sum = 0;
         for (to = from; to < n && m[to].unit == m[from].unit; to++)
-            list[to - from] = r->residual[m[to].sample];
-        const double middle = sdm_fit_median(list, to - from);
-        for (size_t k = from; k < to; k++) all[k] = r->residual[m[k].sample] - middle;
+            sum += r->residual[m[to].sample];
+        const double size = (double)(to - from);
+        for (size_t k = from; k < to && size > 1; k++)
+            list[count++] = (r->residual[m[k].sample] - sum / size) * sqrt(size / (size - 1));
     }
-    const double sd = s ? 0 : sdm_fit_robust_sd(all, n, 0);
+    const double sd = count ? sdm_fit_robust_sd(list, count, 0) : 0;
     for (size_t i = 0; i < r->n; i++) r->sd[i] = sd;
     sdm_free(list);
-    sdm_free(all);
     return s;
 }
 

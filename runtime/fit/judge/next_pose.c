@@ -92,24 +92,34 @@ static sdm_status own_create(const fit_problem *p, own_fit *own, sdm_error *err)
     return SDM_OK;
 }
 
+// the part of a voxel of a map that lies inside, as seen by the distance at its centre: so thin parts
+// count by their volume, wherever the voxels lie
+static double part_inside(const fit_maps *m, double distance)
+{
+    return fmin(fmax(0.5 - distance / fit_longest_edge(&m->grid), 0), 1);
+}
+
 // Dice coefficient of the fit and of the shape with the map distance[n_voxels] in the state `other`
 static double likeness(const own_fit *own, const double *distance, const fit_state *other)
 {
     const fit_maps *m = &own->p->maps;
     const fit_field f = {.grid = &m->grid, .packed = distance, .n_fields = 1, .distance = true};
-    size_t inside = 0, inside_other = 0, step, seen = 0;
-    for (size_t v = 0; v < m->n_voxels; v++)
-        inside += own->distance[v] < 0, inside_other += distance[v] < 0;
-    step = inside / VOXELS_ALIKE + 1;
-    double x[3], world[3], both = 0, tried = 0;
+    double inside = 0, inside_other = 0, x[3], world[3], both = 0, tried = 0;
     for (size_t v = 0; v < m->n_voxels; v++) {
-        if (!(own->distance[v] < 0) || seen++ % step) continue;
+        inside += part_inside(m, own->distance[v]);
+        inside_other += part_inside(m, distance[v]);
+    }
+    const size_t step = (size_t)(inside / VOXELS_ALIKE) + 1;
+    size_t seen = 0;
+    for (size_t v = 0; v < m->n_voxels; v++) {
+        const double part = part_inside(m, own->distance[v]);
+        if (!(part > 0) || seen++ % step) continue;
         place_of(&m->grid, v, x);
         sdm_fit_to_world(&own->state, x, world);
-        tried++;
-        both += sdm_fit_field_at(&f, other, world) < 0;
+        tried += part;
+        both += fmin(part, part_inside(m, sdm_fit_field_at(&f, other, world)));
     }
-    return 2 * (both / tried) * (double)inside / (double)(inside + inside_other);
+    return tried > 0 ? 2 * (both / tried) * inside / (inside + inside_other) : 0;
 }
 
 // rotation i of the cube's: a permutation of the axes with signs, and no reflection; 0: identity

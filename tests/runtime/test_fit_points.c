@@ -201,9 +201,8 @@ static int brick_mesh(const void *self, const sdm_host *host, const sdm_option_v
     return failed;
 }
 
-static const sdm_param brick_params[] = {{"length", "mm", 3, 6, 5, ""},
-                                         {"width", "mm", 2, 5, 4, ""},
-                                         {"height", "mm", 0.8, 3, 1, ""}};
+static const sdm_param brick_params[] = {
+    {"length", "mm", 3, 6, 5, ""}, {"width", "mm", 2, 5, 4, ""}, {"height", "mm", 0.8, 3, 1, ""}};
 static const sdm_shape brick = {.abi = SDM_SHAPE_ABI,
                                 .size = sizeof(sdm_shape),
                                 .name = "brick",

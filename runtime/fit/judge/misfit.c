@@ -9,6 +9,8 @@
 
 // members of a unit between which correlations are computed; of more, every second, third ... one
 #define MEMBERS_MAX 64
+// points in units of two or more that measure the scatter
+#define SCATTER_MIN 200
 // a unit contradicts the shape if its mean exceeds this number of standard deviations
 #define BEYOND 3.0
 // smallest sd of a unit's mean, as a share: errors of the maps and of the scale of the shares
@@ -98,16 +100,19 @@ static double contradicted(const unit_mean *u)
 static sdm_status points_scatter(fit_residuals *r, const member *m, size_t n, sdm_error *err)
 {
     double *list = NULL;
-    size_t count = 0;
+    size_t count = 0, alone = 0;
     const sdm_status s = SDM_ALLOC(&list, n, "residuals of the fit", err);
     for (size_t from = 0, to; from < n && !s; from = to) {
         double sum = 0;
         for (to = from; to < n && m[to].unit == m[from].unit; to++)
             sum += r->residual[m[to].sample];
         const double size = (double)(to - from);
+        alone += size < 2;
         for (size_t k = from; k < to && size > 1; k++)
             list[count++] = (r->residual[m[k].sample] - sum / size) * sqrt(size / (size - 1));
     }
+    // too few to measure the scatter: points that are alone count as without any, which doubts more
+    while (count < SCATTER_MIN && alone-- > 0) list[count++] = 0;
     const double sd = count ? sdm_fit_robust_sd(list, count, 0) : 0;
     for (size_t i = 0; i < r->n; i++) r->sd[i] = sd;
     sdm_free(list);

@@ -92,8 +92,8 @@ static sdm_status own_create(const fit_problem *p, own_fit *own, sdm_error *err)
     return SDM_OK;
 }
 
-// the part of a voxel of a map that lies inside, as seen by the distance at its centre: so thin parts
-// count by their volume, wherever the voxels lie
+// the part of a voxel of a map that lies inside, as seen by the distance at its centre: so thin
+// parts count by their volume, wherever the voxels lie
 static double part_inside(const fit_maps *m, double distance)
 {
     return fmin(fmax(0.5 - distance / fit_longest_edge(&m->grid), 0), 1);

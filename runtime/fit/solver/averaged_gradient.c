@@ -60,8 +60,8 @@ static void average_pose_gradient(fit_problem *p)
             fit_state to;
             move[k] = side * width;
             sdm_fit_state_move(p, &p->state, move, &to);
-            change += side * sdm_fit_samples_log_likelihood(&p->samples, &p->maps,
-                                                            &p->observation, &to);
+            change +=
+                side * sdm_fit_samples_log_likelihood(&p->samples, &p->maps, &p->observation, &to);
         }
         p->information.gradient[k] = change / (2 * width);
     }

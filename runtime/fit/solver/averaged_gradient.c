@@ -4,8 +4,8 @@
 
 #include <math.h>
 
-#include "newton.h"
 #include "objective.h"
+#include "open_motions.h"
 
 // rms motion of the surface over the half width, in voxels of the map: large enough to cross many
 // kinks, but small compared to the details that an image resolves
@@ -56,10 +56,10 @@ static void average_pose_gradient(fit_problem *p)
         const double width = MOTION * step / sqrt(square);
         double change = 0;
         for (int side = -1; side <= 1; side += 2) {
-            double move[FIT_UNKNOWNS_MAX] = {0};
+            double motion[FIT_MOTIONS_MAX] = {0};
             fit_state to;
-            move[k] = side * width;
-            sdm_fit_state_move(p, &p->state, move, &to);
+            motion[k - p->n_params] = 1;
+            sdm_fit_move_along(&p->state, motion, side * width, &to);
             change +=
                 side * sdm_fit_samples_log_likelihood(&p->samples, &p->maps, &p->observation, &to);
         }

@@ -94,7 +94,7 @@ static void test_derivatives_of_distances(void **state)
     const double p[CUP_PARAMS] = {18, 4.2, 0.7}, e = 1e-5;
     sdm_instance *shape = instance_of(&cup);
     fit_shape_surface s = surface_at(shape, p);
-    for (uint64_t i = 0; i < 200; i++) {
+    for (uint64_t i = 0; i < 60; i++) {
         double x[3], closest[3], gradient[3], by[CUP_PARAMS];
         uint32_t triangle;
         for (size_t a = 0; a < 3; a++)

@@ -54,7 +54,8 @@ static void get_checksum(const cli_page_fit *f, const char *name, char text[20])
     }
 }
 
-/* Takes the path for the file, unless one was found before, or this one cannot be read. */
+/* Sets file->path to this path if it can be read, and it has the checksum or is the first one that
+ * can be read. Does nothing once a path with the checksum was found. */
 static void try_path(const char *path, const char *checksum, named_file *file)
 {
     uint64_t crc = 0;

@@ -41,7 +41,8 @@
 // steps, and of steps with the averaged gradient
 #define EPS_FIRST 1e-2
 #define EPS_FIRST_AVERAGED 1e-4
-// least eps of the steps with the averaged gradient in a fit that is only a rival of another one
+// A fit that only serves to judge another one ends its steps with the averaged gradient at this
+// eps, unless the options give a larger one.
 #define EPS_RIVAL 1e-3
 // relative changes of the prior weights up to this size are ignored: always; where flat steps ended
 // the iterations
@@ -353,26 +354,6 @@ static sdm_status points_start(fit_problem *p, sdm_error *err)
     return SDM_OK;
 }
 
-/* The last iterations of a fit, as in fit_problem. */
-typedef struct recent_iterations {
-    double position[FIT_RECENT][FIT_PARAMS_MAX + 6], step[FIT_RECENT][FIT_PARAMS_MAX + 6];
-    size_t n;
-} recent_iterations;
-
-static void recent_keep(const fit_problem *p, recent_iterations *to)
-{
-    memcpy(to->position, p->recent_position, sizeof to->position);
-    memcpy(to->step, p->recent_step, sizeof to->step);
-    to->n = p->n_recent;
-}
-
-static void recent_restore(fit_problem *p, const recent_iterations *from)
-{
-    memcpy(p->recent_position, from->position, sizeof from->position);
-    memcpy(p->recent_step, from->step, sizeof from->step);
-    p->n_recent = from->n;
-}
-
 /* Points, after the fit: maximises again from the shape on whose surface they lie most evenly, and
  * keeps the better of both states. */
 static sdm_status maximise_from_even(fit_problem *p, fit_newton_opts *newton, fit_newton_end *end,
@@ -381,8 +362,7 @@ static sdm_status maximise_from_even(fit_problem *p, fit_newton_opts *newton, fi
     const fit_state state = p->state;
     const fit_newton_end first = *end;
     const double objective = sdm_fit_objective(p);
-    recent_iterations recent;
-    recent_keep(p, &recent);
+    const fit_recent recent = p->recent;
     bool moved;
     sdm_status s = sdm_fit_even_points(p, &moved, err);
     newton->max_iterations = p->opts->max_iterations;
@@ -392,7 +372,7 @@ static sdm_status maximise_from_even(fit_problem *p, fit_newton_opts *newton, fi
     if (s && s != SDM_E_QUALITY) return s;
     p->state = state;
     *end = first;
-    recent_restore(p, &recent);
+    p->recent = recent;
     return sdm_fit_evaluate(p, err);
 }
 

@@ -1,6 +1,5 @@
 /* Exact maps and derivatives of a shape: parameters, mesh, exact engine. */
-#include "sdm/internal/heap.h"
-#include "sdm/runtime.h"
+#include "shape_surface.h"
 
 sdm_status sdm_exact_shape_map(const sdm_instance *shape, const double *p,
                                const sdm_exact_opts *opts, const sdm_grid *grid, float *values,
@@ -10,25 +9,12 @@ sdm_status sdm_exact_shape_map(const sdm_instance *shape, const double *p,
         return sdm_fail(err, SDM_E_ARG, "exact map: shape, parameters, grid and values are needed");
     sdm_status s = sdm_grid_check(grid, err);
     if (s) return s;
-    sdm_mesh mesh = {0};
-    sdm_exact *engine = NULL;
-    s = sdm_instance_mesh(shape, p, &mesh, err);
-    if (!s) s = sdm_exact_create(&mesh, opts, &engine, err);
-    if (!s) s = sdm_exact_map(engine, grid, values, err);
-    if (!s && report) *report = *sdm_exact_get_report(engine);
-    sdm_exact_free(engine);
-    sdm_mesh_dispose(&mesh);
+    shape_surface surface = {0};
+    s = sdm_shape_surface_make(shape, p, false, opts, &surface, err);
+    if (!s) s = sdm_exact_map(surface.engine, grid, values, err);
+    if (!s && report) *report = *sdm_exact_get_report(surface.engine);
+    sdm_shape_surface_dispose(&surface);
     return s;
-}
-
-/* *out = new array [n_params][n_vert][3]: derivative of each vertex by each parameter. */
-static sdm_status vertex_velocities(const sdm_instance *shape, const double *p, size_t n_params,
-                                    size_t n_vert, double **out, sdm_error *err)
-{
-    size_t count;
-    sdm_status s = sdm_mul(3 * n_vert, n_params, &count, err);
-    if (!s) s = SDM_ALLOC(out, count, "velocities of the vertices", err);
-    return s ? s : sdm_instance_velocity(shape, p, n_vert, *out, err);
 }
 
 sdm_status sdm_exact_shape_jacobian(const sdm_instance *shape, const double *p,
@@ -40,19 +26,13 @@ sdm_status sdm_exact_shape_jacobian(const sdm_instance *shape, const double *p,
                         "exact derivatives: shape, parameters, grid and jacobian are needed");
     sdm_status s = sdm_grid_check(grid, err);
     if (s) return s;
-    sdm_mesh mesh = {0};
-    double *velocity = NULL;
-    sdm_exact *engine = NULL;
-    size_t n_params;
-    (void)sdm_instance_params(shape, &n_params);
-    s = sdm_instance_mesh(shape, p, &mesh, err);
-    if (!s) s = vertex_velocities(shape, p, n_params, mesh.n_vert, &velocity, err);
-    if (!s) s = sdm_exact_create(&mesh, opts, &engine, err);
+    shape_surface surface = {0};
     const sdm_exact_layers layers = {.values = values};
-    if (!s) s = sdm_exact_map_derivative(engine, grid, velocity, n_params, &layers, jacobian, err);
-    if (!s && report) *report = *sdm_exact_get_report(engine);
-    sdm_exact_free(engine);
-    sdm_free(velocity);
-    sdm_mesh_dispose(&mesh);
+    s = sdm_shape_surface_make(shape, p, true, opts, &surface, err);
+    if (!s)
+        s = sdm_exact_map_derivative(surface.engine, grid, surface.velocity, surface.n_params,
+                                     &layers, jacobian, err);
+    if (!s && report) *report = *sdm_exact_get_report(surface.engine);
+    sdm_shape_surface_dispose(&surface);
     return s;
 }

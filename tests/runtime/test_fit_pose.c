@@ -225,9 +225,9 @@ static void test_restless_unknown(void **state)
     sdm_fit_result r = {.sd = sd, .n_iterations = 60};
     sdm_error err = {0};
     p.opts = &o;
-    p.n_recent = FIT_RECENT;
+    p.recent.n = FIT_RECENT;
     for (size_t k = 0; k < FIT_RECENT; k++)
-        for (size_t i = 0; i < N; i++) p.recent_step[k][i] = i == MOVES ? 5 : 0.01;
+        for (size_t i = 0; i < N; i++) p.recent.step[k][i] = i == MOVES ? 5 : 0.01;
     sdm_fit_accept_small_steps(&p, &r);
     assert_false(r.converged);
     sdm_fit_verdict_add(&r.verdict, &(sdm_fit_finding){.kind = SDM_FIT_CHECK_CONVERGED,

@@ -81,10 +81,10 @@ static sdm_instance *instance_of(const sdm_shape *shape)
 
 // ---- derivatives
 
-static fit_shape_surface surface_at(const sdm_instance *shape, const double *p)
+static shape_surface surface_at(const sdm_instance *shape, const double *p)
 {
-    fit_shape_surface s = {0};
-    assert_int_equal(sdm_fit_surface_make(shape, p, true, NULL, &s, NULL), SDM_OK);
+    shape_surface s = {0};
+    assert_int_equal(sdm_shape_surface_make(shape, p, true, NULL, &s, NULL), SDM_OK);
     return s;
 }
 
@@ -93,23 +93,23 @@ static void test_derivatives_of_distances(void **state)
     (void)state;
     const double p[CUP_PARAMS] = {18, 4.2, 0.7}, e = 1e-5;
     sdm_instance *shape = instance_of(&cup);
-    fit_shape_surface s = surface_at(shape, p);
+    shape_surface s = surface_at(shape, p);
     for (uint64_t i = 0; i < 60; i++) {
         double x[3], closest[3], gradient[3], by[CUP_PARAMS];
         uint32_t triangle;
         for (size_t a = 0; a < 3; a++)
             x[a] = (a < 2 ? 12 : 24) * sdm_rng_uniform(11, a, i) - (a < 2 ? 6 : 3);
         (void)sdm_exact_point(s.engine, x, closest, gradient, &triangle);
-        sdm_fit_surface_derivatives(&s, triangle, closest, gradient, by);
+        sdm_shape_surface_derivatives(&s, triangle, closest, gradient, by);
         for (size_t k = 0; k < CUP_PARAMS; k++) {
             double change = 0;
             for (int side = -1; side <= 1; side += 2) {
                 double q[CUP_PARAMS];
                 memcpy(q, p, sizeof q);
                 q[k] += side * e;
-                fit_shape_surface other = surface_at(shape, q);
+                shape_surface other = surface_at(shape, q);
                 change += side * sdm_exact_point(other.engine, x, NULL, NULL, NULL) / (2 * e);
-                sdm_fit_surface_dispose(&other);
+                sdm_shape_surface_dispose(&other);
             }
             // a nearest point at an edge between triangles of one sheet changes sides: no kink
             if (!(fabs(by[k] - change) < 1e-4))
@@ -117,7 +117,7 @@ static void test_derivatives_of_distances(void **state)
                          change);
         }
     }
-    sdm_fit_surface_dispose(&s);
+    sdm_shape_surface_dispose(&s);
     sdm_instance_free(shape);
 }
 
@@ -129,9 +129,9 @@ static void test_area_of_the_surface(void **state)
     const double expected = around * (r * p[HEIGHT] + q * (p[HEIGHT] - p[WALL])) +
                             disc * (r * r + (r * r - q * q) + q * q);
     sdm_instance *shape = instance_of(&cup);
-    fit_shape_surface s = surface_at(shape, p);
+    shape_surface s = surface_at(shape, p);
     double area, gradient[CUP_PARAMS];
-    sdm_fit_surface_area(&s, &area, gradient);
+    sdm_shape_surface_area(&s, &area, gradient);
     assert_true(fabs(area / expected - 1) < 1e-12);
     for (size_t k = 0; k < CUP_PARAMS; k++) {
         double change = 0;
@@ -139,14 +139,14 @@ static void test_area_of_the_surface(void **state)
             double at[CUP_PARAMS], other, ignored[CUP_PARAMS];
             memcpy(at, p, sizeof at);
             at[k] += side * e;
-            fit_shape_surface moved = surface_at(shape, at);
-            sdm_fit_surface_area(&moved, &other, ignored);
-            sdm_fit_surface_dispose(&moved);
+            shape_surface moved = surface_at(shape, at);
+            sdm_shape_surface_area(&moved, &other, ignored);
+            sdm_shape_surface_dispose(&moved);
             change += side * other / (2 * e);
         }
         assert_true(fabs(gradient[k] - change) < 1e-4 * fabs(change));
     }
-    sdm_fit_surface_dispose(&s);
+    sdm_shape_surface_dispose(&s);
     sdm_instance_free(shape);
 }
 

@@ -13,10 +13,11 @@
 
 /* A lattice of nodes of a template map, fewer than 2^30. */
 typedef struct template_level {
-    const float *nodes;     /* [nz][ny][nx][4]: distance, gradient */
-    int32_t n[3];           /* at least 2 along each axis */
-    float half;             /* half of the spacing, mm */
-    float scale, offset[3]; /* index in this lattice = scale * (index in `near`) + offset */
+    const float *nodes; /* [nz][ny][nx][4]: distance, gradient */
+    int32_t n[3];       /* at least 2 along each axis */
+    float half;         /* half of the spacing, mm */
+    float scale,
+        offset[3]; /* index in this lattice = scale * (index in the part's fine lattice) + offset */
 } template_level;
 
 /* A map on the lattice of the correction. */
@@ -68,7 +69,7 @@ typedef struct template_stations {
     size_t n, n_lines;
     double first[3][4], step[3][4]; /* of each line */
     double frame[9];                /* inverse of the part's matrix m */
-    double origin[3], spacing;      /* of the lattice `near` */
+    double origin[3], spacing;      /* of the nodes of the part's fine lattice, mm */
     size_t line, plane;             /* stations in a line, in a plane */
     /* Input and output: y - (y + U(y)) of the first station of the line before, then of the last
        line. */
@@ -89,8 +90,8 @@ typedef struct template_table {
        layers of n stations, combined for voxel `phase` between them. */
     void (*combine)(const template_expansion *e, const float *points, const float *metric, size_t n,
                     size_t phase, float *out);
-    /* f[n] = distance and g[3][n] = gradient of the template at the indices u[3][n] in the lattice
-       `near`, interpolated in `l`; indices outside the lattice are clamped. */
+    /* f[n] = distance and g[3][n] = gradient of the template at the indices u[3][n] in the
+       part's fine lattice, interpolated in `l`; indices outside the lattice are clamped. */
     void (*lookup)(const template_level *l, size_t n, const float *const *u, float *f,
                    float *const *g);
     /* out[n] = f / sqrt(q), q = (g^T G g + e t) / (g^T g + e), t = trace(G) / 3, e = 1e-3, with

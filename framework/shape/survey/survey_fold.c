@@ -10,7 +10,7 @@
 
 enum { STEPS = 16 };
 
-/* What is known about one triangle. */
+/* A triangle on the way from one shape to the other. */
 typedef struct face {
     double n[3];   /* the last normal whose length, twice the area, is above rounding */
     double length; /* of n; 0: there was none so far */
@@ -42,7 +42,8 @@ static void take_step(const sdm_mesh *m, int step, double smallest, face *faces)
     }
 }
 
-/* The step in which most of the area turns over, and its share. */
+/* out->share = the largest part of the area that turns over in one step; out->at = where on the way
+ * that is, on average over this area. Both stay 0 where no triangle turns over. */
 static void sum_up(const face *faces, size_t n, survey_fold *out)
 {
     double all = 0, turned[STEPS] = {0}, moment[STEPS] = {0};

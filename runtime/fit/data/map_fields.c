@@ -61,7 +61,7 @@ sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const s
 
 void sdm_fit_maps_dispose(fit_maps *m)
 {
-    sdm_fit_surface_dispose(&m->surface);
+    sdm_shape_surface_dispose(&m->surface);
     sdm_free(m->values);
     sdm_free(m->jacobian);
     sdm_free(m->distance);
@@ -85,7 +85,7 @@ static sdm_status map_make_exact(fit_maps *m, const double *params, bool derivat
     const sdm_instance *shape = m->source->shape;
     m->has_voxels = false;
     if (fit_maps_direct(m))
-        return sdm_fit_surface_make(shape, params, derivatives, &o, &m->surface, err);
+        return sdm_shape_surface_make(shape, params, derivatives, &o, &m->surface, err);
     if (derivatives)
         return sdm_exact_shape_jacobian(shape, params, &o, &m->grid, m->values, m->jacobian, NULL,
                                         err);
@@ -121,7 +121,7 @@ sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives
 
 sdm_status sdm_fit_maps_voxels(fit_maps *m, sdm_error *err)
 {
-    const fit_shape_surface *surface = &m->surface;
+    const shape_surface *surface = &m->surface;
     if (!fit_maps_direct(m) || m->has_voxels) return SDM_OK;
     const double from = sdm_clock();
     const sdm_exact_layers layers = {.values = m->values};
@@ -194,6 +194,7 @@ void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives)
     const int64_t rows = m->grid.n[1] * m->grid.n[2];
     const int n_threads = sdm_threads(m->n_threads);
     (void)n_threads; // unused without OpenMP
+    if (fit_maps_direct(m)) return;
     m->n_fields = field_count(m, derivatives);
 #pragma omp parallel for schedule(static) num_threads(n_threads)
     for (int64_t row = 0; row < rows; row++) {

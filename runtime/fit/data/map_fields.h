@@ -5,7 +5,8 @@
 #include <math.h>
 
 #include "interpolate.h"
-#include "shape_surface.h"
+#include "maps/shape_surface.h"
+#include "unknowns.h"
 
 typedef struct fit_maps {
     const sdm_fit_source *source;
@@ -31,7 +32,7 @@ typedef struct fit_maps {
     /* [n_voxels] the latest map in double precision, mm */
     double *distance;
     /* direct: the surface of the shape, and whether the arrays above hold its map */
-    fit_shape_surface surface;
+    shape_surface surface;
     bool has_voxels;
     /* [n_voxels][n_fields] the field, its derivatives by the parameters and (share) by the blur, as
      * fit_field.packed; `spare` is scratch memory of the same size */
@@ -69,7 +70,7 @@ sdm_status sdm_fit_maps_voxels(fit_maps *m, sdm_error *err);
 
 /* Fills `packed` from the latest map, convolved with a Gaussian of sd `blur` (mm); without
    `derivatives` only its first field. Shares: blur >= min_blur. Distances: blur >= 0. `derivatives`
-   needs a map that was made with derivatives. */
+   needs a map that was made with derivatives. Direct: does nothing. */
 void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives);
 
 /* View of `packed` for interpolation. */

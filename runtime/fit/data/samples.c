@@ -232,8 +232,8 @@ static sdm_status evaluate_direct(fit_samples *samples, const fit_maps *maps,
         for (size_t i = 0; i < n && !s; i++) {
             double by[FIT_PARAMS_MAX];
             if (samples->row[i] == SIZE_MAX) continue;
-            sdm_fit_surface_derivatives(&maps->surface, triangle[i], at.closest + 3 * i,
-                                        at.gradient + 3 * i, by);
+            sdm_shape_surface_derivatives(&maps->surface, triangle[i], at.closest + 3 * i,
+                                          at.gradient + 3 * i, by);
             jacobian_row(maps, state, samples->world + 3 * i, at.gradient + 3 * i, by,
                          samples->jacobian + samples->row[i] * samples->n_columns);
         }

@@ -59,6 +59,7 @@ typedef struct own_fit {
     const fit_problem *p;
     fit_state state;
     double *distance; /* [n_voxels] map of the shape, mm */
+    double volume;    /* see volume_of() */
     double centre[3]; /* of its inside, in its frame, mm */
     double axes[9];   /* rows: its principal axes */
     double factor;    /* as fit_standing, for the present samples */
@@ -69,6 +70,21 @@ static void place_of(const sdm_grid *g, size_t v, double x[3])
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];
     sdm_grid_world(
         g, (const double[3]){(double)(v % nx), (double)(v / nx % ny), (double)(v / nx / ny)}, x);
+}
+
+// The part of a voxel of a map that lies inside, as seen by the distance at its centre: so thin
+// parts count by their volume, wherever the voxels lie.
+static double part_inside(const fit_maps *m, double distance)
+{
+    return fmin(fmax(0.5 - distance / fit_longest_edge(&m->grid), 0), 1);
+}
+
+// the volume, in voxels, of the shape with the map distance[n_voxels]
+static double volume_of(const fit_maps *m, const double *distance)
+{
+    double sum = 0;
+    for (size_t v = 0; v < m->n_voxels; v++) sum += part_inside(m, distance[v]);
+    return sum;
 }
 
 static sdm_status own_create(const fit_problem *p, own_fit *own, sdm_error *err)
@@ -82,6 +98,7 @@ static sdm_status own_create(const fit_problem *p, own_fit *own, sdm_error *err)
     if (s) return s;
     memcpy(own->centre, e.centre, sizeof own->centre);
     memcpy(own->distance, m->distance, m->n_voxels * sizeof *m->distance);
+    own->volume = volume_of(m, m->distance);
     for (size_t v = 0; v < m->n_voxels; v++) {
         if (!(m->distance[v] < 0)) continue;
         place_of(&m->grid, v, x);
@@ -92,24 +109,15 @@ static sdm_status own_create(const fit_problem *p, own_fit *own, sdm_error *err)
     return SDM_OK;
 }
 
-// the part of a voxel of a map that lies inside, as seen by the distance at its centre: so thin
-// parts count by their volume, wherever the voxels lie
-static double part_inside(const fit_maps *m, double distance)
-{
-    return fmin(fmax(0.5 - distance / fit_longest_edge(&m->grid), 0), 1);
-}
-
-// Dice coefficient of the fit and of the shape with the map distance[n_voxels] in the state `other`
-static double likeness(const own_fit *own, const double *distance, const fit_state *other)
+// Dice coefficient of the fit and of the shape with the map distance[n_voxels] and this volume in
+// the state `other`
+static double likeness(const own_fit *own, const double *distance, double volume,
+                       const fit_state *other)
 {
     const fit_maps *m = &own->p->maps;
     const fit_field f = {.grid = &m->grid, .packed = distance, .n_fields = 1, .distance = true};
-    double inside = 0, inside_other = 0, x[3], world[3], both = 0, tried = 0;
-    for (size_t v = 0; v < m->n_voxels; v++) {
-        inside += part_inside(m, own->distance[v]);
-        inside_other += part_inside(m, distance[v]);
-    }
-    const size_t step = (size_t)(inside / VOXELS_ALIKE) + 1;
+    const size_t step = (size_t)(own->volume / VOXELS_ALIKE) + 1;
+    double x[3], world[3], both = 0, tried = 0;
     size_t seen = 0;
     for (size_t v = 0; v < m->n_voxels; v++) {
         const double part = part_inside(m, own->distance[v]);
@@ -119,7 +127,13 @@ static double likeness(const own_fit *own, const double *distance, const fit_sta
         tried += part;
         both += fmin(part, part_inside(m, sdm_fit_field_at(&f, other, world)));
     }
-    return tried > 0 ? 2 * (both / tried) * inside / (inside + inside_other) : 0;
+    return tried > 0 ? 2 * (both / tried) * own->volume / (own->volume + volume) : 0;
+}
+
+// the same of the fit and of the shape with the latest map in the state `other`
+static double map_likeness(const own_fit *own, const fit_maps *m, const fit_state *other)
+{
+    return likeness(own, m->distance, volume_of(m, m->distance), other);
 }
 
 // rotation i of the cube's: a permutation of the axes with signs, and no reflection; 0: identity
@@ -169,6 +183,16 @@ static double rank(const fit_problem *p, const fit_state *state)
     return sum;
 }
 
+// Inserts a start into list[*n], the best first. Of more than `most` the worst is left out.
+static void start_insert(start *list, size_t *n, size_t most, const start *one)
+{
+    if (*n == most && !(one->log_likelihood > list[most - 1].log_likelihood)) return;
+    size_t at = *n < most ? (*n)++ : most - 1;
+    for (; at > 0 && list[at - 1].log_likelihood < one->log_likelihood; at--)
+        list[at] = list[at - 1];
+    list[at] = *one;
+}
+
 // list[N_CUBE + N_EVEN] = the turns that are no symmetries, the best first; returns their number
 static size_t turns_rank(const own_fit *own, start *list)
 {
@@ -176,12 +200,9 @@ static size_t turns_rank(const own_fit *own, start *list)
     for (size_t i = 0; i < N_CUBE + N_EVEN; i++) {
         start one = {.keep_params = true};
         turned(own, i, &one.state);
-        if (likeness(own, own->distance, &one.state) > ALIKE) continue;
+        if (likeness(own, own->distance, own->volume, &one.state) > ALIKE) continue;
         one.log_likelihood = rank(own->p, &one.state);
-        size_t at = n++;
-        for (; at > 0 && list[at - 1].log_likelihood < one.log_likelihood; at--)
-            list[at] = list[at - 1];
-        list[at] = one;
+        start_insert(list, &n, N_CUBE + N_EVEN, &one);
     }
     return n;
 }
@@ -207,19 +228,9 @@ static sdm_status challenge(fit_problem *p, const own_fit *own, const start *fro
     p->state = from->state;
     sdm_status s = climb(p, from->keep_params, STEPS, err);
     if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
-    *other = !s && likeness(own, p->maps.distance, &p->state) <= ALIKE;
+    *other = !s && map_likeness(own, &p->maps, &p->state) <= ALIKE;
     if (s == SDM_E_QUALITY) return SDM_OK; // a state that cannot be fitted is no rival
     return s ? s : sdm_fit_stand(p, own->factor, standing, err);
-}
-
-// replaces the worst of the *n starts, at most `most`, by one that is better; the best first
-static void start_insert(start *list, size_t *n, size_t most, const start *one)
-{
-    if (*n == most && !(one->log_likelihood > list[most - 1].log_likelihood)) return;
-    size_t at = *n < most ? (*n)++ : most - 1;
-    for (; at > 0 && list[at - 1].log_likelihood < one->log_likelihood; at--)
-        list[at] = list[at - 1];
-    list[at] = *one;
 }
 
 // *best = the value of parameter k, of those that are tried, with which the shape explains the
@@ -238,7 +249,7 @@ static sdm_status value_find(fit_problem *p, const own_fit *own, size_t k, start
         if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
         if (s == SDM_E_NOMEM || s == SDM_E_CANCELLED) return s;
         // parameters without a shape are no rival
-        if (!s && likeness(own, p->maps.distance, &one.state) <= ALIKE) *best = one;
+        if (!s && map_likeness(own, &p->maps, &one.state) <= ALIKE) *best = one;
     }
     return SDM_OK;
 }

@@ -301,23 +301,25 @@ static sdm_status averaged_step(fit_problem *p, const fit_newton_opts *opts, fit
 // there is none, or the damping hides it
 static void iteration_remember(fit_problem *p, const double *step, const double *plain)
 {
-    const size_t n = p->n_params + 6, now = p->n_recent % FIT_RECENT,
-                 before = (p->n_recent + FIT_RECENT - 1) % FIT_RECENT;
+    fit_recent *r = &p->recent;
+    const size_t n = p->n_params + 6, now = r->n % FIT_RECENT,
+                 before = (r->n + FIT_RECENT - 1) % FIT_RECENT;
     for (size_t i = 0; i < n; i++) {
-        p->recent_position[now][i] = (p->n_recent ? p->recent_position[before][i] : 0) + step[i];
-        p->recent_step[now][i] = plain ? plain[i] : INFINITY;
+        r->position[now][i] = (r->n ? r->position[before][i] : 0) + step[i];
+        r->step[now][i] = plain ? plain[i] : INFINITY;
     }
-    p->n_recent++;
+    r->n++;
 }
 
 double sdm_fit_unrest(const fit_problem *p, size_t i)
 {
+    const fit_recent *r = &p->recent;
     double low = INFINITY, high = -INFINITY, mean = 0;
-    if (p->n_recent < FIT_RECENT) return INFINITY;
+    if (r->n < FIT_RECENT) return INFINITY;
     for (size_t k = 0; k < FIT_RECENT; k++) {
-        low = fmin(low, p->recent_position[k][i]);
-        high = fmax(high, p->recent_position[k][i]);
-        mean += p->recent_step[k][i] / FIT_RECENT;
+        low = fmin(low, r->position[k][i]);
+        high = fmax(high, r->position[k][i]);
+        mean += r->step[k][i] / FIT_RECENT;
     }
     return fmax(0.5 * (high - low), fabs(mean));
 }

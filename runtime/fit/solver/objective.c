@@ -24,7 +24,7 @@ static void add_even_density(fit_problem *p)
 {
     double area, gradient[FIT_PARAMS_MAX];
     if (fit_maps_direct(&p->maps))
-        sdm_fit_surface_area(&p->maps.surface, &area, gradient);
+        sdm_shape_surface_area(&p->maps.surface, &area, gradient);
     else
         sdm_fit_maps_area(&p->maps, &area, gradient);
     if (!(area > 0)) return;
@@ -50,7 +50,7 @@ sdm_status sdm_fit_evaluate(fit_problem *p, sdm_error *err)
     if (s) return s;
     // blur the field
     const double blur = sdm_fit_field_blur(p);
-    if (!(p->maps_blur == blur) && !fit_maps_direct(&p->maps)) {
+    if (!(p->maps_blur == blur)) {
         sdm_fit_maps_pack(&p->maps, blur, true);
         p->maps_blur = blur;
     }
@@ -74,7 +74,7 @@ sdm_status sdm_fit_log_likelihood(fit_problem *p, const double *params, double *
     p->maps_params[0] = p->maps_blur = NAN;
     const sdm_status s = sdm_fit_maps_make(&p->maps, params, false, err);
     if (s) return s;
-    if (!fit_maps_direct(&p->maps)) sdm_fit_maps_pack(&p->maps, sdm_fit_field_blur(p), false);
+    sdm_fit_maps_pack(&p->maps, sdm_fit_field_blur(p), false);
     *log_likelihood =
         sdm_fit_samples_log_likelihood(&p->samples, &p->maps, &p->observation, &p->state);
     return SDM_OK;

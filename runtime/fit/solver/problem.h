@@ -34,6 +34,14 @@ typedef struct fit_pose_param {
     double motion[FIT_MOTIONS_MAX];
 } fit_pose_param;
 
+/* The last iterations, see sdm_fit_unrest(). */
+typedef struct fit_recent {
+    /* rings of [n_params + 6]: sum of the steps of each unknown so far; the undamped step */
+    double position[FIT_RECENT][FIT_PARAMS_MAX + 6], step[FIT_RECENT][FIT_PARAMS_MAX + 6];
+    /* number of all iterations so far */
+    size_t n;
+} fit_recent;
+
 typedef struct fit_problem {
     /* inputs, owned by the caller of sdm_fit() or by its stack frame */
     const sdm_fit_source *source;
@@ -88,14 +96,10 @@ typedef struct fit_problem {
     /* [n_iterations] log-posterior density after each iteration, except those of the search */
     double *objective;
     size_t n_iterations, objective_capacity;
-    /* ring of the last n_recent iterations: sum of the steps of each unknown [n_params + 6], and
-     * the undamped step, see sdm_fit_unrest() */
-    double recent_position[FIT_RECENT][FIT_PARAMS_MAX + 6];
-    double recent_step[FIT_RECENT][FIT_PARAMS_MAX + 6];
-    size_t n_recent;
+    fit_recent recent;
     /* number of iterations so far, including those of the search */
     size_t n_steps;
-    /* true: the fit only has to be good enough to be compared with another one, see fit_rival.h */
+    /* true: the fit only serves to judge another one, see fit_rival.h */
     bool is_rival;
     /* the second best of several starts of the search; its objective */
     bool has_runner_up;

@@ -1,4 +1,5 @@
-/* From the estimate of a fit to points to the shape on whose surface they lie most evenly. */
+/* Searches from the estimate of a fit to points for the shape on whose surface the points lie most
+ * evenly. */
 #include "even_points.h"
 
 #include <math.h>

@@ -9,5 +9,5 @@
    the distances of the points alone have a local maximum. It is wrong for data that show a part of
    the surface, so the caller continues without it and keeps the better state. point_sd and the
    share of outliers end at their values of the estimate. *moved = false: the state is the same
-   within STEP_LEAST, or the parameters are kept. */
+   within a hundredth of the range of each parameter. The parameters must not be kept. */
 sdm_status sdm_fit_even_points(fit_problem *p, bool *moved, sdm_error *err);

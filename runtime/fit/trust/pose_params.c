@@ -74,7 +74,7 @@ static sdm_status try_finite(fit_problem *p, size_t k, double m[6], bool *rigid,
     p->maps_params[0] = p->maps_blur = NAN;
     const sdm_status s = sdm_fit_maps_make(&p->maps, params, false, err);
     if (s) return s;
-    if (!fit_maps_direct(&p->maps)) sdm_fit_maps_pack(&p->maps, sdm_fit_field_blur(p), false);
+    sdm_fit_maps_pack(&p->maps, sdm_fit_field_blur(p), false);
     for (int i = 0; i < 6; i++) m[i] *= change;
     for (int round = 0; round < ROUNDS; round++) undo_step(p, m);
     sdm_fit_move_along(&p->state, m, 1, &to);

@@ -444,8 +444,8 @@ typedef struct sdm_fit_result {
     double blur;
     /* tissues at the end of the fit */
     sdm_fit_appearance appearance;
-    /* points: sd of the distances from the surface, mm, of those that are no outliers; other
-       targets: 0 */
+    /* points: standard deviation of the distances of the points from the surface, without the
+       outliers, mm; other targets: 0 */
     double point_sd;
     /* number of the rotation that was chosen, from 0 */
     size_t turn;

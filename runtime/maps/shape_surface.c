@@ -6,22 +6,21 @@
 
 #include "sdm/internal/heap.h"
 #include "sdm/internal/vec3.h"
-#include "sdm/runtime.h"
 
-void sdm_fit_surface_dispose(fit_shape_surface *s)
+void sdm_shape_surface_dispose(shape_surface *s)
 {
     sdm_exact_free(s->engine);
     sdm_mesh_dispose(&s->mesh);
     sdm_free(s->velocity);
-    *s = (fit_shape_surface){0};
+    *s = (shape_surface){0};
 }
 
-sdm_status sdm_fit_surface_make(const sdm_instance *shape, const double *params, bool derivatives,
-                                const sdm_exact_opts *opts, fit_shape_surface *surface,
-                                sdm_error *err)
+sdm_status sdm_shape_surface_make(const sdm_instance *shape, const double *params, bool derivatives,
+                                  const sdm_exact_opts *opts, shape_surface *surface,
+                                  sdm_error *err)
 {
     size_t count;
-    sdm_fit_surface_dispose(surface);
+    sdm_shape_surface_dispose(surface);
     (void)sdm_instance_params(shape, &surface->n_params);
     sdm_status s = sdm_instance_mesh(shape, params, &surface->mesh, err);
     if (!s && derivatives) {
@@ -31,7 +30,7 @@ sdm_status sdm_fit_surface_make(const sdm_instance *shape, const double *params,
             s = sdm_instance_velocity(shape, params, surface->mesh.n_vert, surface->velocity, err);
     }
     if (!s) s = sdm_exact_create(&surface->mesh, opts, &surface->engine, err);
-    if (s) sdm_fit_surface_dispose(surface);
+    if (s) sdm_shape_surface_dispose(surface);
     return s;
 }
 
@@ -50,8 +49,8 @@ static void barycentric(const double *a, const double *b, const double *c, const
     weight[0] = 1 - weight[1] - weight[2];
 }
 
-void sdm_fit_surface_derivatives(const fit_shape_surface *s, uint32_t triangle,
-                                 const double closest[3], const double gradient[3], double *by)
+void sdm_shape_surface_derivatives(const shape_surface *s, uint32_t triangle,
+                                   const double closest[3], const double gradient[3], double *by)
 {
     const uint32_t *t = s->mesh.tri + 3 * (size_t)sdm_exact_source(s->engine)[triangle];
     double weight[3];
@@ -68,15 +67,13 @@ void sdm_fit_surface_derivatives(const fit_shape_surface *s, uint32_t triangle,
 // normal of a triangle whose length is its area
 static double area_normal(const double *vert, const uint32_t *t, double normal[3])
 {
-    double u[3], v[3];
-    v3_sub(vert + 3 * (size_t)t[1], vert + 3 * (size_t)t[0], u);
-    v3_sub(vert + 3 * (size_t)t[2], vert + 3 * (size_t)t[0], v);
-    v3_cross(u, v, normal);
+    v3_triangle_normal(vert + 3 * (size_t)t[0], vert + 3 * (size_t)t[1], vert + 3 * (size_t)t[2],
+                       normal);
     for (int i = 0; i < 3; i++) normal[i] *= 0.5;
     return v3_norm(normal);
 }
 
-void sdm_fit_surface_area(const fit_shape_surface *s, double *area, double *gradient)
+void sdm_shape_surface_area(const shape_surface *s, double *area, double *gradient)
 {
     const sdm_mesh *used = sdm_exact_surface(s->engine);
     const uint32_t *source = sdm_exact_source(s->engine);

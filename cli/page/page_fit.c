@@ -274,8 +274,10 @@ static sdm_status make_maps(const sdm_model *model, const sdm_instance *shape, c
 static sdm_grid choose_grid(const sdm_grid *model, const sdm_grid *image)
 {
     sdm_grid g = *model;
+    // along any axis of the model: the pose turns the image
+    const double finest = fmin(image->spacing[0], fmin(image->spacing[1], image->spacing[2]));
     for (int a = 0; a < 3; a++)
-        if (image->spacing[0] < 0.75 * g.spacing[a] && g.n[a] > 1) {
+        if (finest < 0.75 * g.spacing[a] && g.n[a] > 1) {
             g.n[a] = 2 * g.n[a] - 1;
             g.spacing[a] /= 2;
         }

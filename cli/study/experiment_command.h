@@ -72,6 +72,12 @@ typedef enum cli_experiment_stored {
 cli_experiment_stored cli_experiment_find_stored(const cli_experiment_run *run,
                                                  const cli_experiment_job *job);
 
+/* Before a training with network.kind: auto starts: removes model and checkpoint of an earlier one
+ * and writes asked.yaml, the configuration as the row states it, to the folder of the row. Other
+ * kinds: does nothing. SDM_E_IO, SDM_E_NOMEM. */
+sdm_status cli_experiment_write_asked(const cli_experiment_run *run, const cli_experiment_job *job,
+                                      sdm_error *err);
+
 /* Provides model.sdm in the folder of the row: if it does not exist, starts or continues the
  * training. SDM_E_QUALITY: the training would exceed experiment.minutes. Also returns errors of the
  * training. */

@@ -104,8 +104,16 @@ sdm_status cli_experiment_write_file(const cli_experiment_run *run, const char *
     return sdm_text_write(text, path, err);
 }
 
+/* *x = the keys of the configuration that affect its network. */
+static void dump_network_keys(sdm_config *c, sdm_text *x)
+{
+    sdm_config_strip(c);
+    sdm_config_dump(c, x);
+}
+
 /* True when the configurations a and text[size] give the same network; keys that do not affect it
- * are ignored. name: the source of the text. */
+ * are ignored. name: the source of the text. With network.kind: auto in `a`, the text may be that
+ * of a kind that the trainer chose, with its part of the budget: see ASKED for the whole. */
 static bool is_same_config(const sdm_config *a, const char *name, const char *text, size_t size)
 {
     sdm_config *copy = NULL, *other = NULL;
@@ -115,10 +123,16 @@ static bool is_same_config(const sdm_config *a, const char *name, const char *te
         !SDM_ALLOC(&other, 1, "configuration", NULL) &&
         !sdm_config_parse(name, text, size, NULL, 0, other, NULL)) {
         *copy = *a;
-        sdm_config_strip(copy);
-        sdm_config_strip(other);
-        sdm_config_dump(copy, &x);
-        sdm_config_dump(other, &y);
+        const sdm_network_kind chosen = other->network.kind;
+        if (a->network.kind == SDM_NETWORK_AUTO &&
+            (chosen == SDM_NETWORK_POD || chosen == SDM_NETWORK_TEMPLATE)) {
+            sdm_config_choose_kind(copy, chosen);
+            copy->train.minutes = other->train.minutes;
+            copy->train.steps = other->train.steps;
+            copy->train.samples = other->train.samples;
+        }
+        dump_network_keys(copy, &x);
+        dump_network_keys(other, &y);
         same = !x.failed && !y.failed && !strcmp(x.data, y.data);
     }
     sdm_text_dispose(&x);
@@ -126,6 +140,54 @@ static bool is_same_config(const sdm_config *a, const char *name, const char *te
     sdm_free(copy);
     sdm_free(other);
     return same;
+}
+
+/* Name of the file in the folder of a row with network.kind: auto that holds the configuration as
+ * the row states it: model and checkpoint hold the kind that the trainer chose, and its part of the
+ * budget. */
+#define ASKED "asked.yaml"
+#define ASKED_BYTES_MAX (1 << 20)
+
+/* True unless the row has network.kind: auto and its folder holds a training of another
+ * configuration. */
+static bool is_same_asked(const cli_experiment_run *run, const cli_experiment_job *job, size_t row)
+{
+    char path[SDM_PATH_TEXT_MAX];
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    if (job->config->network.kind != SDM_NETWORK_AUTO) return true;
+    const bool same = !cli_experiment_path(run, row, ASKED, path, NULL) &&
+                      !sdm_file_read(path, ASKED_BYTES_MAX, &bytes, &size, NULL) &&
+                      is_same_config(job->config, path, (const char *)bytes, size);
+    sdm_free(bytes);
+    return same;
+}
+
+sdm_status cli_experiment_write_asked(const cli_experiment_run *run, const cli_experiment_job *job,
+                                      sdm_error *err)
+{
+    static const char *const REPLACED[] = {"model.sdm", "checkpoint.sdmc"};
+    char path[SDM_PATH_TEXT_MAX];
+    sdm_config *c = NULL;
+    sdm_text text = {0};
+    if (job->config->network.kind != SDM_NETWORK_AUTO) return SDM_OK;
+    sdm_status s = SDM_OK;
+    // they would belong to another asked.yaml
+    for (size_t i = 0; i < sizeof REPLACED / sizeof *REPLACED && !s; i++) {
+        s = cli_experiment_path(run, job->index, REPLACED[i], path, err);
+        if (!s) unlink(path);
+    }
+    if (!s) s = SDM_ALLOC(&c, 1, "configuration", err);
+    if (!s) {
+        *c = *job->config;
+        dump_network_keys(c, &text);
+        s = cli_experiment_path(run, job->index, ASKED, path, err);
+    }
+    if (!s) s = sdm_make_folder(job->config->output.folder, err);
+    if (!s) s = sdm_text_write(&text, path, err);
+    sdm_text_dispose(&text);
+    sdm_free(c);
+    return s;
 }
 
 static bool is_same_model(const sdm_config *c, const char *path)
@@ -166,7 +228,9 @@ cli_experiment_stored cli_experiment_find_stored(const cli_experiment_run *run,
         cli_experiment_path(run, row, "model.sdm", model, NULL) ||
         cli_experiment_path(run, row, "checkpoint.sdmc", checkpoint, NULL))
         return CLI_STORED_NONE;
-    if (is_same_model(job->config, model)) return CLI_STORED_MODEL;
-    if (is_same_checkpoint(job->config, checkpoint)) return CLI_STORED_CHECKPOINT;
+    if (is_same_asked(run, job, row)) {
+        if (is_same_model(job->config, model)) return CLI_STORED_MODEL;
+        if (is_same_checkpoint(job->config, checkpoint)) return CLI_STORED_CHECKPOINT;
+    }
     return access(model, F_OK) && access(checkpoint, F_OK) ? CLI_STORED_NONE : CLI_STORED_OTHER;
 }

@@ -35,10 +35,12 @@ static sdm_status train_network(const cli_experiment_run *run, const cli_experim
     cli_progress progress;
     sdm_train_report report = {0};
     const sdm_train_hooks hooks = cli_train_hooks(&progress);
+    sdm_status s = resume ? SDM_OK : cli_experiment_write_asked(run, job, err);
+    if (s) return s;
     const long before = cli_bench_peak_start();
     cli_progress_start(&progress);
-    const sdm_status s = sdm_train(job->config, job->shape, job->config->output.folder, resume,
-                                   &hooks, &report, err);
+    s = sdm_train(job->config, job->shape, job->config->output.folder, resume, &hooks, &report,
+                  err);
     cli_progress_end(&progress, !s);
     if (!s)
         cli_experiment_log(run, "%s: trained in %.1f s, peak memory %.0f MB",

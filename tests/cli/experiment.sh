@@ -98,6 +98,23 @@ sdmgen experiment tiny.yaml experiment.pictures=no --out stopped --peers none >o
 grep -q 'POD: the model or checkpoint in stopped/pod has another configuration and is replaced' err || bad "not said: $(cat err)"
 grep -q '"evaluate", "step": 20,' stopped/pod/metrics.jsonl || bad "not 20 steps: $(tail -n 1 stopped/pod/metrics.jsonl)"
 
+# The same for a kind that the trainer chooses: its part of the budget is not the budget of the row.
+sed -e '/network: {depth/d' -e 's/network: pod, set: .*/network: auto}/' -e '/name: VTK/d' tiny.yaml >auto.yaml
+sdmgen experiment auto.yaml experiment.pictures=no --out auto --peers none >out 2>err || bad "auto: $(cat err)"
+before=$(cksum <auto/pod/model.sdm)
+expect 0 - sdmgen experiment auto.yaml --dry-run --out auto
+has '^POD .*load, measure'
+expect 0 - sdmgen experiment auto.yaml train.steps=21 --dry-run --out auto
+has '^POD .*train anew, measure'
+sdmgen experiment auto.yaml experiment.pictures=no --out auto --peers none >out 2>err || bad "auto again: $(cat err)"
+grep -q 'POD: the model in auto/pod is loaded, not trained again' err || bad "not loaded: $(cat err)"
+[ "$before" = "$(cksum <auto/pod/model.sdm)" ] || bad 'the model has changed'
+stopped_at 'fit' experiment auto.yaml train.steps=1000000000 --out auto-stopped --peers none
+expect 0 - sdmgen experiment auto.yaml train.steps=1000000000 --dry-run --out auto-stopped
+has '^POD .*go on training, measure'
+expect 0 - sdmgen experiment auto.yaml --dry-run --out auto-stopped
+has '^POD .*train anew, measure'
+
 # An interrupt keeps the tables of the previous run. --force trains again; a run without --force then resumes what the forced run began.
 tables=$(cksum stopped/table.*)
 stopped_at 'bases and' experiment tiny.yaml train.steps=1000000000 --out stopped --peers none --force

@@ -8,11 +8,15 @@
 
 /* A block of 8 x 8 x 8 positions of a grid. */
 typedef struct spline_block {
-    const float *rows;  /* interpolated along x: the eight positions of coefficient row (0, 0) */
+    const float *rows;  /* interpolated along x: the eight positions of the first row */
     size_t line, plane; /* distances of rows of coefficients along y and z, in floats */
+    int32_t first[2];   /* y and z: the coefficients of the first row */
     const int32_t *cell[2];      /* [8] y and z: the first of the four coefficients */
     const float (*weight[2])[4]; /* [8] */
 } spline_block;
+
+/* What spline_table.cut finds. */
+enum { SPLINE_BETWEEN, SPLINE_ALL_LOW, SPLINE_ALL_HIGH };
 
 typedef struct spline_table {
     /* out[i] = sum over k of weight[i][k] row[cell[i] + k], i < n. */
@@ -22,6 +26,9 @@ typedef struct spline_table {
     void (*combine)(size_t n, const float *const row[4], const float weight[4], float *out);
     /* out[8][8][8] = the values of a block. */
     void (*block)(const spline_block *b, float *out);
+    /* values[512] are cut off at -width and width. Returns SPLINE_ALL_LOW if all were <= -width,
+       SPLINE_ALL_HIGH if all were >= width, else SPLINE_BETWEEN. */
+    int (*cut)(float width, float *values);
     /* The spline at one point. c: the first of its 4 x 4 x 4 coefficients, rows `line` and planes
        `plane` floats apart; weight[3][4] along x, y, z. */
     float (*value)(const float *c, size_t line, size_t plane, const float (*weight)[4]);

@@ -63,7 +63,8 @@ static void block(const spline_block *b, float *out)
             if (plane[p & 3] == p) continue;
             plane[p & 3] = p;
             for (int j = 0; j < 8; j++) {
-                const float *row = b->rows + (size_t)p * b->plane + (size_t)b->cell[0][j] * b->line;
+                const float *row = b->rows + (size_t)(p - b->first[1]) * b->plane +
+                                   (size_t)(b->cell[0][j] - b->first[0]) * b->line;
                 combine_loop(8, row, row + b->line, row + 2 * b->line, row + 3 * b->line,
                              b->weight[0][j], kept[p & 3] + 8 * j);
             }
@@ -72,6 +73,18 @@ static void block(const spline_block *b, float *out)
         combine_loop(64, kept[p & 3], kept[(p + 1) & 3], kept[(p + 2) & 3], kept[(p + 3) & 3],
                      b->weight[1][k], out);
     }
+}
+
+static int cut(float width, float *values)
+{
+    int32_t low = -1, high = -1; // all bits: all values so far
+    for (int i = 0; i < 512; i++) {
+        const float v = values[i], above = v > -width ? v : -width;
+        low &= -(int32_t)(v <= -width);
+        high &= -(int32_t)(v >= width);
+        values[i] = above < width ? above : width;
+    }
+    return low ? SPLINE_ALL_LOW : high ? SPLINE_ALL_HIGH : SPLINE_BETWEEN;
 }
 
 static float value(const float *c, size_t line, size_t plane, const float (*weight)[4])
@@ -103,4 +116,4 @@ static void gradient(const float *c, size_t line, size_t plane, const float (*we
 }
 
 const spline_table TABLE = {
-    .expand = expand, .combine = combine, .block = block, .value = value, .gradient = gradient};
+    .expand = expand, .combine = combine, .block = block, .cut = cut, .value = value, .gradient = gradient};

@@ -18,7 +18,17 @@ typedef struct spline_block {
 /* What spline_table.cut finds. */
 enum { SPLINE_BETWEEN, SPLINE_ALL_LOW, SPLINE_ALL_HIGH };
 
+/* The rows that spline_table.fit_rows takes at once. */
+enum { SPLINE_LINES = 32 };
+
 typedef struct spline_table {
+    /* Solves the systems of sdm_spline_fit() for `width` lines, neighbours in memory, whose n > 2
+       elements are `step` floats apart. factor[n]: of the elimination. */
+    void (*solve)(float *c, size_t n, size_t step, size_t width, const float *factor);
+    /* The same for SPLINE_LINES rows of n > 2 values, `from` floats apart; the solution goes to c,
+       rows `to` floats apart. memory[n][SPLINE_LINES], 64-byte aligned. */
+    void (*fit_rows)(const float *values, size_t n, size_t from, const float *factor, float *c,
+                     size_t to, float *memory);
     /* out[i] = sum over k of weight[i][k] row[cell[i] + k], i < n. */
     void (*expand)(size_t n, const int32_t *cell, const float (*weight)[4], const float *row,
                    float *out);

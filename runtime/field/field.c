@@ -14,13 +14,12 @@
 static sdm_status allocate(sdm_field *f, sdm_error *err)
 {
     const size_t p = f->info->n_params, n_maps = f->derivatives ? p + 1 : 1;
-    int64_t longest = 0;
-    for (int a = 0; a < 3; a++) longest = f->shape.n[a] > longest ? f->shape.n[a] : longest;
+    const int64_t *n = f->shape.n;
     size_t count;
     sdm_status s = sdm_mul(n_maps, f->shape.count, &count, err);
     if (!s) s = SDM_ALLOC(&f->splines, count, "splines of a field", err);
     if (!s) s = SDM_ALLOC(&f->maps, n_maps * f->voxels, "maps of a field", err);
-    if (!s) s = SDM_ALLOC(&f->factor, (size_t)longest, "factors of a spline", err);
+    if (!s) s = SDM_ALLOC(&f->factor, (size_t)(n[0] + n[1] + n[2]), "factors of a spline", err);
     if (!s) s = SDM_ALLOC(&f->params, p, "parameters", err);
     return s ? s : SDM_ALLOC(&f->used, p, "parameters", err);
 }

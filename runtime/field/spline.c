@@ -79,17 +79,16 @@ void sdm_spline_fit(const spline_shape *s, const float *values, int n_threads, f
 {
     const size_t *n = s->padded, *step = s->step, plane = (size_t)(s->n[0] * s->n[1]);
     const spline_table *kernels = sdm_spline_kernels();
+    float *factor_y = factor + s->n[0];
     if (s->n[0] > 2) eliminate(s->n[0], factor);
-#pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-    for (int64_t k = 0; k < s->n[2]; k++)
-        fit_plane(s, values + (size_t)k * plane, factor, kernels,
-                  c + step[0] + step[1] + (size_t)(k + 1) * step[2]);
-    // along y: whole padded rows
-    if (s->n[1] > 2) eliminate(s->n[1], factor);
+    if (s->n[1] > 2) eliminate(s->n[1], factor_y);
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (int64_t k = 0; k < s->n[2]; k++) {
         float *rows = c + (size_t)(k + 1) * step[2];
-        if (s->n[1] > 2) kernels->solve(rows + step[1], (size_t)s->n[1], step[1], n[0], factor);
+        fit_plane(s, values + (size_t)k * plane, factor, kernels, rows + step[1] + step[0]);
+        // along y: whole padded rows
+        if (s->n[1] > 2)
+            kernels->solve(rows + step[1], (size_t)s->n[1], step[1], n[0], factor_y);
         extend(rows, s->n[1], n[1], step[1], n[0]);
     }
     // along z

@@ -44,8 +44,8 @@ typedef struct spline_axis {
 /* The shape of the spline of a map of n[3] voxels. */
 spline_shape sdm_spline_shape(const int64_t n[3]);
 
-/* coefficient[count] = those of the spline that interpolates values[nz][ny][nx]. factor[max of n]
-   is scratch memory. The same bits for any number of threads. */
+/* coefficient[count] = those of the spline that interpolates values[nz][ny][nx]. factor[sum
+   of n] is scratch memory. The same bits for any number of threads. */
 void sdm_spline_fit(const spline_shape *s, const float *values, int n_threads, float *factor,
                     float *coefficient);
 

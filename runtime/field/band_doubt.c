@@ -5,10 +5,12 @@
 
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
+#include "spline_kernels.h"
 
 /* Bin b holds the coefficients BIN b .. BIN (b + 1) along each axis: neighbouring coefficients
    share a bin, so between blocks of different signs lies a mixed bin. */
 enum { BIN = 4 };
+_Static_assert(BIN + 1 == SPLINE_WINDOW, "a bin is a window");
 
 /* What the coefficients of a bin show: all beyond the limit outside, all inside, or neither. */
 enum { ALL_OUTSIDE = 0, MIXED = 1, ALL_INSIDE = 2 };
@@ -31,15 +33,6 @@ static size_t bin_last(const spline_shape *s, int a, size_t b)
     return last < s->padded[a] ? last : s->padded[a] - 1;
 }
 
-/* low[n], high[n] become the smaller and larger ones of these and row[n]. */
-static void take_row(size_t n, const float *restrict row, float *restrict low, float *restrict high)
-{
-    for (size_t i = 0; i < n; i++) {
-        low[i] = smaller(row[i], low[i]);
-        high[i] = larger(row[i], high[i]);
-    }
-}
-
 static uint8_t kind_of(float low, float high, float limit)
 {
     if (low > limit + ROUNDING * high) return ALL_OUTSIDE;
@@ -51,12 +44,18 @@ static void sort_bins(const spline_shape *s, const float *c, float limit, const 
                       size_t k, float *low, float *high)
 {
     const size_t nx = s->padded[0];
+    const spline_table *kernels = sdm_spline_kernels();
     const float *first = c + k * BIN * s->step[2] + j * BIN * s->step[1];
     memcpy(low, first, nx * sizeof *low);
     memcpy(high, first, nx * sizeof *high);
-    for (size_t z = k * BIN; z <= bin_last(s, 2, k); z++)
-        for (size_t y = j * BIN; y <= bin_last(s, 1, j); y++)
-            take_row(nx, c + z * s->step[2] + y * s->step[1], low, high);
+    for (size_t z = k * BIN; z <= bin_last(s, 2, k); z++) {
+        const float *row[SPLINE_WINDOW];
+        for (size_t i = 0; i <= BIN; i++) {
+            const size_t y = j * BIN + i, last = bin_last(s, 1, j);
+            row[i] = c + z * s->step[2] + (y < last ? y : last) * s->step[1];
+        }
+        kernels->extremes(row, nx, low, high);
+    }
     uint8_t *kind = b->kind + (k * b->n[1] + j) * b->n[0];
     for (size_t i = 0; i < b->n[0]; i++) {
         float least = low[i * BIN], most = high[i * BIN];

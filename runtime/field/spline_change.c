@@ -6,9 +6,11 @@
 
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
+#include "spline_kernels.h"
 
 /* Coefficients with an influence in a brick, along an axis. */
-enum { WINDOW = SPLINE_BRICK + 3 };
+enum { WINDOW = SPLINE_WINDOW };
+_Static_assert(SPLINE_BRICK + 3 == SPLINE_WINDOW, "the kernels take windows of this size");
 
 static inline float larger(float a, float b) { return a > b ? a : b; }
 
@@ -28,37 +30,6 @@ static void list_window(const float *c, size_t size, size_t first, size_t end,
         from[k] = c + (first + k < end ? first + k : end - 1) * size;
 }
 
-_Static_assert(WINDOW == 5, "the loops name the planes or rows of a window");
-
-/* most[n] = the largest difference of coefficients `step` apart in the planes of a window. */
-static void take_differences(const float *const plane[WINDOW], size_t n, size_t step,
-                             float *restrict most)
-{
-    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
-    for (size_t i = 0; i < n; i++) {
-        const float ab = larger(fabsf(a[i + step] - a[i]), fabsf(b[i + step] - b[i])),
-                    cd = larger(fabsf(c[i + step] - c[i]), fabsf(d[i + step] - d[i]));
-        most[i] = larger(larger(ab, cd), fabsf(e[i + step] - e[i]));
-    }
-}
-
-/* most[n] = the largest difference from plane to plane. */
-static void take_steps(const float *const plane[WINDOW], size_t n, float *restrict most)
-{
-    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
-    for (size_t i = 0; i < n; i++)
-        most[i] = larger(larger(fabsf(b[i] - a[i]), fabsf(c[i] - b[i])),
-                         larger(fabsf(d[i] - c[i]), fabsf(e[i] - d[i])));
-}
-
-/* most[n] = the largest of the rows of a window. */
-static void take_largest(const float *const row[WINDOW], size_t n, float *restrict most)
-{
-    const float *a = row[0], *b = row[1], *c = row[2], *d = row[3], *e = row[4];
-    for (size_t i = 0; i < n; i++)
-        most[i] = larger(larger(larger(a[i], b[i]), larger(c[i], d[i])), e[i]);
-}
-
 /* four[n] = the largest of row[i] .. row[i + 3]. */
 static void take_fours(const float *restrict row, size_t n, float *restrict four)
 {
@@ -74,12 +45,13 @@ static void layer_differences(const spline_shape *s, const float *c, size_t b, b
 {
     const size_t size = s->step[2], line = s->step[1], first = rows.first * SPLINE_BRICK * line,
                  n = window_end(s, 1, rows.last - 1) * line - first;
+    const spline_table *kernels = sdm_spline_kernels();
     const float *window[WINDOW];
     list_window(c, size, b * SPLINE_BRICK, window_end(s, 2, b), window);
     for (size_t k = 0; k < WINDOW; k++) window[k] += first;
-    take_differences(window, n - 1, 1, plane + first);
-    take_differences(window, n - line, line, plane + size + first);
-    take_steps(window, n, plane + 2 * size + first);
+    kernels->differences(window, n - 1, 1, plane + first);
+    kernels->differences(window, n - line, line, plane + size + first);
+    kernels->steps(window, n, plane + 2 * size + first);
 }
 
 /* Floats of a row, with zeros after its end for the windows of the last bricks. */
@@ -91,13 +63,14 @@ static void layer_bounds(const spline_shape *s, const double reach[3], const flo
                          brick_rows rows, float *row, spline_change *out)
 {
     const size_t nx = s->padded[0], size = s->step[2], next = row_size(s);
+    const spline_table *kernels = sdm_spline_kernels();
     float *to = out->max + (b * out->n[1] + rows.first) * out->n[0], *four = row + 3 * next;
     for (size_t j = rows.first; j < rows.last; j++) {
         for (size_t a = 0; a < 3; a++) {
             const float *window[WINDOW];
             list_window(plane + a * size, nx, j * SPLINE_BRICK, window_end(s, 1, j) - (a == 1),
                         window);
-            take_largest(window, nx, row + a * next);
+            kernels->largest(window, nx, row + a * next);
             if (a == 0) row[nx - 1] = 0; // the last coefficient has no next one
             take_fours(row + a * next, nx, four + a * next);
         }

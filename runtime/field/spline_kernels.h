@@ -18,6 +18,9 @@ typedef struct spline_block {
 /* What spline_table.cut finds. */
 enum { SPLINE_BETWEEN, SPLINE_ALL_LOW, SPLINE_ALL_HIGH };
 
+/* Rows or planes of a window of coefficients. */
+enum { SPLINE_WINDOW = 5 };
+
 /* The rows that spline_table.fit_rows takes at once. */
 enum { SPLINE_LINES = 32 };
 
@@ -29,13 +32,22 @@ typedef struct spline_table {
        rows `to` floats apart. memory[n][SPLINE_LINES], 64-byte aligned. */
     void (*fit_rows)(const float *values, size_t n, size_t from, const float *factor, float *c,
                      size_t to, float *memory);
-    /* out[i] = sum over k of weight[i][k] row[cell[i] + k], i < n. */
-    void (*expand)(size_t n, const int32_t *cell, const float (*weight)[4], const float *row,
-                   float *out);
+    /* out[i] = sum over k of weight[i][k] row[cell[i] + k], i < n. tap[k]: weight[..][k] in a row;
+       cells ascend or descend. */
+    void (*expand)(size_t n, const int32_t *cell, const float (*weight)[4],
+                   const float *const tap[4], const float *row, float *out);
     /* out[i] = sum over k of weight[k] row[k][i], i < n. */
     void (*combine)(size_t n, const float *const row[4], const float weight[4], float *out);
     /* out[8][8][8] = the values of a block. */
     void (*block)(const spline_block *b, float *out);
+    /* Of the five rows or planes of a window, for i < n: the largest abs(plane[k][i + step] -
+       plane[k][i]); the largest abs(plane[k + 1][i] - plane[k][i]); the largest plane[k][i]. */
+    void (*differences)(const float *const plane[SPLINE_WINDOW], size_t n, size_t step,
+                        float *most);
+    void (*steps)(const float *const plane[SPLINE_WINDOW], size_t n, float *most);
+    void (*largest)(const float *const plane[SPLINE_WINDOW], size_t n, float *most);
+    /* low[i] and high[i] become the smallest and the largest of these and plane[k][i]. */
+    void (*extremes)(const float *const plane[SPLINE_WINDOW], size_t n, float *low, float *high);
     /* values[512] are cut off at -width and width. Returns SPLINE_ALL_LOW if all were <= -width,
        SPLINE_ALL_HIGH if all were >= width, else SPLINE_BETWEEN. */
     int (*cut)(float width, float *values);

@@ -1,6 +1,11 @@
 /* The loops of spline_kernels.h, compiled once for each instruction set. Before inclusion, define
    TABLE, the name of the spline_table. */
+#include <math.h>
+#include <stdbool.h>
 #include <string.h>
+#ifdef __AVX512F__
+#include <immintrin.h>
+#endif
 
 #include "spline_kernels.h"
 
@@ -27,14 +32,46 @@ static inline four mix(const four *row, const float *w)
     return (w[0] * row[0] + w[1] * row[1]) + (w[2] * row[2] + w[3] * row[3]);
 }
 
-static void expand(size_t n, const int32_t *cell, const float (*weight)[4], const float *row,
-                   float *out)
+#ifdef __AVX512F__
+/* Sixteen positions whose coefficients lie in one register. */
+static inline bool expand_near(const int32_t *cell, const float *const tap[4], size_t i,
+                               const float *row, float *out)
+{
+    const int32_t a = cell[i], b = cell[i + 15], first = a < b ? a : b, span = a + b - 2 * first;
+    if (span > 12) return false;
+    const __m512 c = _mm512_maskz_loadu_ps((__mmask16)(0xffff >> (12 - span)), row + first);
+    __m512i at = _mm512_sub_epi32(_mm512_loadu_si512(cell + i), _mm512_set1_epi32(first));
+    __m512 product[4];
+    for (int k = 0; k < 4; k++) {
+        product[k] = _mm512_mul_ps(_mm512_loadu_ps(tap[k] + i), _mm512_permutexvar_ps(at, c));
+        at = _mm512_add_epi32(at, _mm512_set1_epi32(1));
+    }
+    _mm512_storeu_ps(out + i, _mm512_add_ps(_mm512_add_ps(product[0], product[1]),
+                                            _mm512_add_ps(product[2], product[3])));
+    return true;
+}
+#else
+static inline bool expand_near(const int32_t *cell, const float *const tap[4], size_t i,
+                               const float *row, float *out)
+{
+    (void)cell, (void)tap, (void)i, (void)row, (void)out;
+    return false;
+}
+#endif
+
+static void expand(size_t n, const int32_t *cell, const float (*weight)[4],
+                   const float *const tap[4], const float *row, float *out)
 {
     size_t i = 0;
-    for (; i + 4 <= n; i += 4) {
+    while (i + 4 <= n) {
+        if (i + 16 <= n && expand_near(cell, tap, i, row, out)) {
+            i += 16;
+            continue;
+        }
         four product[4];
         for (size_t k = 0; k < 4; k++) product[k] = load(weight[i + k]) * load(row + cell[i + k]);
         *(four_u *)(out + i) = sums(product[0], product[1], product[2], product[3]);
+        i += 4;
     }
     for (; i < n; i++) out[i] = sum(load(weight[i]) * load(row + cell[i]));
 }
@@ -72,6 +109,48 @@ static void block(const spline_block *b, float *out)
         const int32_t p = b->cell[1][k];
         combine_loop(64, kept[p & 3], kept[(p + 1) & 3], kept[(p + 2) & 3], kept[(p + 3) & 3],
                      b->weight[1][k], out);
+    }
+}
+
+static inline float larger(float a, float b) { return a > b ? a : b; }
+static inline float smaller(float a, float b) { return a < b ? a : b; }
+_Static_assert(SPLINE_WINDOW == 5, "the loops name the planes or rows of a window");
+
+static void differences(const float *const plane[SPLINE_WINDOW], size_t n, size_t step,
+                        float *restrict most)
+{
+    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
+    for (size_t i = 0; i < n; i++) {
+        const float ab = larger(fabsf(a[i + step] - a[i]), fabsf(b[i + step] - b[i])),
+                    cd = larger(fabsf(c[i + step] - c[i]), fabsf(d[i + step] - d[i]));
+        most[i] = larger(larger(ab, cd), fabsf(e[i + step] - e[i]));
+    }
+}
+
+static void steps(const float *const plane[SPLINE_WINDOW], size_t n, float *restrict most)
+{
+    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
+    for (size_t i = 0; i < n; i++)
+        most[i] = larger(larger(fabsf(b[i] - a[i]), fabsf(c[i] - b[i])),
+                         larger(fabsf(d[i] - c[i]), fabsf(e[i] - d[i])));
+}
+
+static void largest(const float *const plane[SPLINE_WINDOW], size_t n, float *restrict most)
+{
+    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
+    for (size_t i = 0; i < n; i++)
+        most[i] = larger(larger(larger(a[i], b[i]), larger(c[i], d[i])), e[i]);
+}
+
+static void extremes(const float *const plane[SPLINE_WINDOW], size_t n, float *restrict low,
+                     float *restrict high)
+{
+    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
+    for (size_t i = 0; i < n; i++) {
+        const float p = smaller(smaller(smaller(a[i], b[i]), smaller(c[i], d[i])), e[i]),
+                    q = larger(larger(larger(a[i], b[i]), larger(c[i], d[i])), e[i]);
+        low[i] = smaller(p, low[i]);
+        high[i] = larger(q, high[i]);
     }
 }
 
@@ -207,4 +286,4 @@ static void gradient(const float *c, size_t line, size_t plane, const float (*we
     memcpy(out, &all, 3 * sizeof *out);
 }
 
-const spline_table TABLE = {.solve = solve, .fit_rows = fit_rows, .expand = expand, .combine = combine, .block = block, .cut = cut, .value = value, .gradient = gradient};
+const spline_table TABLE = {.solve = solve, .fit_rows = fit_rows, .expand = expand, .combine = combine, .block = block, .differences = differences, .steps = steps, .largest = largest, .extremes = extremes, .cut = cut, .value = value, .gradient = gradient};

@@ -36,7 +36,6 @@ typedef struct spline_axis {
     int32_t *cell;      /* [n] as in spline_place */
     int32_t *node;      /* [n] as in spline_place */
     float (*weight)[4]; /* [n] weights of the coefficients cell .. cell + 3 */
-    float *tap[4];      /* [n] the same, coefficient by coefficient */
     float *beyond;      /* [n] distance from the end of the box to the voxel, mm; 0: inside */
     int32_t low, high;  /* the coefficients in use: low .. high - 1 */
     bool leaves;        /* a voxel lies outside of the box */

@@ -63,7 +63,6 @@ static void axis_fill(const spline_shape *s, const spline_frame *f, const sdm_gr
         x->cell[i] = p.cell;
         x->node[i] = p.node;
         sdm_spline_weights(p.t, x->weight[i]);
-        for (int k = 0; k < 4; k++) x->tap[k][i] = x->weight[i][k];
         x->beyond[i] = (float)(fabs(p.beyond) * f->spacing[x->axis]);
         x->leaves = x->leaves || p.beyond != 0;
         x->low = p.cell < x->low ? p.cell : x->low;
@@ -75,7 +74,7 @@ sdm_status sdm_spline_grid_create(const spline_shape *s, const spline_frame *f,
                                   const sdm_grid *grid, const int64_t n[3], double offset,
                                   double stride, spline_grid *out, sdm_error *err)
 {
-    enum { WORDS = 11 }; // cell, node, four weights twice, beyond
+    enum { WORDS = 7 }; // cell, node, four weights, beyond
     memset(out, 0, sizeof *out);
     const size_t total = (size_t)n[0] + (size_t)n[1] + (size_t)n[2];
     const sdm_status status = SDM_ALLOC(&out->memory, WORDS * total, "places of voxels", err);
@@ -88,7 +87,6 @@ sdm_status sdm_spline_grid_create(const spline_shape *s, const spline_frame *f,
         x->cell = at + 4 * x->n;
         x->node = x->cell + x->n;
         x->beyond = (float *)(x->node + x->n);
-        for (size_t k = 0; k < 4; k++) x->tap[k] = x->beyond + (k + 1) * x->n;
         at += WORDS * x->n;
         axis_fill(s, f, grid, b, offset, stride, x);
     }
@@ -107,10 +105,7 @@ static void pieces_expand(const spline_axis *x, size_t begin, size_t end, const 
 {
     const size_t first = begin * SPLINE_PIECE,
                  last = end * SPLINE_PIECE < x->n ? end * SPLINE_PIECE : x->n;
-    const float *const tap[4] = {x->tap[0] + first, x->tap[1] + first, x->tap[2] + first,
-                                 x->tap[3] + first};
-    kernels->expand(last - first, x->cell + first, (const float(*)[4])x->weight + first, tap, row,
-                    to);
+    kernels->expand(last - first, x->cell + first, (const float(*)[4])x->weight + first, row, to);
 }
 
 /* Interpolates the wanted pieces of the row of coefficients (j, k). gathered[padded]: scratch

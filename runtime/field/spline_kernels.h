@@ -32,10 +32,9 @@ typedef struct spline_table {
        rows `to` floats apart. memory[n][SPLINE_LINES], 64-byte aligned. */
     void (*fit_rows)(const float *values, size_t n, size_t from, const float *factor, float *c,
                      size_t to, float *memory);
-    /* out[i] = sum over k of weight[i][k] row[cell[i] + k], i < n. tap[k]: weight[..][k] in a row;
-       cells ascend or descend. */
-    void (*expand)(size_t n, const int32_t *cell, const float (*weight)[4],
-                   const float *const tap[4], const float *row, float *out);
+    /* out[i] = sum over k of weight[i][k] row[cell[i] + k], i < n. */
+    void (*expand)(size_t n, const int32_t *cell, const float (*weight)[4], const float *row,
+                   float *out);
     /* out[i] = sum over k of weight[k] row[k][i], i < n. */
     void (*combine)(size_t n, const float *const row[4], const float weight[4], float *out);
     /* out[8][8][8] = the values of a block. */

@@ -1,11 +1,7 @@
 /* The loops of spline_kernels.h, compiled once for each instruction set. Before inclusion, define
    TABLE, the name of the spline_table. */
 #include <math.h>
-#include <stdbool.h>
 #include <string.h>
-#ifdef __AVX512F__
-#include <immintrin.h>
-#endif
 
 #include "spline_kernels.h"
 
@@ -32,46 +28,14 @@ static inline four mix(const four *row, const float *w)
     return (w[0] * row[0] + w[1] * row[1]) + (w[2] * row[2] + w[3] * row[3]);
 }
 
-#ifdef __AVX512F__
-/* Sixteen positions whose coefficients lie in one register. */
-static inline bool expand_near(const int32_t *cell, const float *const tap[4], size_t i,
-                               const float *row, float *out)
-{
-    const int32_t a = cell[i], b = cell[i + 15], first = a < b ? a : b, span = a + b - 2 * first;
-    if (span > 12) return false;
-    const __m512 c = _mm512_maskz_loadu_ps((__mmask16)(0xffff >> (12 - span)), row + first);
-    __m512i at = _mm512_sub_epi32(_mm512_loadu_si512(cell + i), _mm512_set1_epi32(first));
-    __m512 product[4];
-    for (int k = 0; k < 4; k++) {
-        product[k] = _mm512_mul_ps(_mm512_loadu_ps(tap[k] + i), _mm512_permutexvar_ps(at, c));
-        at = _mm512_add_epi32(at, _mm512_set1_epi32(1));
-    }
-    _mm512_storeu_ps(out + i, _mm512_add_ps(_mm512_add_ps(product[0], product[1]),
-                                            _mm512_add_ps(product[2], product[3])));
-    return true;
-}
-#else
-static inline bool expand_near(const int32_t *cell, const float *const tap[4], size_t i,
-                               const float *row, float *out)
-{
-    (void)cell, (void)tap, (void)i, (void)row, (void)out;
-    return false;
-}
-#endif
-
-static void expand(size_t n, const int32_t *cell, const float (*weight)[4],
-                   const float *const tap[4], const float *row, float *out)
+static void expand(size_t n, const int32_t *cell, const float (*weight)[4], const float *row,
+                   float *out)
 {
     size_t i = 0;
-    while (i + 4 <= n) {
-        if (i + 16 <= n && expand_near(cell, tap, i, row, out)) {
-            i += 16;
-            continue;
-        }
+    for (; i + 4 <= n; i += 4) {
         four product[4];
         for (size_t k = 0; k < 4; k++) product[k] = load(weight[i + k]) * load(row + cell[i + k]);
         *(four_u *)(out + i) = sums(product[0], product[1], product[2], product[3]);
-        i += 4;
     }
     for (; i < n; i++) out[i] = sum(load(weight[i]) * load(row + cell[i]));
 }

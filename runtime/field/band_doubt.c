@@ -133,8 +133,7 @@ sdm_status sdm_band_doubt(const spline_shape *s, const float *coefficient, float
     bins b = {.kind = NULL};
     block_range *range[3] = {NULL};
     sdm_status status = make_bins(s, coefficient, limit, n_threads, &b, err);
-    if (!status)
-        status = SDM_ALLOC(&range[0], b.n[0] + b.n[1] + b.n[2], "blocks of bins", err);
+    if (!status) status = SDM_ALLOC(&range[0], b.n[0] + b.n[1] + b.n[2], "blocks of bins", err);
     if (!status) {
         range[1] = range[0] + b.n[axis[0].axis];
         range[2] = range[1] + b.n[axis[1].axis];

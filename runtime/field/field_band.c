@@ -14,13 +14,13 @@ typedef struct job {
     double width;
     float radius; /* mm from the centre of a block to its voxels at the corners */
     bool parallel;
-    spline_grid places; /* of the voxels, up to the end of the last blocks; parallel grids only */
-    spline_part part;   /* what candidates of a parallel grid need of its rows */
-    float *rows;        /* of sdm_spline_rows(), for this part */
-    brick_span *span[3];  /* of the blocks along the axes of a parallel grid */
-    uint8_t *doubt;       /* [blocks] of sdm_band_doubt(); parallel grids only */
-    float *centre;      /* [blocks] values at the centres of the blocks */
-    double half[3];     /* mm along the axes of the map from the centre of a block to its voxels */
+    spline_grid places;  /* of the voxels, up to the end of the last blocks; parallel grids only */
+    spline_part part;    /* what candidates of a parallel grid need of its rows */
+    float *rows;         /* of sdm_spline_rows(), for this part */
+    brick_span *span[3]; /* of the blocks along the axes of a parallel grid */
+    uint8_t *doubt;      /* [blocks] of sdm_band_doubt(); parallel grids only */
+    float *centre;       /* [blocks] values at the centres of the blocks */
+    double half[3];      /* mm along the axes of the map from the centre of a block to its voxels */
     spline_change change;
     uint32_t *candidate; /* [n] blocks that may meet the band */
     size_t n;
@@ -96,8 +96,8 @@ static void find_spans(const job *j, const double at[3], brick_span span[3])
     }
 }
 
-/* Whether the value may change by more than `most` from the centre of a block to its voxels; span[3]
-   along x, y, z of the map. */
+/* Whether the value may change by more than `most` from the centre of a block to its voxels;
+   span[3] along x, y, z of the map. */
 static bool may_change(const job *j, float most, const brick_span *const span[3])
 {
     const spline_change *c = &j->change;

@@ -87,8 +87,7 @@ void sdm_spline_fit(const spline_shape *s, const float *values, int n_threads, f
         float *rows = c + (size_t)(k + 1) * step[2];
         fit_plane(s, values + (size_t)k * plane, factor, kernels, rows + step[1] + step[0]);
         // along y: whole padded rows
-        if (s->n[1] > 2)
-            kernels->solve(rows + step[1], (size_t)s->n[1], step[1], n[0], factor_y);
+        if (s->n[1] > 2) kernels->solve(rows + step[1], (size_t)s->n[1], step[1], n[0], factor_y);
         extend(rows, s->n[1], n[1], step[1], n[0]);
     }
     // along z

@@ -214,10 +214,9 @@ sdm_status sdm_spline_map(const spline_shape *s, const spline_grid *g, const flo
     const size_t planes = (size_t)(g->axis[2].high - g->axis[2].low) * width * height;
     const spline_table *kernels = sdm_spline_kernels();
     const spline_axis *y = &g->axis[1], *z = &g->axis[2];
-    const spline_part part = {
-        .first = {0, (size_t)y->low, (size_t)z->low},
-        .n = {(nx + SPLINE_PIECE - 1) / SPLINE_PIECE, (size_t)(y->high - y->low),
-              (size_t)(z->high - z->low)}};
+    const spline_part part = {.first = {0, (size_t)y->low, (size_t)z->low},
+                              .n = {(nx + SPLINE_PIECE - 1) / SPLINE_PIECE,
+                                    (size_t)(y->high - y->low), (size_t)(z->high - z->low)}};
     float *rows = NULL, *memory = NULL;
     size_t count;
     sdm_status status = sdm_mul(part.n[0] * SPLINE_PIECE * part.n[1], part.n[2], &count, err);

@@ -8,9 +8,9 @@
 
 /* A block of 8 x 8 x 8 positions of a grid. */
 typedef struct spline_block {
-    const float *rows;  /* interpolated along x: the eight positions of the first row */
-    size_t line, plane; /* distances of rows of coefficients along y and z, in floats */
-    int32_t first[2];   /* y and z: the coefficients of the first row */
+    const float *rows;           /* interpolated along x: the eight positions of the first row */
+    size_t line, plane;          /* distances of rows of coefficients along y and z, in floats */
+    int32_t first[2];            /* y and z: the coefficients of the first row */
     const int32_t *cell[2];      /* [8] y and z: the first of the four coefficients */
     const float (*weight[2])[4]; /* [8] */
 } spline_block;

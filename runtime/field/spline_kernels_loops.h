@@ -169,7 +169,10 @@ static inline void transpose(four r[4])
 }
 
 /* The last of the groups of four elements of a row overlaps the one before, if need be. */
-static inline size_t next_four(size_t i, size_t n) { return i + 4 < n && i + 8 > n ? n - 4 : i + 4; }
+static inline size_t next_four(size_t i, size_t n)
+{
+    return i + 4 < n && i + 8 > n ? n - 4 : i + 4;
+}
 
 typedef float lanes __attribute__((vector_size(64)));
 _Static_assert(SPLINE_LINES == 32, "the rows are two vectors");
@@ -250,4 +253,15 @@ static void gradient(const float *c, size_t line, size_t plane, const float (*we
     memcpy(out, &all, 3 * sizeof *out);
 }
 
-const spline_table TABLE = {.solve = solve, .fit_rows = fit_rows, .expand = expand, .combine = combine, .block = block, .differences = differences, .steps = steps, .largest = largest, .extremes = extremes, .cut = cut, .value = value, .gradient = gradient};
+const spline_table TABLE = {.solve = solve,
+                            .fit_rows = fit_rows,
+                            .expand = expand,
+                            .combine = combine,
+                            .block = block,
+                            .differences = differences,
+                            .steps = steps,
+                            .largest = largest,
+                            .extremes = extremes,
+                            .cut = cut,
+                            .value = value,
+                            .gradient = gradient};

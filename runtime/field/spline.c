@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "sdm/internal/threads.h"
 #include "spline_kernels.h"
 
 spline_shape sdm_spline_shape(const int64_t n[3])
@@ -49,17 +50,25 @@ static void extend(float *first, int64_t n, size_t padded, size_t step, size_t w
     }
 }
 
-/* Floats of the memory of spline_table.fit_rows that lies on the stack; longer rows are solved one
-   by one. */
-enum { MEMORY = SPLINE_LINES * 1024 };
+/* Floats for the factors of all axes, and for spline_table.fit_rows. */
+static size_t factor_floats(const spline_shape *s)
+{
+    const size_t n = (size_t)(s->n[0] + s->n[1] + s->n[2]);
+    return (n + SPLINE_LINES - 1) / SPLINE_LINES * SPLINE_LINES; // what follows is aligned
+}
+static size_t rows_floats(const spline_shape *s) { return SPLINE_LINES * (size_t)s->n[0]; }
 
-/* Along x: rows values[rows][n[0]] of a plane, to c. */
+size_t sdm_spline_scratch(const spline_shape *s, int n_threads)
+{
+    return factor_floats(s) + (size_t)n_threads * rows_floats(s);
+}
+
+/* Along x: rows values[rows][n[0]] of a plane, to c. memory[rows_floats()], 64-byte aligned. */
 static void fit_plane(const spline_shape *s, const float *values, const float *factor,
-                      const spline_table *kernels, float *c)
+                      const spline_table *kernels, float *memory, float *c)
 {
     const size_t n = (size_t)s->n[0], rows = (size_t)s->n[1], to = s->step[1];
-    _Alignas(64) float memory[MEMORY];
-    if (n > 2 && rows >= SPLINE_LINES && n * SPLINE_LINES <= MEMORY) {
+    if (n > 2 && rows >= SPLINE_LINES) {
         // the last rows overlap those before
         for (size_t j = 0; j < rows; j += SPLINE_LINES) {
             const size_t first = rows - j < SPLINE_LINES ? rows - SPLINE_LINES : j;
@@ -74,18 +83,19 @@ static void fit_plane(const spline_shape *s, const float *values, const float *f
     for (size_t j = 0; j < rows; j++) extend(c + j * to - 1, s->n[0], s->padded[0], 1, 1);
 }
 
-void sdm_spline_fit(const spline_shape *s, const float *values, int n_threads, float *factor,
+void sdm_spline_fit(const spline_shape *s, const float *values, int n_threads, float *scratch,
                     float *c)
 {
     const size_t *n = s->padded, *step = s->step, plane = (size_t)(s->n[0] * s->n[1]);
     const spline_table *kernels = sdm_spline_kernels();
-    float *factor_y = factor + s->n[0];
+    float *factor = scratch, *factor_y = factor + s->n[0], *memory = scratch + factor_floats(s);
     if (s->n[0] > 2) eliminate(s->n[0], factor);
     if (s->n[1] > 2) eliminate(s->n[1], factor_y);
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (int64_t k = 0; k < s->n[2]; k++) {
         float *rows = c + (size_t)(k + 1) * step[2];
-        fit_plane(s, values + (size_t)k * plane, factor, kernels, rows + step[1] + step[0]);
+        fit_plane(s, values + (size_t)k * plane, factor, kernels,
+                  memory + (size_t)sdm_thread() * rows_floats(s), rows + step[1] + step[0]);
         // along y: whole padded rows
         if (s->n[1] > 2) kernels->solve(rows + step[1], (size_t)s->n[1], step[1], n[0], factor_y);
         extend(rows, s->n[1], n[1], step[1], n[0]);

@@ -14,13 +14,13 @@
 static sdm_status allocate(sdm_field *f, sdm_error *err)
 {
     const size_t p = f->info->n_params, n_maps = f->derivatives ? p + 1 : 1;
-    int64_t longest = 0;
-    for (int a = 0; a < 3; a++) longest = f->shape.n[a] > longest ? f->shape.n[a] : longest;
     size_t count;
     sdm_status s = sdm_mul(n_maps, f->shape.count, &count, err);
     if (!s) s = SDM_ALLOC(&f->splines, count, "splines of a field", err);
     if (!s) s = SDM_ALLOC(&f->maps, n_maps * f->voxels, "maps of a field", err);
-    if (!s) s = SDM_ALLOC(&f->factor, (size_t)longest, "factors of a spline", err);
+    if (!s)
+        s = SDM_ALLOC(&f->scratch, sdm_spline_scratch(&f->shape, f->n_threads),
+                      "factors of a spline", err);
     if (!s) s = SDM_ALLOC(&f->params, p, "parameters", err);
     return s ? s : SDM_ALLOC(&f->used, p, "parameters", err);
 }
@@ -70,7 +70,7 @@ void sdm_field_free(sdm_field *f)
     free_exact(f);
     sdm_free(f->used);
     sdm_free(f->params);
-    sdm_free(f->factor);
+    sdm_free(f->scratch);
     sdm_free(f->maps);
     sdm_free(f->splines);
     sdm_free(f);
@@ -118,7 +118,7 @@ static sdm_status fill_maps(sdm_field *f, sdm_error *err)
     const sdm_status s =
         sdm_model_fine(f->model) ? fine_maps(f, f->maps, err) : network_maps(f, f->maps, err);
     for (size_t i = 0; i < n_maps && !s; i++)
-        sdm_spline_fit(&f->shape, f->maps + i * f->voxels, f->n_threads, f->factor,
+        sdm_spline_fit(&f->shape, f->maps + i * f->voxels, f->n_threads, f->scratch,
                        f->splines + i * f->shape.count);
     return s;
 }

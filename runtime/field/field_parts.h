@@ -21,7 +21,7 @@ struct sdm_field {
     size_t voxels;
     float *maps;    /* [1 + n_params or 1][voxels]: the map, then its derivatives */
     float *splines; /* [the same][shape.count] */
-    float *factor;  /* scratch memory of sdm_spline_fit() */
+    float *scratch; /* scratch memory of sdm_spline_fit() */
     /* The parameters in use. */
     bool ready;
     double *params, *used; /* [n_params] as given; as the network takes them */

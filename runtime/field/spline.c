@@ -4,8 +4,8 @@
 
 #include <string.h>
 
-/* Lines that the solver along x takes at once: their recursions overlap. */
-enum { LINES = 16 };
+#include "sdm/internal/threads.h"
+#include "spline_kernels.h"
 
 spline_shape sdm_spline_shape(const int64_t n[3])
 {
@@ -30,34 +30,6 @@ static void eliminate(int64_t n, float *factor)
     for (int64_t i = 1; i < n; i++) factor[i] = (float)(u = 1 / (4 - u));
 }
 
-/* Solves the system for `width` lines whose first elements are `apart` floats apart; elements of a
-   line are `step` apart. */
-static void solve(float *c, int64_t n, size_t step, size_t width, size_t apart, const float *factor)
-{
-    const size_t last = (size_t)n - 1;
-    for (size_t w = 0; w < width; w++) {
-        float *line = c + w * apart;
-        const float end = line[last * step] - line[(last - 1) * step];
-        line[0] -= line[step];
-        line[last * step] = end;
-    }
-    for (size_t i = 1; i < last; i++)
-        for (size_t w = 0; w < width; w++) {
-            float *at = c + w * apart + i * step;
-            at[0] = (6 * at[0] - at[-(ptrdiff_t)step]) * factor[i];
-        }
-    const float closing = 1 / (1 + factor[last - 1]);
-    for (size_t w = 0; w < width; w++) {
-        float *at = c + w * apart + last * step;
-        at[0] = (at[0] + at[-(ptrdiff_t)step]) * closing;
-    }
-    for (size_t i = last; i-- > 0;)
-        for (size_t w = 0; w < width; w++) {
-            float *at = c + w * apart + i * step;
-            at[0] -= factor[i] * at[step];
-        }
-}
-
 /* The coefficient beyond an end: the third difference is zero, or on a short axis the second or the
    first one. c: the coefficient at the end; inward: distance to the next one. */
 static float beyond_end(const float *c, int64_t n, ptrdiff_t inward)
@@ -78,47 +50,62 @@ static void extend(float *first, int64_t n, size_t padded, size_t step, size_t w
     }
 }
 
-static void fit_rows(const spline_shape *s, int n_threads, float *factor, float *c)
+/* Floats for the factors of all axes, and for spline_table.fit_rows. */
+static size_t factor_floats(const spline_shape *s)
 {
-    const int64_t rows = s->n[1] * s->n[2];
-    float *inner = c + s->step[0] + s->step[1] + s->step[2];
-    if (s->n[0] > 2) eliminate(s->n[0], factor);
-#pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-    for (int64_t k = 0; k < s->n[2]; k++) {
-        float *plane = inner + (size_t)k * s->step[2];
-        for (int64_t j = 0; s->n[0] > 2 && j < s->n[1]; j += LINES)
-            solve(plane + (size_t)j * s->step[1], s->n[0], 1,
-                  (size_t)(s->n[1] - j < LINES ? s->n[1] - j : LINES), s->step[1], factor);
-    }
-#pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-    for (int64_t r = 0; r < rows; r++)
-        extend(inner + (size_t)(r / s->n[1]) * s->step[2] + (size_t)(r % s->n[1]) * s->step[1] - 1,
-               s->n[0], s->padded[0], 1, 1);
+    const size_t n = (size_t)(s->n[0] + s->n[1] + s->n[2]);
+    return (n + SPLINE_LINES - 1) / SPLINE_LINES * SPLINE_LINES; // what follows is aligned
+}
+static size_t rows_floats(const spline_shape *s) { return SPLINE_LINES * (size_t)s->n[0]; }
+
+size_t sdm_spline_scratch(const spline_shape *s, int n_threads)
+{
+    return factor_floats(s) + (size_t)n_threads * rows_floats(s);
 }
 
-void sdm_spline_fit(const spline_shape *s, const float *values, int n_threads, float *factor,
+/* Along x: rows values[rows][n[0]] of a plane, to c. memory[rows_floats()], 64-byte aligned. */
+static void fit_plane(const spline_shape *s, const float *values, const float *factor,
+                      const spline_table *kernels, float *memory, float *c)
+{
+    const size_t n = (size_t)s->n[0], rows = (size_t)s->n[1], to = s->step[1];
+    if (n > 2 && rows >= SPLINE_LINES) {
+        // the last rows overlap those before
+        for (size_t j = 0; j < rows; j += SPLINE_LINES) {
+            const size_t first = rows - j < SPLINE_LINES ? rows - SPLINE_LINES : j;
+            kernels->fit_rows(values + first * n, n, n, factor, c + first * to, to, memory);
+        }
+    } else {
+        for (size_t j = 0; j < rows; j++) {
+            memcpy(c + j * to, values + j * n, n * sizeof *c);
+            if (n > 2) kernels->solve(c + j * to, n, 1, 1, factor);
+        }
+    }
+    for (size_t j = 0; j < rows; j++) extend(c + j * to - 1, s->n[0], s->padded[0], 1, 1);
+}
+
+void sdm_spline_fit(const spline_shape *s, const float *values, int n_threads, float *scratch,
                     float *c)
 {
-    const size_t *n = s->padded, *step = s->step;
-    for (int64_t k = 0; k < s->n[2]; k++)
-        for (int64_t j = 0; j < s->n[1]; j++)
-            memcpy(c + step[0] + (size_t)(j + 1) * step[1] + (size_t)(k + 1) * step[2],
-                   values + (k * s->n[1] + j) * s->n[0], (size_t)s->n[0] * sizeof *c);
-    fit_rows(s, n_threads, factor, c);
-    // along y: whole padded rows
-    if (s->n[1] > 2) eliminate(s->n[1], factor);
+    const size_t *n = s->padded, *step = s->step, plane = (size_t)(s->n[0] * s->n[1]);
+    const spline_table *kernels = sdm_spline_kernels();
+    float *factor = scratch, *factor_y = factor + s->n[0], *memory = scratch + factor_floats(s);
+    if (s->n[0] > 2) eliminate(s->n[0], factor);
+    if (s->n[1] > 2) eliminate(s->n[1], factor_y);
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (int64_t k = 0; k < s->n[2]; k++) {
-        float *plane = c + (size_t)(k + 1) * step[2];
-        if (s->n[1] > 2) solve(plane + step[1], s->n[1], step[1], n[0], 1, factor);
-        extend(plane, s->n[1], n[1], step[1], n[0]);
+        float *rows = c + (size_t)(k + 1) * step[2];
+        fit_plane(s, values + (size_t)k * plane, factor, kernels,
+                  memory + (size_t)sdm_thread() * rows_floats(s), rows + step[1] + step[0]);
+        // along y: whole padded rows
+        if (s->n[1] > 2) kernels->solve(rows + step[1], (size_t)s->n[1], step[1], n[0], factor_y);
+        extend(rows, s->n[1], n[1], step[1], n[0]);
     }
     // along z
     if (s->n[2] > 2) eliminate(s->n[2], factor);
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (size_t j = 0; j < n[1]; j++) {
         float *column = c + j * step[1];
-        if (s->n[2] > 2) solve(column + step[2], s->n[2], step[2], n[0], 1, factor);
+        if (s->n[2] > 2) kernels->solve(column + step[2], (size_t)s->n[2], step[2], n[0], factor);
         extend(column, s->n[2], n[2], step[2], n[0]);
     }
 }

@@ -44,9 +44,12 @@ typedef struct spline_axis {
 /* The shape of the spline of a map of n[3] voxels. */
 spline_shape sdm_spline_shape(const int64_t n[3]);
 
-/* coefficient[count] = those of the spline that interpolates values[nz][ny][nx]. factor[max of n]
-   is scratch memory. The same bits for any number of threads. */
-void sdm_spline_fit(const spline_shape *s, const float *values, int n_threads, float *factor,
+/* Floats of scratch memory of sdm_spline_fit(). */
+size_t sdm_spline_scratch(const spline_shape *s, int n_threads);
+
+/* coefficient[count] = those of the spline that interpolates values[nz][ny][nx].
+   scratch[sdm_spline_scratch()], 64-byte aligned. The same bits for any number of threads. */
+void sdm_spline_fit(const spline_shape *s, const float *values, int n_threads, float *scratch,
                     float *coefficient);
 
 /* The place of an index (a finite number) in an axis of n voxels. */

@@ -99,47 +99,55 @@ void sdm_spline_grid_dispose(spline_grid *g)
     memset(g, 0, sizeof *g);
 }
 
-/* The rows of coefficients (j, k) of a grid: position and distances in the array of
-   sdm_spline_rows(). */
-static size_t row_line(const spline_grid *g) { return g->axis[0].n; }
-static size_t row_plane(const spline_shape *s, const spline_grid *g)
+/* Interpolates pieces begin .. end - 1 of a row along x. */
+static void pieces_expand(const spline_axis *x, size_t begin, size_t end, const float *row,
+                          const spline_table *kernels, float *to)
 {
-    return g->axis[0].n * s->padded[g->axis[1].axis];
+    const size_t first = begin * SPLINE_PIECE,
+                 last = end * SPLINE_PIECE < x->n ? end * SPLINE_PIECE : x->n;
+    kernels->expand(last - first, x->cell + first, (const float(*)[4])x->weight + first, row, to);
 }
 
-/* Interpolates one row of coefficients along x. gathered[padded]: scratch memory. */
+/* Interpolates the wanted pieces of the row of coefficients (j, k). gathered[padded]: scratch
+   memory. */
 static void row_expand(const spline_shape *s, const spline_grid *g, const float *coefficient,
-                       size_t j, size_t k, const spline_table *kernels, float *gathered, float *to)
+                       const spline_part *part, size_t j, size_t k, const spline_table *kernels,
+                       float *gathered, float *to)
 {
     const spline_axis *x = &g->axis[0];
-    const size_t step = s->step[x->axis];
-    const float *row = coefficient + j * s->step[g->axis[1].axis] + k * s->step[g->axis[2].axis];
+    const size_t step = s->step[x->axis], n = part->n[0];
+    const uint8_t *wanted = part->wanted;
+    if (wanted) wanted += (k * part->n[1] + j) * n;
+    if (wanted && !memchr(wanted, 1, n)) return;
+    const float *row = coefficient + (part->first[1] + j) * s->step[g->axis[1].axis] +
+                       (part->first[2] + k) * s->step[g->axis[2].axis];
     if (step != 1) {
         for (int32_t i = x->low; i < x->high; i++) gathered[i] = row[(size_t)i * step];
         row = gathered;
     }
-    kernels->expand(x->n, x->cell, (const float(*)[4])x->weight, row, to);
+    for (size_t p = 0, end; p < n; p = end + 1) {
+        for (end = p; end < n && (!wanted || wanted[end]); end++) continue;
+        if (end > p)
+            pieces_expand(x, part->first[0] + p, part->first[0] + end, row, kernels,
+                          to + p * SPLINE_PIECE);
+    }
 }
 
 sdm_status sdm_spline_rows(const spline_shape *s, const spline_grid *g, const float *coefficient,
-                           int n_threads, float **rows, sdm_error *err)
+                           const spline_part *part, int n_threads, float *rows, sdm_error *err)
 {
-    const spline_axis *x = &g->axis[0], *y = &g->axis[1], *z = &g->axis[2];
     const spline_table *kernels = sdm_spline_kernels();
     float *gathered = NULL;
-    const size_t length = s->padded[x->axis];
-    size_t count;
-    sdm_status status = sdm_mul(row_plane(s, g), s->padded[z->axis], &count, err);
-    if (!status)
-        status = sdm_alloc_unset((void **)rows, count, sizeof **rows, "rows of a spline", err);
-    if (!status) status = SDM_ALLOC(&gathered, length * (size_t)n_threads, "row of a spline", err);
+    const size_t length = s->padded[g->axis[0].axis], line = part->n[0] * SPLINE_PIECE;
+    const sdm_status status =
+        SDM_ALLOC(&gathered, length * (size_t)n_threads, "row of a spline", err);
     if (status) return status;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
-    for (int32_t k = z->low; k < z->high; k++)
-        for (int32_t j = y->low; j < y->high; j++)
-            row_expand(s, g, coefficient, (size_t)j, (size_t)k, kernels,
+    for (size_t k = 0; k < part->n[2]; k++)
+        for (size_t j = 0; j < part->n[1]; j++)
+            row_expand(s, g, coefficient, part, j, k, kernels,
                        gathered + (size_t)sdm_thread() * length,
-                       *rows + (size_t)k * row_plane(s, g) + (size_t)j * row_line(g));
+                       rows + (k * part->n[1] + j) * line);
     sdm_free(gathered);
     return SDM_OK;
 }
@@ -149,16 +157,17 @@ typedef struct tile {
     size_t i, j, width, height;
 } tile;
 
-/* planes[coefficients in use along z][height][width] = the tile, interpolated along y. */
-static void tile_planes(const spline_shape *s, const spline_grid *g, const float *rows,
+/* planes[coefficients in use along z][height][width] = the tile, interpolated along y. rows: those
+   of `part`, the coefficients in use. */
+static void tile_planes(const spline_grid *g, const spline_part *part, const float *rows,
                         const tile *t, const spline_table *kernels, float *planes)
 {
-    const spline_axis *y = &g->axis[1], *z = &g->axis[2];
-    const size_t line = row_line(g);
-    for (int32_t k = z->low; k < z->high; k++)
+    const spline_axis *y = &g->axis[1];
+    const size_t line = part->n[0] * SPLINE_PIECE;
+    for (size_t k = 0; k < part->n[2]; k++)
         for (size_t j = t->j; j < t->j + t->height; j++, planes += t->width) {
             const float *first =
-                rows + (size_t)k * row_plane(s, g) + (size_t)y->cell[j] * line + t->i;
+                rows + (k * part->n[1] + (size_t)(y->cell[j] - y->low)) * line + t->i;
             const float *const four[4] = {first, first + line, first + 2 * line, first + 3 * line};
             kernels->combine(t->width, four, y->weight[j], planes);
         }
@@ -204,8 +213,16 @@ sdm_status sdm_spline_map(const spline_shape *s, const spline_grid *g, const flo
     const size_t across = (nx + width - 1) / width, tiles = across * ((ny + height - 1) / height);
     const size_t planes = (size_t)(g->axis[2].high - g->axis[2].low) * width * height;
     const spline_table *kernels = sdm_spline_kernels();
+    const spline_axis *y = &g->axis[1], *z = &g->axis[2];
+    const spline_part part = {.first = {0, (size_t)y->low, (size_t)z->low},
+                              .n = {(nx + SPLINE_PIECE - 1) / SPLINE_PIECE,
+                                    (size_t)(y->high - y->low), (size_t)(z->high - z->low)}};
     float *rows = NULL, *memory = NULL;
-    sdm_status status = sdm_spline_rows(s, g, coefficient, n_threads, &rows, err);
+    size_t count;
+    sdm_status status = sdm_mul(part.n[0] * SPLINE_PIECE * part.n[1], part.n[2], &count, err);
+    if (!status)
+        status = sdm_alloc_unset((void **)&rows, count, sizeof *rows, "rows of a spline", err);
+    if (!status) status = sdm_spline_rows(s, g, coefficient, &part, n_threads, rows, err);
     if (!status)
         status = sdm_alloc_unset((void **)&memory, planes * (size_t)n_threads, sizeof *memory,
                                  "planes of a spline", err);
@@ -214,7 +231,7 @@ sdm_status sdm_spline_map(const spline_shape *s, const spline_grid *g, const flo
         const size_t i = n % across * width, j = n / across * height;
         const tile t = {i, j, nx - i < width ? nx - i : width, ny - j < height ? ny - j : height};
         float *own = memory + (size_t)sdm_thread() * planes;
-        tile_planes(s, g, rows, &t, kernels, own);
+        tile_planes(g, &part, rows, &t, kernels, own);
         for (size_t k = 0; k < nz; k++) {
             tile_write(g, &t, own, k, kernels, values);
             if (map) write_nodes(s, g, &t, k, map, values);

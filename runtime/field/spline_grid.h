@@ -36,11 +36,20 @@ sdm_status sdm_spline_grid_create(const spline_shape *s, const spline_frame *f,
                                   double stride, spline_grid *out, sdm_error *err);
 void sdm_spline_grid_dispose(spline_grid *g);
 
-/* *rows = new array [s->padded of z][of y][n[0]] where z and y are the axes of the map that belong
-   to those of the grid: the coefficients interpolated along x, in the rows that the grid needs;
-   free with sdm_free(). SDM_E_NOMEM. */
+/* Positions of a piece of a row. */
+#define SPLINE_PIECE 8
+
+/* Pieces of the rows of a grid: first[0] ... along x of the grid, rows of coefficients first[1] ...
+   and first[2] ... along the axes of the map that belong to y and z of the grid; n[3] of them. */
+typedef struct spline_part {
+    size_t first[3], n[3];
+    const uint8_t *wanted; /* [n[2]][n[1]][n[0]]: 1 for pieces that are needed, else 0; NULL: all */
+} spline_part;
+
+/* rows[part->n[2]][part->n[1]][SPLINE_PIECE part->n[0]] = the coefficients interpolated along x.
+   The last piece of a row may be shorter, its end stays unset. SDM_E_NOMEM. */
 sdm_status sdm_spline_rows(const spline_shape *s, const spline_grid *g, const float *coefficient,
-                           int n_threads, float **rows, sdm_error *err);
+                           const spline_part *part, int n_threads, float *rows, sdm_error *err);
 
 /* values[nz][ny][nx] = the spline at the voxels of a grid; beyond the box, at the nearest point of
    the box. Voxels at nodes get the value of map[] (NULL: that of the spline). SDM_E_NOMEM. */

@@ -1,5 +1,6 @@
 /* The loops of spline_kernels.h, compiled once for each instruction set. Before inclusion, define
    TABLE, the name of the spline_table. */
+#include <math.h>
 #include <string.h>
 
 #include "spline_kernels.h"
@@ -63,7 +64,8 @@ static void block(const spline_block *b, float *out)
             if (plane[p & 3] == p) continue;
             plane[p & 3] = p;
             for (int j = 0; j < 8; j++) {
-                const float *row = b->rows + (size_t)p * b->plane + (size_t)b->cell[0][j] * b->line;
+                const float *row = b->rows + (size_t)(p - b->first[1]) * b->plane +
+                                   (size_t)(b->cell[0][j] - b->first[0]) * b->line;
                 combine_loop(8, row, row + b->line, row + 2 * b->line, row + 3 * b->line,
                              b->weight[0][j], kept[p & 3] + 8 * j);
             }
@@ -72,6 +74,155 @@ static void block(const spline_block *b, float *out)
         combine_loop(64, kept[p & 3], kept[(p + 1) & 3], kept[(p + 2) & 3], kept[(p + 3) & 3],
                      b->weight[1][k], out);
     }
+}
+
+static inline float larger(float a, float b) { return a > b ? a : b; }
+static inline float smaller(float a, float b) { return a < b ? a : b; }
+_Static_assert(SPLINE_WINDOW == 5, "the loops name the planes or rows of a window");
+
+static void differences(const float *const plane[SPLINE_WINDOW], size_t n, size_t step,
+                        float *restrict most)
+{
+    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
+    for (size_t i = 0; i < n; i++) {
+        const float ab = larger(fabsf(a[i + step] - a[i]), fabsf(b[i + step] - b[i])),
+                    cd = larger(fabsf(c[i + step] - c[i]), fabsf(d[i + step] - d[i]));
+        most[i] = larger(larger(ab, cd), fabsf(e[i + step] - e[i]));
+    }
+}
+
+static void steps(const float *const plane[SPLINE_WINDOW], size_t n, float *restrict most)
+{
+    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
+    for (size_t i = 0; i < n; i++)
+        most[i] = larger(larger(fabsf(b[i] - a[i]), fabsf(c[i] - b[i])),
+                         larger(fabsf(d[i] - c[i]), fabsf(e[i] - d[i])));
+}
+
+static void largest(const float *const plane[SPLINE_WINDOW], size_t n, float *restrict most)
+{
+    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
+    for (size_t i = 0; i < n; i++)
+        most[i] = larger(larger(larger(a[i], b[i]), larger(c[i], d[i])), e[i]);
+}
+
+static void extremes(const float *const plane[SPLINE_WINDOW], size_t n, float *restrict low,
+                     float *restrict high)
+{
+    const float *a = plane[0], *b = plane[1], *c = plane[2], *d = plane[3], *e = plane[4];
+    for (size_t i = 0; i < n; i++) {
+        const float p = smaller(smaller(smaller(a[i], b[i]), smaller(c[i], d[i])), e[i]),
+                    q = larger(larger(larger(a[i], b[i]), larger(c[i], d[i])), e[i]);
+        low[i] = smaller(p, low[i]);
+        high[i] = larger(q, high[i]);
+    }
+}
+
+static int cut(float width, float *values)
+{
+    int32_t low = -1, high = -1; // all bits: all values so far
+    for (int i = 0; i < 512; i++) {
+        const float v = values[i], above = v > -width ? v : -width;
+        low &= -(int32_t)(v <= -width);
+        high &= -(int32_t)(v >= width);
+        values[i] = above < width ? above : width;
+    }
+    return low ? SPLINE_ALL_LOW : high ? SPLINE_ALL_HIGH : SPLINE_BETWEEN;
+}
+
+static void solve(float *restrict c, size_t n, size_t step, size_t width, const float *factor)
+{
+    const size_t last = n - 1;
+    for (size_t w = 0; w < width; w++) {
+        const float end = c[last * step + w] - c[(last - 1) * step + w];
+        c[w] -= c[step + w];
+        c[last * step + w] = end;
+    }
+    for (size_t i = 1; i < last; i++) {
+        const float *restrict before = c + (i - 1) * step, f = factor[i];
+        float *restrict at = c + i * step;
+        for (size_t w = 0; w < width; w++) at[w] = (6 * at[w] - before[w]) * f;
+    }
+    const float closing = 1 / (1 + factor[last - 1]);
+    for (size_t w = 0; w < width; w++) {
+        float *at = c + last * step + w;
+        at[0] = (at[0] + at[-(ptrdiff_t)step]) * closing;
+    }
+    for (size_t i = last; i-- > 0;) {
+        const float *restrict next = c + (i + 1) * step, f = factor[i];
+        float *restrict at = c + i * step;
+        for (size_t w = 0; w < width; w++) at[w] -= f * next[w];
+    }
+}
+
+/* Transposes four vectors. */
+static inline void transpose(four r[4])
+{
+    const four a = __builtin_shufflevector(r[0], r[1], 0, 4, 1, 5),
+               b = __builtin_shufflevector(r[2], r[3], 0, 4, 1, 5),
+               c = __builtin_shufflevector(r[0], r[1], 2, 6, 3, 7),
+               d = __builtin_shufflevector(r[2], r[3], 2, 6, 3, 7);
+    r[0] = __builtin_shufflevector(a, b, 0, 1, 4, 5);
+    r[1] = __builtin_shufflevector(a, b, 2, 3, 6, 7);
+    r[2] = __builtin_shufflevector(c, d, 0, 1, 4, 5);
+    r[3] = __builtin_shufflevector(c, d, 2, 3, 6, 7);
+}
+
+/* The last of the groups of four elements of a row overlaps the one before, if need be. */
+static inline size_t next_four(size_t i, size_t n)
+{
+    return i + 4 < n && i + 8 > n ? n - 4 : i + 4;
+}
+
+typedef float lanes __attribute__((vector_size(64)));
+_Static_assert(SPLINE_LINES == 32, "the rows are two vectors");
+
+/* solve() for SPLINE_LINES lines, neighbours in memory: what a step needs of the one before
+   stays in registers, and the two vectors wait for it at the same time. */
+static void solve_rows(lanes (*c)[2], size_t n, const float *factor)
+{
+    const size_t last = n - 1;
+    const float closing = 1 / (1 + factor[last - 1]);
+    const lanes end[2] = {c[last][0] - c[last - 1][0], c[last][1] - c[last - 1][1]};
+    lanes a = c[0][0] -= c[1][0], b = c[0][1] -= c[1][1];
+    for (size_t i = 1; i < last; i++) {
+        c[i][0] = a = (6 * c[i][0] - a) * factor[i];
+        c[i][1] = b = (6 * c[i][1] - b) * factor[i];
+    }
+    c[last][0] = a = (end[0] + a) * closing;
+    c[last][1] = b = (end[1] + b) * closing;
+    for (size_t i = last; i-- > 0;) {
+        c[i][0] = a = c[i][0] - factor[i] * a;
+        c[i][1] = b = c[i][1] - factor[i] * b;
+    }
+}
+
+static void fit_rows(const float *values, size_t n, size_t from, const float *factor, float *c,
+                     size_t to, float *memory)
+{
+    if (n < 4) {
+        for (size_t l = 0; l < SPLINE_LINES; l++)
+            for (size_t i = 0; i < n; i++) memory[i * SPLINE_LINES + l] = values[l * from + i];
+    }
+    for (size_t i = 0; n >= 4 && i < n; i = next_four(i, n))
+        for (size_t l = 0; l < SPLINE_LINES; l += 4) {
+            four r[4];
+            for (size_t k = 0; k < 4; k++) r[k] = load(values + (l + k) * from + i);
+            transpose(r);
+            for (size_t k = 0; k < 4; k++) *(four_u *)(memory + (i + k) * SPLINE_LINES + l) = r[k];
+        }
+    solve_rows((lanes(*)[2])memory, n, factor);
+    if (n < 4) {
+        for (size_t l = 0; l < SPLINE_LINES; l++)
+            for (size_t i = 0; i < n; i++) c[l * to + i] = memory[i * SPLINE_LINES + l];
+    }
+    for (size_t i = 0; n >= 4 && i < n; i = next_four(i, n))
+        for (size_t l = 0; l < SPLINE_LINES; l += 4) {
+            four r[4];
+            for (size_t k = 0; k < 4; k++) r[k] = load(memory + (i + k) * SPLINE_LINES + l);
+            transpose(r);
+            for (size_t k = 0; k < 4; k++) *(four_u *)(c + (l + k) * to + i) = r[k];
+        }
 }
 
 static float value(const float *c, size_t line, size_t plane, const float (*weight)[4])
@@ -102,5 +253,15 @@ static void gradient(const float *c, size_t line, size_t plane, const float (*we
     memcpy(out, &all, 3 * sizeof *out);
 }
 
-const spline_table TABLE = {
-    .expand = expand, .combine = combine, .block = block, .value = value, .gradient = gradient};
+const spline_table TABLE = {.solve = solve,
+                            .fit_rows = fit_rows,
+                            .expand = expand,
+                            .combine = combine,
+                            .block = block,
+                            .differences = differences,
+                            .steps = steps,
+                            .largest = largest,
+                            .extremes = extremes,
+                            .cut = cut,
+                            .value = value,
+                            .gradient = gradient};

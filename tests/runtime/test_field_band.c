@@ -1,5 +1,5 @@
 /* Bands of fields: parts of the whole map, also where it is steep.
- * Tests: field_band.c */
+ * Tests: field_band.c band_doubt.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

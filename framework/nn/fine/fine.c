@@ -60,11 +60,14 @@ sdm_status sdm_fine_cells(const sdm_grid *g, float threshold, const float *map, 
             for (size_t j = 1; j + 2 < ny; j++) {
                 const float *a = bend + k * plane + j * nx, *b = a + nx, *c = a + plane,
                             *d = c + nx;
+                size_t count = *n; // without branches, which cannot be foreseen
                 for (size_t i = 1; i + 2 < nx; i++) {
                     const float sum = ((a[i] + a[i + 1]) + (b[i] + b[i + 1])) +
                                       ((c[i] + c[i + 1]) + (d[i] + d[i + 1]));
-                    if (sum > least) (*cells)[(*n)++] = (uint32_t)(k * plane + j * nx + i);
+                    (*cells)[count] = (uint32_t)(k * plane + j * nx + i);
+                    count += sum > least;
                 }
+                *n = count;
             }
     }
     sdm_free(bend);
@@ -149,10 +152,15 @@ static void change_cells(const change_job *j, const uint32_t *cells, size_t n, f
     for (size_t m = 0; m < j->n_maps; m++)
         gather(j->g, j->maps + m * j->voxels, cells, work + m * SDM_FINE_STENCIL * FINE_CELLS);
     sdm_fine_kernels()->cells(j->f, smallest(j->g), j->n_maps - 1, work, out);
+    size_t place[FINE_CELLS];
+    for (size_t l = 0; l < n; l++) {
+        const uint32_t row = cells[l] / (uint32_t)nx, z = row / (uint32_t)ny;
+        const size_t x = cells[l] - row * (uint32_t)nx, y = row - z * (uint32_t)ny;
+        place[l] = (2 * (size_t)z * fy + 2 * y) * fx + 2 * x;
+    }
     for (size_t m = 0; m < j->n_maps; m++)
         for (size_t l = 0; l < n; l++) {
-            const size_t x = cells[l] % nx, y = cells[l] / nx % ny, z = cells[l] / nx / ny;
-            float *to = j->fine + m * j->fine_voxels + (2 * z * fy + 2 * y) * fx + 2 * x;
+            float *to = j->fine + m * j->fine_voxels + place[l];
             for (size_t q = 1; q < SDM_FINE_OUTPUTS; q++)
                 to[(q / 4 * fy + q / 2 % 2) * fx + q % 2] +=
                     out[(m * SDM_FINE_OUTPUTS + q) * FINE_CELLS + l];

@@ -68,18 +68,34 @@ static void halve_axis(size_t outer, size_t n, size_t inner, const float *from, 
     }
 }
 
+/* middle[n - 1] of a row: those with three voxels on either side have the same weights. */
+static void halve_row(size_t n, const midpoint *m, const float *from, float *middle)
+{
+    const size_t taps = n < TAPS ? n : TAPS, first = n < TAPS ? n : TAPS / 2 - 1,
+                 last = n < TAPS ? n : n - TAPS / 2;
+    for (size_t i = 0; i < first && i + 1 < n; i++) mix_rows(1, taps, &m[i], from, 1, middle + i);
+    if (first >= n) return;
+    const midpoint inner = {.weight = {m[first].weight[0], m[first].weight[1], m[first].weight[2],
+                                       m[first].weight[3], m[first].weight[4], m[first].weight[5]}};
+    mix_rows(last - first, taps, &inner, from, 1, middle + first);
+    for (size_t i = last; i + 1 < n; i++) mix_rows(1, taps, &m[i], from, 1, middle + i);
+}
+
 /* The x axis: from[rows][n] becomes to[rows][2 n - 1]. */
 static void halve_rows(size_t rows, size_t n, const midpoint *middle, const float *from,
                        int n_threads, float *to)
 {
-    const size_t taps = n < TAPS ? n : TAPS;
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
     for (size_t r = 0; r < rows; r++) {
+        const float *own = from + r * n;
         float *row = to + r * (2 * n - 1);
-        for (size_t i = 0; i < n; i++) {
-            row[2 * i] = from[r * n + i];
-            if (i + 1 < n) mix_rows(1, taps, &middle[i], from + r * n, 1, row + 2 * i + 1);
+        // the midpoints lie at the end of the row until they come into their places
+        halve_row(n, middle, own, row + n);
+        for (size_t i = 0; i + 1 < n; i++) {
+            row[2 * i] = own[i];
+            row[2 * i + 1] = row[n + i];
         }
+        row[2 * n - 2] = own[n - 1];
     }
 }
 

@@ -77,11 +77,11 @@ SDM_API sdm_status sdm_field_grid(const sdm_field *f, const sdm_grid *grid, floa
                                   float *slopes, sdm_error *err);
 
 /* *out = the band of half width `width` (mm, at least the longest edge of a voxel) on a grid; free
-   it with sdm_blocks_dispose(). Only blocks that can meet the band are evaluated: the value at the
-   centre of a block, and a bound on the slope of the spline from differences of its coefficients,
-   exclude the others. Values within the band are those of sdm_field_grid(). Voxels outside of the
-   box count only if their bound lies within the band. Of exact distances, the band
-   is that of sdm_exact_map_blocks(). On error *out is empty. */
+   it with sdm_blocks_dispose(). Only blocks that can meet the band are evaluated: the
+   coefficients of the spline, the value at the centre of a block, and a bound on the slope from
+   differences of the coefficients exclude the others. Values within the band are those of
+   sdm_field_grid(). Voxels outside of the box count only if their bound lies within the band. Of
+   exact distances, the band is that of sdm_exact_map_blocks(). On error *out is empty. */
 SDM_API sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, double width,
                                   sdm_blocks *out, sdm_error *err);
 

@@ -48,7 +48,7 @@ check_whole() {
 
 # try WAY WORKER...: starts the workers that have not ended well, kills one of them, and so on, until there were enough kills
 try() {
-    local todo again pids victim k code n=0
+    local todo again pids codes victim k code n=0
     way=$1 cohorts=0 twice=0 killed_here=0
     shift
     rm -rf killed killed.*.log
@@ -59,15 +59,18 @@ try() {
             worker "${todo[$k]}" "killed.$k.log" &
             pids[k]=$!
         done
+        codes=()
         if [ $n -lt "$kills" ]; then
             victim=$((RANDOM % ${#todo[@]}))
-            sleep "$(awk -v d="$duration" -v r=$RANDOM -v all=$# 'BEGIN { print d * r / 32768 / 3 / (all > 2 ? 2 : all) }')"
+            sleep "$(awk -v d="$duration" -v r=$RANDOM -v all=$# 'BEGIN { print d * r / 32768 / (all > 1 ? 12 : 6) }')"
             kill -KILL "${pids[$victim]}" 2>err
+            wait "${pids[$victim]}" 2>err # first: the shell tells of it otherwise
+            codes[victim]=$?
         fi
         again=()
         for k in "${!todo[@]}"; do
-            { wait "${pids[$k]}"; } 2>err
-            code=$?
+            [ "${codes[$k]:-}" ] || { wait "${pids[$k]}" 2>err; codes[k]=$?; }
+            code=${codes[$k]}
             [ $code = 0 ] || again+=("${todo[$k]}")
             [ $code != 137 ] || n=$((n + 1)) killed_here=$((killed_here + 1))
             case $code in 0 | 137) ;; *) bad "$way: exit code $code: $(tail -n 3 "killed.$k.log")" ;; esac

@@ -37,14 +37,17 @@ compare() {
 }
 
 few=(train.minutes=0 train.samples=0 train.steps=30 train.batch=8 data.start=48 data.static=2 data.online=32 data.holdout=8)
+ellipsoid=("$source_folder/configs/ellipsoid.yaml" grid.spacing=0.9 'grid.size=[16,14,12]' "${few[@]}")
+small=(network.depth=1 network.width=16 network.rank=8 network.modes=8)
 compare pod "$tiny"
 compare error "$tiny" data.sampling=error train.steps=100
-compare auto "$tiny" network.kind=auto "${few[@]}"
-compare template "$source_folder/configs/ellipsoid.yaml" grid.spacing=0.9 'grid.size=[16,14,12]' network.kind=template "${few[@]}"
-compare fine "$tiny" network.fine=8 "${few[@]}"
-for kind in deepsdf imnet sdmnn; do
-    compare $kind "$source_folder/configs/$kind.yaml" grid.spacing=1.2 'grid.size=[12,10,10]' "${few[@]}"
+compare template "${ellipsoid[@]}" network.kind=template
+compare auto "${ellipsoid[@]}" network.kind=auto "${small[@]}"
+for kind in deepsdf imnet; do
+    compare $kind "$source_folder/configs/$kind.yaml" grid.spacing=1.2 'grid.size=[12,10,10]' network.width=67 "${few[@]}"
 done
+compare sdmnn "$source_folder/configs/sdmnn.yaml" grid.spacing=1.2 'grid.size=[12,10,10]' "${few[@]}"
+compare fine "${ellipsoid[@]}" "${small[@]}" shape.options.edge=1.5 grid.spacing=1.5 'grid.size=[10,9,8]' network.kind=pod network.fine=4
 
 # mpirun without a back-end
 expect 1 'Open MPI started 2 processes, but its back-end cannot be loaded' env OMPI_COMM_WORLD_SIZE=2 bash -c "cp '$program' alone && ./alone train '$tiny' --out none"

@@ -45,7 +45,8 @@ static size_t first_voxel(const pod_state *pod, size_t tree)
  * same number of voxels: its first voxel is the one nearest to rank / size of all. */
 static size_t first_tree(const pod_state *pod, int rank)
 {
-    const size_t n = n_trees(pod), aim = sdm_comm_first(pod->t->hooks.comm, pod->arch.n_voxels, rank);
+    const size_t n = n_trees(pod),
+                 aim = sdm_comm_first(pod->t->hooks.comm, pod->arch.n_voxels, rank);
     size_t below = 0, above = n; // first_voxel(below) <= aim <= first_voxel(above)
     while (above - below > 1) {
         const size_t middle = (below + above) / 2;

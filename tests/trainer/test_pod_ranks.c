@@ -1,6 +1,5 @@
-/* The trees of a `pod` network of each rank: they follow one another, all trees have a rank, and the
- * largest share of voxels is not much larger than the mean.
- * Tests: pod_ranks.c */
+/* The trees of a `pod` network of each rank: they follow one another, all trees have a rank, and
+ * the largest share of voxels is not much larger than the mean. Tests: pod_ranks.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -28,8 +27,7 @@ static double check_shares(pod_state *pod, int size)
         next = share.end;
         const size_t begin =
             trainer_pod_place_voxel(pod, trainer_pod_first_block(pod, 0, share.first));
-        const size_t end =
-            trainer_pod_place_voxel(pod, trainer_pod_first_block(pod, 0, share.end));
+        const size_t end = trainer_pod_place_voxel(pod, trainer_pod_first_block(pod, 0, share.end));
         if (end - begin > most) most = end - begin;
     }
     assert_int_equal(next, n);

@@ -58,8 +58,21 @@ static const char *other_kind(const sdm_train_report *r)
     return r->other_kind == SDM_NETWORK_POD ? "pod" : "template";
 }
 
+/* Tells of several ranks, and what memory they needed. */
+static void print_ranks(const cli_ranks_use *use)
+{
+    int64_t least = use->memory[0], most = use->memory[0], all = 0;
+    for (int i = 0; i < use->n; i++) {
+        if (use->memory[i] < least) least = use->memory[i];
+        if (use->memory[i] > most) most = use->memory[i];
+        all += use->memory[i];
+    }
+    printf("  ranks       %d by %s; memory of a rank %.0f to %.0f MB, of all %.0f MB\n", use->n,
+           use->by, 1e-6 * (double)least, 1e-6 * (double)most, 1e-6 * (double)all);
+}
+
 static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
-                                const cli_timing *times, sdm_error *err)
+                                const cli_timing *times, const cli_ranks_use *use, sdm_error *err)
 {
     const sdm_accuracy *a = &r->accuracy;
     // print as JSON
@@ -78,6 +91,9 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         sdm_json_int(&j, "maps", r->samples);
         sdm_json_real(&j, "ms_network", times->ms_network);
         sdm_json_real(&j, "ms_exact", times->ms_exact);
+        sdm_json_open(&j, "memory_bytes", '[');
+        for (int i = 0; i < use->n; i++) sdm_json_int(&j, NULL, use->memory[i]);
+        sdm_json_close(&j, ']');
         if (r->compared) {
             sdm_json_open(&j, "other", '{');
             sdm_json_text(&j, "kind", other_kind(r));
@@ -104,6 +120,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
            (long long)a->samples, a->mse_mm2, a->rmse_mm, a->near_mm, a->rmse_near_mm,
            a->max_abs_mm);
     cli_print_two("  time        ", times);
+    if (use->n > 1) print_ranks(use);
     if (r->compared)
         printf("  auto        trained %s, too: RMSE %.5f mm, near the surface %.5f mm; not kept\n",
                other_kind(r), r->other.rmse_mm, r->other.rmse_near_mm);
@@ -126,11 +143,13 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     if (first) cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
     if (first) cli_progress_end(&progress, !s);
+    cli_ranks_use use = {0};
+    if (!s) s = cli_ranks_measure(comm, &use, err);
     s = cli_ranks_end(comm, s, err);
-    if (s) return s;
     cli_timing times;
-    s = look_at_model(report.model_path, shape, folder, &times, err);
-    if (!s) s = print_summary(args, &report, &times, err);
+    if (!s) s = look_at_model(report.model_path, shape, folder, &times, err);
+    if (!s) s = print_summary(args, &report, &times, &use, err);
+    sdm_free(use.memory);
     return s || !args->report
                ? s
                : cli_page_report(args, folder, cli_page_has_runtime(), args->report, err);

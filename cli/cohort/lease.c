@@ -113,6 +113,49 @@ static bool is_stale(const cli_lease *lease, unsigned number, bool *gone, char h
     return false;
 }
 
+static int write_text(const char *path, const char *text)
+{
+    const size_t length = strlen(text);
+    const int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd < 0) return errno;
+    errno = 0;
+    int code = write(fd, text, length) == (ssize_t)length ? 0 : errno ? errno : EIO;
+    if (close(fd) && !code) code = errno;
+    if (code) unlink(path);
+    return code;
+}
+
+/* Gives `temp` a second name, `path`, which must be new. Returns 0, or the error number. */
+static int name_file(const char *temp, const char *path)
+{
+    struct stat st;
+    const int code = link(temp, path) ? errno : 0;
+    // a file server may answer twice: the second time the name exists
+    return code == EEXIST && !stat(temp, &st) && st.st_nlink == 2 ? 0 : code;
+}
+
+/* Creates the lease `path` with this text. It appears under its name with all of its text: a
+ * process that is killed never leaves a lease that does not tell whose it is. Returns 0, or the
+ * error number. */
+static int create_whole(const cli_lease *lease, const char *path, const char *text)
+{
+    enum { TRIES = 100 }; // names of temporary files; a process with this number may have left some
+    for (int i = 0; i < TRIES; i++) {
+        char temp[CLI_CASE_PATH_MAX + 64];
+        snprintf(temp, sizeof temp, "%s.%ld.%d.tmp", lease->path, (long)getpid(), i);
+        int code = write_text(temp, text);
+        if (code == EEXIST) continue;
+        if (code) return code;
+        code = name_file(temp, path);
+        unlink(temp);
+        // the process that has the lease removes temporary files
+        if (code == ENOENT) continue;
+        const bool unable = code == EPERM || code == ENOTSUP || code == ENOSYS || code == EINVAL;
+        return unable ? write_text(path, text) : code; // no second names in this file system
+    }
+    return EEXIST;
+}
+
 /* Creates the lease `number`. Returns 0, or the error number. */
 static int create(const cli_lease *lease, unsigned number)
 {
@@ -123,14 +166,8 @@ static int create(const cli_lease *lease, unsigned number)
     path_of(lease, number, path);
     name_host(host);
     if (gmtime_r(&now, &utc)) strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
-    const int length =
-        snprintf(text, sizeof text, "host %s process %ld since %s\n", host, (long)getpid(), date);
-    const int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (fd < 0) return errno;
-    int code = write(fd, text, (size_t)length) == length ? 0 : errno ? errno : EIO;
-    if (close(fd) && !code) code = errno;
-    if (code) unlink(path);
-    return code;
+    snprintf(text, sizeof text, "host %s process %ld since %s\n", host, (long)getpid(), date);
+    return create_whole(lease, path, text);
 }
 
 sdm_status cli_lease_take(const char *folder, cli_lease *lease, char holder[200], sdm_error *err)

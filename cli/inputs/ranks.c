@@ -2,10 +2,12 @@
 #include "ranks.h"
 
 #include <stdio.h>
+#include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "report/terminal.h"
+#include "sdm/memory.h"
 
 sdm_status cli_ranks_start(const cli_args *args, sdm_comm **out, sdm_error *err)
 {
@@ -18,6 +20,17 @@ sdm_status cli_ranks_start(const cli_args *args, sdm_comm **out, sdm_error *err)
     if (!s && !*out && args->ranks > 1) s = sdm_comm_fork((int)args->ranks, out, err);
     if (sdm_comm_rank(*out)) cli_set_quiet(true);
     return s;
+}
+
+sdm_status cli_ranks_measure(sdm_comm *comm, cli_ranks_use *out, sdm_error *err)
+{
+    struct rusage use = {0};
+    *out = (cli_ranks_use){.n = sdm_comm_size(comm), .by = sdm_comm_name(comm)};
+    const sdm_status s = SDM_ALLOC(&out->memory, (size_t)out->n, "ranks", err);
+    if (s) return s;
+    getrusage(RUSAGE_SELF, &use);
+    out->memory[sdm_comm_rank(comm)] = 1024 * (int64_t)use.ru_maxrss; // Linux counts in kB
+    return sdm_comm_gather_shares(comm, out->memory, (size_t)out->n, sizeof *out->memory, err);
 }
 
 /* Tells an error that the other ranks do not know, and ends them all. */

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Two processes share the cases of a cohort, and are killed at random: no case is lost, none is done twice, and the table is the same.
-# SDM_KILLS: how often (default 3). SDM_CASES: number of cases (default 12).
+# tests/cluster/cohort_kill.sh kills more often.
 # Tests: lease.c cohort_run.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
-kills=${SDM_KILLS:-3}
-cases=${SDM_CASES:-12}
+kills=3
+cases=12
 
 shape='--shape ellipsoid -O edge=1.5'
 fit="$shape --rotation 0,0,0 --spacing 1 --eps 1e-2"

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "sdm/internal/clock.h"
 #include "sdm/internal/threads.h"
 #include "workbench.h"
 
@@ -45,6 +46,7 @@ typedef struct filling {
     long failed;     // lowest number of a map that failed; -1: none. So the message does not
     sdm_error first; // depend on scheduling
     bool enough;
+    size_t round; // maps of a round (fill_by_ranks())
 } filling;
 
 /* Makes map number `at`. */
@@ -116,6 +118,20 @@ static sdm_status fill_range(filling *f, size_t begin, size_t end, sdm_error *er
     return f->first.status;
 }
 
+/* Decides on rank 0, for all: whether the maps are enough, and the number of maps of the next
+ * round. started: when this round began. */
+static sdm_status decide(filling *f, double started, sdm_error *err)
+{
+    // ranks wait for the slowest one at the end of a round, and are interrupted there
+    static const double SHORT = 0.25; // s
+    if (sdm_clock() - started < SHORT) f->round *= 2;
+    size_t all[] = {f->enough, f->round};
+    const sdm_status s = sdm_comm_broadcast(f->d->comm, 0, all, sizeof all, err);
+    f->enough = all[0] != 0;
+    f->round = all[1];
+    return s;
+}
+
 /* Makes the maps begin .. end - 1, all of them held-out or none, on all ranks, and gives all to
  * each. */
 static sdm_status fill_round(filling *f, size_t begin, size_t end, sdm_error *err)
@@ -124,6 +140,7 @@ static sdm_status fill_round(filling *f, size_t begin, size_t end, sdm_error *er
     sdm_comm *comm = d->comm;
     const size_t n = end - begin, p = d->n_params, v = d->n_voxels;
     const int rank = sdm_comm_rank(comm);
+    const double started = sdm_clock();
     sdm_status s = fill_range(f, begin + sdm_comm_first(comm, n, rank),
                               begin + sdm_comm_first(comm, n, rank + 1), err);
     s = sdm_comm_agree(comm, s, err);
@@ -136,10 +153,8 @@ static sdm_status fill_round(filling *f, size_t begin, size_t end, sdm_error *er
     if (!holdout && !s)
         s = sdm_comm_gather_shares(comm, d->maps + slot * v, n, v * sizeof *d->maps, err);
     if (!holdout && !s) s = sdm_comm_gather_shares(comm, d->scale + slot, n, sizeof *d->scale, err);
-    // rank 0 decides
-    if (!s) s = sdm_comm_broadcast(comm, 0, &f->enough, sizeof f->enough, err);
     f->done = end;
-    return s;
+    return s ? s : decide(f, started, err);
 }
 
 /* d->inside becomes true if it is so on any rank. */
@@ -159,10 +174,10 @@ static sdm_status fill_by_ranks(filling *f, sdm_error *err)
     int threads = f->n_threads;
     sdm_status s = sdm_comm_broadcast(d->comm, 0, &threads, sizeof threads, err);
     f->each = (size_t)sdm_comm_size(d->comm);
-    const size_t round = (size_t)threads * PER_THREAD * f->each;
+    f->round = (size_t)threads * PER_THREAD * f->each;
     for (size_t at = 0, end; at < f->all && !s; at = end) {
         const size_t until = at < d->n_holdout ? d->n_holdout : f->all;
-        end = until - at < round ? until : at + round;
+        end = until - at < f->round ? until : at + f->round;
         s = fill_round(f, at, end, err);
     }
     return s ? s : share_inside(d, err);

@@ -12,14 +12,6 @@ static size_t n_trees(const pod_state *pod)
     return levels->first[levels->n] - levels->first[levels->n - 1];
 }
 
-pod_share trainer_pod_share(const pod_state *pod)
-{
-    const sdm_comm *comm = pod->t->hooks.comm;
-    const int rank = sdm_comm_rank(comm);
-    return (pod_share){sdm_comm_first(comm, n_trees(pod), rank),
-                       sdm_comm_first(comm, n_trees(pod), rank + 1)};
-}
-
 size_t trainer_pod_first_block(const pod_state *pod, size_t level, size_t tree)
 {
     const sdm_pod_levels *levels = &pod->arch.levels;
@@ -43,6 +35,32 @@ size_t trainer_pod_place_voxel(const pod_state *pod, size_t b)
     return b < pod->arch.levels.first[1] ? pod->blocks[b].voxel : pod->arch.n_voxels;
 }
 
+/* Number of voxels in the trees before number `tree`. */
+static size_t first_voxel(const pod_state *pod, size_t tree)
+{
+    return trainer_pod_place_voxel(pod, trainer_pod_first_block(pod, 0, tree));
+}
+
+/* The first tree of `rank`. Trees at the end of the grid are smaller, so each rank has about the
+ * same number of voxels: its first voxel is the one nearest to rank / size of all. */
+static size_t first_tree(const pod_state *pod, int rank)
+{
+    const size_t n = n_trees(pod),
+                 aim = sdm_comm_first(pod->t->hooks.comm, pod->arch.n_voxels, rank);
+    size_t below = 0, above = n; // first_voxel(below) <= aim <= first_voxel(above)
+    while (above - below > 1) {
+        const size_t middle = (below + above) / 2;
+        *(first_voxel(pod, middle) <= aim ? &below : &above) = middle;
+    }
+    return aim - first_voxel(pod, below) < first_voxel(pod, above) - aim ? below : above;
+}
+
+pod_share trainer_pod_share(const pod_state *pod)
+{
+    const int rank = sdm_comm_rank(pod->t->hooks.comm);
+    return (pod_share){first_tree(pod, rank), first_tree(pod, rank + 1)};
+}
+
 size_t trainer_pod_place_matrix(const pod_state *pod, size_t b) { return pod->matrix_at[b]; }
 
 size_t trainer_pod_place_coefficient(const pod_state *pod, size_t b)
@@ -57,7 +75,7 @@ static void find_parts(const pod_state *pod, size_t level, pod_place *place, siz
 {
     const sdm_comm *comm = pod->t->hooks.comm;
     for (int r = 0; r <= sdm_comm_size(comm); r++) {
-        const size_t tree = sdm_comm_first(comm, n_trees(pod), r);
+        const size_t tree = first_tree(pod, r);
         at[r] = place(pod, trainer_pod_first_block(pod, level, tree)) * bytes;
     }
 }

@@ -17,6 +17,7 @@
 #include "report/terminal.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/isolation.h"
+#include "sdm/internal/picture_child.h"
 #ifdef SDM_HAVE_VDB
 #include "sdm/internal/vdb_memory.h"
 #endif
@@ -75,6 +76,7 @@ static int run_command(const cli_args *args)
 #endif
     cli_catch_interrupts();
     cli_guard_callbacks();
+    sdm_picture_in_child(true);
     sdm_error err = {0};
     const sdm_status s = functions[args->command - cli_commands](args, &err);
     if (!s) return CLI_EXIT_DONE;

@@ -57,7 +57,10 @@ static void check_options(const sdm_config *c, const sdm_shape *shape, sdm_named
     for (size_t i = 0; i < c->shape.n_options; i++) {
         const sdm_config_option *o = &c->shape.options[i];
         sdm_error why = {0};
-        if (sdm_shape_check_option(shape, o->name, o->value, &why))
+        const sdm_status s = sdm_shape_check_option(shape, o->name, o->value, &why);
+        if (s == SDM_E_NOMEM)
+            sdm_mistakes_starve(m);
+        else if (s)
             sdm_mistakes_add(m, o->mark, "%s", why.text);
         else
             good[(*n_good)++] = (sdm_named_text){o->name, o->value};
@@ -73,7 +76,8 @@ static sdm_status create_checked(sdm_config *c, const sdm_shape *shape, sdm_inst
     size_t n_good;
     check_options(c, shape, good, &n_good, &mistakes);
     // without all of its options a shape may have other parameters, or none
-    if (mistakes.count > 0 && shape->create) return sdm_mistakes_report(&mistakes, err);
+    if (mistakes.count > 0 && (shape->create || mistakes.starved))
+        return sdm_mistakes_report(&mistakes, err);
     char *folder = NULL;
     sdm_status s = find_folder(c->file, &folder, err);
     if (!s) s = sdm_instance_create(shape, good, n_good, folder, out, err);

@@ -94,18 +94,20 @@ static sdm_status read_files(const cli_args *args, source *s, sdm_error *err)
 /* Opens the shape of the model for the texts about its parameters, if it is known. */
 static sdm_status open_shape(const cli_args *args, source *s, sdm_error *err)
 {
-    sdm_error unknown = {0};
-    const sdm_status status = cli_open_registry(args, &s->shapes, err);
-    if (!status && sdm_runtime_instance(s->model, s->shapes, &s->shape, &unknown)) s->shape = NULL;
-    return status;
+    sdm_status status = cli_open_registry(args, &s->shapes, err);
+    if (status) return status;
+    status = sdm_runtime_instance(s->model, s->shapes, &s->shape, err);
+    if (status) s->shape = NULL;
+    return status == SDM_E_NOMEM ? status : SDM_OK;
 }
 
-/* Measures the shape at p; without a result where the shape refuses. */
-static void measure(source *s, const double *p)
+/* Measures the shape at p; without a result where the shape refuses. SDM_E_NOMEM. */
+static sdm_status measure(source *s, const double *p, sdm_error *err)
 {
-    sdm_error refused = {0};
-    if (s->shape && sdm_shape_measure(s->shape, p, NULL, 0, &s->measures, &refused))
-        s->measures.n = 0;
+    if (!s->shape) return SDM_OK;
+    const sdm_status status = sdm_shape_measure(s->shape, p, NULL, 0, &s->measures, err);
+    if (status) s->measures.n = 0;
+    return status == SDM_E_NOMEM ? status : SDM_OK;
 }
 
 /* Makes the pictures at the default parameters, and the errors of the network. */
@@ -119,7 +121,7 @@ static sdm_status make_still(source *s, sdm_error *err)
     for (size_t i = 0; i < m->n_params && !status; i++) params[i] = m->params[i].def;
     if (!status) status = sdm_generate(s->model, params, NULL, values, NULL, err);
     if (!status) status = cli_still_make(&m->grid, values, &s->still, err);
-    if (!status) measure(s, params);
+    if (!status) status = measure(s, params, err);
     if (!status && s->shape) status = cli_page_errors_make(s->model, s->shape, &s->errors, err);
     sdm_free(values);
     sdm_free(params);
@@ -129,9 +131,9 @@ static sdm_status make_still(source *s, sdm_error *err)
 /* Makes the pictures at the estimate of a fit. */
 static sdm_status make_fit(source *s, sdm_error *err)
 {
-    const sdm_status status = cli_page_fit_sample(s->model, s->shape, &s->fit, err);
+    sdm_status status = cli_page_fit_sample(s->model, s->shape, &s->fit, err);
+    if (!status) status = measure(s, s->fit.params, err);
     if (status) return status;
-    measure(s, s->fit.params);
     return cli_still_make(&sdm_model_get_info(s->model)->grid, s->fit.map, &s->still, err);
 }
 

@@ -1,7 +1,9 @@
-/* Signal handlers and an exit handler that name the plug-in whose callback ended the program. */
+/* Signal handlers and an exit handler that name the plug-in whose callback, or the library whose
+ * crash ended the program. */
 #define _XOPEN_SOURCE 700 // sigaltstack()
 #include "crash_guard.h"
 
+#include <errno.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -11,16 +13,22 @@
 
 #include "sdm/internal/callback.h"
 #include "sdm/internal/file.h"
+#include "sdm/internal/foreign.h"
 #include "terminal.h"
 
-/* Prints "sdmgen: error: shape 'mug', mesh() at r=2 h=3: REASON" and ends the program. snprintf()
- * is no function for signal handlers by the standard; the C libraries' own work there for short
- * texts without locks or memory, and the alternative is a message without numbers. Where two
- * threads crash at once, one tells it; the other waits for the end. */
-static void end_program(const sdm_callback *c, const char *reason)
+/* Where two threads crash at once, one tells it; the other waits for the end. */
+static void wait_unless_first(void)
 {
     static atomic_flag told = ATOMIC_FLAG_INIT;
     while (atomic_flag_test_and_set(&told)) pause();
+}
+
+/* Prints "sdmgen: error: shape 'mug', mesh() at r=2 h=3: REASON" and ends the program. snprintf()
+ * is no function for signal handlers by the standard; the C libraries' own work there for short
+ * texts without locks or memory, and the alternative is a message without numbers. */
+static void end_program(const sdm_callback *c, const char *reason)
+{
+    wait_unless_first();
     char line[1024];
     // names hold no characters that JSON escapes
     const bool json = cli_get_form() == CLI_FORM_JSON;
@@ -36,17 +44,34 @@ static void end_program(const sdm_callback *c, const char *reason)
     _exit(CLI_EXIT_INPUT);
 }
 
+/* Prints "sdmgen: error: x.vdb: out of memory, and OpenVDB crashed" and ends the program. */
+static void end_in_library(const sdm_foreign *f, bool starved)
+{
+    wait_unless_first();
+    sdm_error err = {0};
+    sdm_fail(&err, SDM_E_NOMEM, "%.1000s%s%s%s crashed%s", f->path ? f->path : "",
+             f->path ? ": " : "", starved ? "out of memory, and " : "", f->library,
+             starved ? "" : ": it does so where memory ends, else this is a fault of the library");
+    cli_report(&err);
+    sdm_outfile_remove_temps();
+    _exit(CLI_EXIT_FAILED);
+}
+
 static const int signals[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 enum { N_SIGNALS = sizeof signals / sizeof *signals };
 static struct sigaction before[N_SIGNALS]; // what the signals did before
 
 static void on_crash(int signal_number, siginfo_t *info, void *context)
 {
+    const bool starved = errno == ENOMEM;
     (void)context;
     const sdm_callback *c = sdm_callback_running();
     if (c) end_program(c, sdm_callback_crash_reason(signal_number));
-    // not a plug-in: the instruction runs into the fault again, as ever; a signal that was sent
-    // does not come again by itself
+    const sdm_foreign f = sdm_foreign_running();
+    // not a signal that another process sent
+    if (f.library && (info->si_code > 0 || info->si_pid == getpid())) end_in_library(&f, starved);
+    // neither a plug-in nor a library: the instruction runs into the fault again, as ever; a signal
+    // that was sent does not come again by itself
     for (size_t i = 0; i < N_SIGNALS; i++)
         if (signals[i] == signal_number) sigaction(signal_number, &before[i], NULL);
     if (info->si_code <= 0) raise(signal_number);
@@ -60,7 +85,7 @@ static void on_exit_call(void)
 
 void cli_guard_callbacks(void)
 {
-    static char stack[1 << 16]; // of the main thread's handler, whose own stack may have overflowed
+    static char stack[1 << 17]; // of the main thread's handler, whose own stack may have overflowed
     const stack_t own = {.ss_sp = stack, .ss_size = sizeof stack};
     sigaltstack(&own, NULL);
     struct sigaction action;

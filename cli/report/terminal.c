@@ -64,14 +64,33 @@ void cli_json_line(sdm_json *json)
     sdm_json_dispose(json);
 }
 
+/* Room for a message as it is printed: a byte becomes \xNN, or \u00NN in JSON. */
+#define ROOM_BYTES (6 * SDM_ERROR_TEXT_MAX + 64)
+
+/* An empty text for at most `bytes` bytes. A message is printed where memory has ended, too: if it
+ * is no longer than that of an error, its text lies in `room` and takes no memory. */
+static sdm_text begin_text(char room[ROOM_BYTES], size_t bytes)
+{
+    room[0] = '\0';
+    if (bytes < ROOM_BYTES) return (sdm_text){.data = room, .capacity = ROOM_BYTES};
+    return (sdm_text){0};
+}
+
+static void end_text(sdm_text *t, const char *room)
+{
+    if (t->data != room) sdm_text_dispose(t);
+}
+
 /* Prints an object with one member. */
 static void print_json_message(const char *key, const char *text)
 {
-    sdm_json json = {0};
+    char room[ROOM_BYTES];
+    sdm_json json = {.text = begin_text(room, 6 * strlen(text) + 64)};
     sdm_json_open(&json, NULL, '{');
     sdm_json_text(&json, key, text);
     sdm_json_close(&json, '}');
-    cli_json_line(&json);
+    if (!json.text.failed) fprintf(stderr, "%s\n", json.text.data);
+    end_text(&json.text, room);
 }
 
 bool cli_has_terminal(void)
@@ -105,17 +124,17 @@ static bool has_place(const char *line, size_t length)
 int cli_report(const sdm_error *err)
 {
     const bool colour = wants_colour();
-    char named[SDM_ERROR_TEXT_MAX];
+    char named[SDM_ERROR_TEXT_MAX], room[ROOM_BYTES];
     snprintf(named, sizeof named, "%s", err->text[0] ? err->text : sdm_status_name(err->status));
     cli_name_options(named);
     const char *text = named;
-    sdm_text shown = {0};
     if (form == CLI_FORM_JSON) {
         print_json_message("error", text);
         return exit_code_of(err->status);
     }
+    sdm_text shown = begin_text(room, 4 * strlen(text));
     sdm_text_add_shown(&shown, text);
-    text = shown.failed ? sdm_status_name(err->status) : shown.data;
+    text = shown.data;
     while (*text) {
         const size_t length = strcspn(text, "\n");
         if (!(err->status == SDM_E_CONFIG && has_place(text, length)))
@@ -124,52 +143,51 @@ int cli_report(const sdm_error *err)
         fprintf(stderr, "%.*s\n", (int)length, text);
         text += length + (text[length] == '\n');
     }
-    sdm_text_dispose(&shown);
+    end_text(&shown, room);
     return exit_code_of(err->status);
 }
 
-/* *out = the formatted text, as it is to be shown or, for JSON, as it is. */
-static void format_text(sdm_text *out, bool as_shown, const char *fmt, va_list args)
-{
-    va_list again;
-    va_copy(again, args);
-    const int length = vsnprintf(NULL, 0, fmt, again);
-    va_end(again);
-    char *text = length < 0 ? NULL : malloc((size_t)length + 1);
-    if (text) vsnprintf(text, (size_t)length + 1, fmt, args);
-    if (as_shown)
-        sdm_text_add_shown(out, text ? text : fmt);
-    else
-        sdm_text_add(out, "%s", text ? text : fmt);
-    free(text);
-}
-
-/* Prints a notice or a warning; `kind` is its key in JSON, `begin` its beginning elsewhere. */
+/* Prints a notice or a warning; `kind` is its key in JSON, `begin` its beginning elsewhere. Without
+ * memory a text longer than that of an error is cut. */
 static void print_line(const char *kind, const char *begin, const char *fmt, va_list args)
 {
-    const bool json = form == CLI_FORM_JSON;
-    sdm_text text = {0};
-    format_text(&text, !json, fmt, args);
-    const char *line = text.failed || !text.data ? fmt : text.data;
-    if (json)
-        print_json_message(kind, line);
-    else
-        fprintf(stderr, "%s%s\n", begin, line);
-    sdm_text_dispose(&text);
+    char start[SDM_ERROR_TEXT_MAX], room[ROOM_BYTES], *whole = NULL;
+    va_list again;
+    va_copy(again, args);
+    const int length = vsnprintf(start, sizeof start, fmt, args);
+    if (length >= (int)sizeof start) whole = malloc((size_t)length + 1);
+    if (whole) vsnprintf(whole, (size_t)length + 1, fmt, again);
+    va_end(again);
+    const char *text = length < 0 ? fmt : whole ? whole : start;
+    if (form == CLI_FORM_JSON) {
+        print_json_message(kind, text);
+    } else {
+        sdm_text shown = begin_text(room, 4 * strlen(text));
+        sdm_text_add_shown(&shown, text);
+        fprintf(stderr, "%s%s\n", begin, shown.data ? shown.data : start);
+        end_text(&shown, room);
+    }
+    free(whole);
 }
 
 void cli_print(const char *fmt, ...)
 {
-    sdm_text text = {0};
-    va_list args;
+    sdm_text shown = {0};
+    va_list args, again;
     va_start(args, fmt);
-    format_text(&text, true, fmt, args);
+    va_copy(again, args);
+    const int length = vsnprintf(NULL, 0, fmt, args);
     va_end(args);
-    if (text.failed || !text.data)
+    char *text = length < 0 ? NULL : malloc((size_t)length + 1);
+    if (text) vsnprintf(text, (size_t)length + 1, fmt, again);
+    va_end(again);
+    if (text) sdm_text_add_shown(&shown, text);
+    if (!text || shown.failed)
         unprinted = true;
-    else
-        fputs(text.data, stdout);
-    sdm_text_dispose(&text);
+    else if (shown.data)
+        fputs(shown.data, stdout);
+    free(text);
+    sdm_text_dispose(&shown);
 }
 
 bool cli_is_unprinted(void) { return unprinted; }

@@ -332,7 +332,7 @@ static bool read_list(sdm_reader *r, const sdm_tree_node *node, const char *path
     if (node->kind != SDM_TREE_LIST || node->n_children > SDM_EXPERIMENT_ROWS_MAX)
         return sdm_refuse_type(r, node, path, wanted);
     if (sdm_alloc(array, node->n_children, size, path, NULL)) {
-        sdm_mistakes_add(r->mistakes, node->mark, "%s: out of memory", path);
+        sdm_mistakes_starve(r->mistakes);
         return false;
     }
     const sdm_section alone = {

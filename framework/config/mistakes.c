@@ -32,6 +32,12 @@ void sdm_mistakes_add(sdm_mistakes *m, sdm_mark mark, const char *fmt, ...)
     va_end(args);
 }
 
+void sdm_mistakes_starve(sdm_mistakes *m)
+{
+    m->starved = true;
+    m->count++;
+}
+
 const char *sdm_mark_print(sdm_mark mark, const char *file, char *buf, size_t size)
 {
     char quoted[SDM_QUOTE_MAX];
@@ -50,6 +56,7 @@ sdm_status sdm_mistakes_report(const sdm_mistakes *m, sdm_error *err)
     char text[SDM_ERROR_TEXT_MAX];
     size_t used = 0, shown = 0;
     if (m->count == 0) return SDM_OK;
+    if (m->starved) return sdm_fail(err, SDM_E_NOMEM, "%s: out of memory", m->file);
 
     // print as many whole lines as fit
     text[0] = 0;

@@ -80,7 +80,7 @@ static bool add_leaf(sdm_overrides *o, const char *key, const sdm_tree_node *nod
     sdm_text_add(&text, "%s=", key);
     add_value(node, &text);
     const bool done = !text.failed && !sdm_overrides_add(o, text.data, mark, NULL);
-    if (!done) sdm_mistakes_add(m, mark, "%s: out of memory", key);
+    if (!done) sdm_mistakes_starve(m);
     sdm_text_dispose(&text);
     return done;
 }

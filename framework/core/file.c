@@ -218,7 +218,7 @@ sdm_status sdm_outfile_open(const char *path, sdm_outfile **out, sdm_error *err)
 
 const char *sdm_outfile_temp_path(const sdm_outfile *f) { return f->temp; }
 
-static sdm_status outfile_flush(sdm_outfile *f, sdm_error *err)
+sdm_status sdm_outfile_flush(sdm_outfile *f, sdm_error *err)
 {
     for (size_t at = 0; at < f->filled;) {
         const ssize_t put = write(f->fd, f->buffer + at, f->filled - at);
@@ -236,7 +236,7 @@ sdm_status sdm_outfile_write(sdm_outfile *f, const void *data, size_t size, sdm_
     const uint8_t *p = data;
     while (size) {
         if (f->filled == BUFFER_BYTES) {
-            const sdm_status s = outfile_flush(f, err);
+            const sdm_status s = sdm_outfile_flush(f, err);
             if (s) return s;
         }
         size_t n = BUFFER_BYTES - f->filled;
@@ -281,7 +281,7 @@ static void folder_sync(const char *path)
 sdm_status sdm_outfile_commit(sdm_outfile **pf, sdm_error *err)
 {
     sdm_outfile *f = *pf;
-    sdm_status s = outfile_flush(f, err);
+    sdm_status s = sdm_outfile_flush(f, err);
     // a library may have replaced the temporary file by another one of the same name: open it again
     // by its name for fsync()
     if (!s) {

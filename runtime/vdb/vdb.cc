@@ -2,7 +2,11 @@
    vdb*.cc are the only C++ files and the only users of OpenVDB; no exception leaves them. */
 #include "sdm/vdb.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <atomic>
+#include <cerrno>
 #include <cinttypes>
 #include <cmath>
 #include <cstring>
@@ -13,6 +17,7 @@
 #include "band.h"
 #include "headroom.h"
 #include "sdm/internal/block_border.h"
+#include "sdm/internal/foreign.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
 #include "seal.h"
@@ -25,10 +30,45 @@ namespace
 
 using Leaf = Grid::TreeType::LeafNodeType;
 
-void initialize_once()
+/* Marks OpenVDB as the library that is at work until the end of a block; `library` NULL: marks that
+   it is not, while it calls back. */
+class at_work
+{
+  public:
+    at_work(const char *library, const char *path)
+        : before(sdm_foreign_enter(sdm_foreign{library, path}))
+    {
+    }
+    ~at_work() { sdm_foreign_enter(before); }
+    at_work(const at_work &) = delete;
+    at_work &operator=(const at_work &) = delete;
+
+  private:
+    sdm_foreign before;
+};
+
+/* Sets up OpenVDB and TBB, before there is a tree: TBB without memory for its set-up would wait for
+   itself for ever at its next use, in the destructor of a tree. OpenVDB swallows allocations that
+   fail while it makes the names of its types, and would write files with other names. */
+void initialize_once(const char *path, sdm_error *err)
 {
     static std::once_flag once;
-    std::call_once(once, [] { openvdb::initialize(); });
+    static std::atomic<bool> unusable{false};
+    if (unusable)
+        need(sdm_fail(err, SDM_E_NOMEM,
+                      "%s: memory ended while OpenVDB was set up; start the program again", path));
+    std::call_once(once, [] {
+        unusable = true;
+        errno = 0;
+        try {
+            openvdb::initialize();
+            tbb::parallel_for(0, 2, [](int) {});
+        } catch (const std::exception &) { // no memory, or no thread
+            throw std::bad_alloc();
+        }
+        if (errno == ENOMEM || Grid::gridType() != "Tree_float_5_4_3") throw std::bad_alloc();
+        unusable = false;
+    });
 }
 
 /* Runs f; an exception becomes a status, that of an I/O error of OpenVDB becomes
@@ -37,7 +77,8 @@ template <typename F>
 sdm_status guarded(const char *path, sdm_status when_unreadable, sdm_error *err, F f)
 {
     try {
-        initialize_once();
+        const at_work mark("OpenVDB", path);
+        initialize_once(path, err);
         f();
         return SDM_OK;
     } catch (const failure &e) {
@@ -277,7 +318,10 @@ Grid::Ptr make_level_set(const sdm_grid &g, const float *values, const sdm_vdb_o
     const auto transform = uniform_transform(g, err);
     const float background = background_value(band_of(o), transform->voxelSize()[0], o.half);
     owned_band box;
-    need(sdm_band_close(&g, values, background, &o, &box.band, err));
+    {
+        const at_work ours(nullptr, nullptr); // o.map() may call a plug-in
+        need(sdm_band_close(&g, values, background, &o, &box.band, err));
+    }
     report.cut = box.band.cut;
     report.estimated_voxels = box.band.estimated;
     Grid::Ptr grid = grid_of(transform, box.band, background, false, o.half, err);

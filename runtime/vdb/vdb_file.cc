@@ -105,6 +105,38 @@ void write_archive(const char *path, const std::string &temp, const Grid::Ptr &g
 
 } // namespace
 
+namespace
+{
+
+// reads the temporary file of `path`
+Grid::Ptr read_back(const char *path, const std::string &temp, sdm_error *err)
+{
+    bool sealed = false;
+    Grid::Ptr back;
+    errno = 0;
+    try {
+        back = read_grid(temp.c_str(), &sealed, err);
+    } catch (const failure &e) {
+        if (e.status != SDM_E_FORMAT) throw;
+    }
+    // the streams of OpenVDB swallow allocations that fail
+    if (!back && errno == ENOMEM)
+        need(sdm_fail(err, SDM_E_NOMEM, "%s: no memory for the level set", path));
+    return sealed ? back : nullptr;
+}
+
+// whether the values, their places and the metadata of `grid` are those of `back`
+bool is_same(const Grid &grid, const Grid &back)
+{
+    for (auto m = grid.beginMeta(); m != grid.endMeta(); ++m) {
+        const auto other = back[m->first];
+        if (!other || *other != *m->second) return false;
+    }
+    return hash_of(back) == hash_of(grid) && back.constTransform() == grid.constTransform();
+}
+
+} // namespace
+
 void vdb_parts::write_grid(const char *path, const Grid::Ptr &grid, sdm_error *err)
 {
     struct output {
@@ -115,9 +147,8 @@ void vdb_parts::write_grid(const char *path, const Grid::Ptr &grid, sdm_error *e
     const std::string temp = sdm_outfile_temp_path(out.file);
     write_archive(path, temp, grid, err);
     need(sdm_seal_append(temp.c_str(), err));
-    bool sealed = false;
-    const Grid::Ptr back = read_grid(temp.c_str(), &sealed, err);
-    if (!sealed || hash_of(*back) != hash_of(*grid))
+    const Grid::Ptr back = read_back(path, temp, err);
+    if (!back || !is_same(*grid, *back))
         need(sdm_fail(err, SDM_E_IO, "%s: reads back different from what was written", path));
     if (grid->getGridClass() == openvdb::GRID_LEVEL_SET)
         check_level_set(*back, path, SDM_E_QUALITY, err);

@@ -1,6 +1,6 @@
 /* The core library: status and error texts, memory, random numbers, checksums, files, text,
  * threads, grids.
- * Tests: checksum.c file.c grid.c json.c memory.c rng.c status.c text.c threads.c */
+ * Tests: checksum.c file.c foreign.c grid.c json.c memory.c rng.c status.c text.c threads.c */
 #include <limits.h>
 #include <math.h>
 #include <setjmp.h>
@@ -19,6 +19,7 @@
 #include "sdm/grid.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/file.h"
+#include "sdm/internal/foreign.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/near.h"
 #include "sdm/internal/rng.h"
@@ -372,6 +373,22 @@ static void voxels_on_the_surface_have_either_side(void **state)
     assert_false(sdm_inside_beside(0.002f, -0.01f, 0.5f));
 }
 
+static void the_library_at_work_is_known(void **state)
+{
+    (void)state;
+    assert_null(sdm_foreign_running().library);
+    const sdm_foreign none = sdm_foreign_enter((sdm_foreign){"cairo", "x.png"});
+    assert_null(none.library);
+    // while it calls back it is not at work
+    const sdm_foreign cairo = sdm_foreign_enter(none);
+    assert_null(sdm_foreign_running().library);
+    sdm_foreign_enter(cairo);
+    assert_string_equal(sdm_foreign_running().library, "cairo");
+    assert_string_equal(sdm_foreign_running().path, "x.png");
+    sdm_foreign_enter(none);
+    assert_null(sdm_foreign_running().library);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -385,6 +402,7 @@ int main(void)
         cmocka_unit_test(json_text_is_escaped),
         cmocka_unit_test(files_are_written_whole_or_not),
         cmocka_unit_test(thread_counts_are_limited),
+        cmocka_unit_test(the_library_at_work_is_known),
         cmocka_unit_test(a_child_has_one_thread),
         cmocka_unit_test(grids_convert_coordinates),
         cmocka_unit_test(voxels_on_the_surface_have_either_side),

@@ -17,6 +17,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 /* glibc's own names of the functions that this file replaces */
@@ -28,8 +29,8 @@ int __libc_start_main(int (*begin)(int, char **, char **), int argc, char **argv
                       void (*init)(void), void (*fini)(void), void (*rtld_fini)(void),
                       void *stack_end);
 
-static atomic_long allocations;
-static atomic_bool started; /* main() runs */
+static atomic_long *allocations; /* shared with child processes */
+static atomic_bool started;      /* main() runs */
 static long fail_at;
 static bool lasting;
 static const char *where;            /* FAIL_IN; NULL: everywhere */
@@ -39,7 +40,7 @@ static bool fails(const void *caller)
 {
     const uintptr_t at = (uintptr_t)caller;
     if (!started || (where && (at < first_byte || at >= beyond))) return false;
-    const long n = atomic_fetch_add(&allocations, 1) + 1;
+    const long n = atomic_fetch_add(allocations, 1) + 1;
     if (!fail_at || n < fail_at || (n > fail_at && !lasting)) return false;
     errno = ENOMEM;
     return true;
@@ -85,7 +86,7 @@ __attribute__((destructor)) static void end(void)
     if (!path) return;
     char text[32], name[4096];
     snprintf(name, sizeof name, "%s.memory", path);
-    const int n = snprintf(text, sizeof text, "%ld\n", (long)allocations),
+    const int n = snprintf(text, sizeof text, "%ld\n", allocations ? (long)*allocations : 0),
               fd = open(name, O_WRONLY | O_CREAT | O_TRUNC, 0666);
     if (fd >= 0 && write(fd, text, (size_t)n) == n) close(fd);
 }
@@ -99,6 +100,9 @@ static int counted_main(int argc, char **argv, char **environment)
     lasting = mode && !strcmp(mode, "lasting");
     where = getenv("FAIL_IN");
     if (where) dl_iterate_phdr(find_object, NULL);
+    allocations =
+        mmap(NULL, sizeof *allocations, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (allocations == MAP_FAILED) _exit(99);
     started = true;
     return program_main(argc, argv, environment);
 }

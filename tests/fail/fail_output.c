@@ -18,13 +18,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/uio.h>
 #include <unistd.h>
 
 enum { FILES_MAX = 4096 };
 
-static atomic_long operations;
+static atomic_long *operations;          /* shared with child processes */
 static atomic_bool is_output[FILES_MAX]; /* by descriptor: opened for writing */
 static long fail_at;
 static const char *mode = "once";
@@ -34,6 +35,9 @@ static const char *mode = "once";
 __attribute__((constructor)) static void begin(void)
 {
     const char *n = getenv("FAIL_AT"), *m = getenv("FAIL_MODE");
+    operations =
+        mmap(NULL, sizeof *operations, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (operations == MAP_FAILED) _exit(99);
     if (n) fail_at = atol(n);
     if (m) mode = m;
 }
@@ -44,7 +48,7 @@ __attribute__((destructor)) static void end(void)
     if (!path) return;
     char text[32], name[4096];
     snprintf(name, sizeof name, "%s.output", path);
-    const int n = snprintf(text, sizeof text, "%ld\n", (long)operations),
+    const int n = snprintf(text, sizeof text, "%ld\n", operations ? (long)*operations : 0),
               fd = REAL(open)(name, O_WRONLY | O_CREAT | O_TRUNC, 0666);
     if (fd >= 0 && REAL(write)(fd, text, (size_t)n) == n) REAL(close)(fd);
 }
@@ -53,7 +57,7 @@ __attribute__((destructor)) static void end(void)
  * process has to be killed after half of it. */
 static bool fails(bool *half)
 {
-    const long n = atomic_fetch_add(&operations, 1) + 1;
+    const long n = atomic_fetch_add(operations, 1) + 1;
     if (!fail_at || n < fail_at) return false;
     const bool lasting = !strcmp(mode, "lasting"), in_half = !strcmp(mode, "half") && half;
     if (n > fail_at && !lasting) return false;

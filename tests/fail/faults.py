@@ -4,8 +4,8 @@
 
 Each case is a command that writes files, some of which were there before. It is run once without a fault, and then with a fault at the
 n-th operation: by the shims fail_output.c and fail_memory.c. Without --sample all n up to 40 are tried, and 40 random ones beyond; of single
-allocations inside cairo and OpenVDB all n up to 1,000 and the primes beyond. With --sample N N random faults for each case, 4 N inside
-libraries, and fewer cases. Whatever fails:
+allocations inside cairo and OpenVDB all n up to 1,000 and the primes beyond. With --sample N N random faults for each case, fewer cases, and
+each k-th allocation where libraries crash or a part of the result may be missing (STRIDES). Whatever fails:
   - the program does not crash, and it ends: with the exit code 0 and every output complete, or with 1 and a message;
   - a file under its final name is the old one or a complete new one, and no temporary file stays (but after a kill);
   - a training that was killed goes on with --resume to a model of the same bits.
@@ -42,11 +42,13 @@ methods:
 POINTS = "x,y,z\n0,0,5\n0,0,-5\n" + "".join(f"{x},{y},{z}\n" for z in (0, 2, -2) for x, y in ((2, 0), (-2, 0), (0, 2), (0, -2)))
 OLD = b"the old file\n"
 PICTURES = ("png", "svg", "pdf")
-FORMATS_SAMPLED = ("npy", "nrrd", "vdb", "ply", "svg", "pdf")
+FORMATS_SAMPLED = ("npy", "nrrd", "vdb", "ply", "png", "svg", "pdf")
 FORMATS = ("npy", "nii", "nii.gz", "nrrd", "mha", "vdb", "ply", "stl", "obj", "off", "vtk", "vtp", "png", "svg", "pdf")
 TIME_LIMIT = 200
 EVERY, BEYOND, RANDOM_KILLS = 40, 40, 40
 DENSE = 1000
+# with --sample: each k-th allocation up to the n-th fails alone
+STRIDES = {"cairo png": (10, 400), "cairo svg": (8, 400), "cairo pdf": (40, 1000), "libraries vdb": (25, 1000), "report": (6, 120), "experiment": (5, 40)}
 
 
 class Case:
@@ -221,6 +223,10 @@ def choose(case, counts, sample, chance):
         # cairo forgets that a write of a PDF file failed if later ones succeed
         known = [("output", "once", at) for at in range(1, counts["output"] + 1)] if case.name == "generate pdf" else []
         n = 4 * sample if case.of_libraries else sample
+        step, last = STRIDES.get(case.name, (1, 0))
+        known += [("memory", "once", at) for at in range(chance.randint(1, step), min(last, counts["memory"]) + 1, step)]
+        if case.name == "experiment":  # messages need no memory
+            known += [("memory", "lasting", at) for at in (8, 30)]
         return known + [(shim, mode, chance.randint(1, counts[shim])) for shim, mode in (chance.choice(modes) for _ in range(n))]
     faults = [(shim, mode, at) for shim, mode in modes
               for at in (places_in_libraries if case.of_libraries and mode == "once" else places)(counts[shim], chance)]  # fmt: skip

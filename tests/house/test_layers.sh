@@ -38,13 +38,13 @@ check() {
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
         own("core", "blocks export grid memory pose shape status") # shape: types alone
-         own("core", "block_border box checksum clock container distribution envelope file heap json_describe json_read mat3 near processor rng rotation sampling sanitized sha256 shared table team text threads units utf8 vec3")
+         own("core", "block_border box checksum clock container distribution envelope file foreign heap json_describe json_read mat3 near processor rng rotation sampling sanitized sha256 shared table team text threads units utf8 vec3")
          own("config", "config experiment mistakes")
         own("geom", "exact isosurface mesh")
         own("geom", "brute_force builder methods part_audit")
         own("nn", "model")
         own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template")
-        own("io", "glb image meshfile npy picture ssm volume")
+        own("io", "glb image meshfile npy picture picture_child ssm volume")
         own("shape", "callback conformance isolation mesh_measures registry shape_box shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")

@@ -1,6 +1,6 @@
 /* The three formats of pictures (PNG, SVG, PDF): chosen by the ending, well-formed, text stored as
  * text, reproducible bytes, and no file left after a failure.
- * Tests: canvas.c */
+ * Tests: canvas.c drawer.c */
 #include <dirent.h>
 #include <math.h>
 #include <setjmp.h>
@@ -18,9 +18,12 @@
 #include <cmocka.h>
 
 #include "sdm/internal/heap.h"
+#include "sdm/internal/picture_child.h"
 #include "sdm/picture.h"
 
 enum { SIDE = 12 };
+
+static bool in_child;
 
 /* Writes one of the four kinds of picture, with titles that need escaping in XML. */
 static sdm_status write_picture(int kind, const char *path, sdm_error *err)
@@ -217,7 +220,8 @@ static void test_failures_leave_no_file(void **state)
             snprintf(path, sizeof path, "no_such_folder/%s", known[i]);
             assert_int_equal(sdm_picture_check(path, &err), SDM_OK);
             assert_int_equal(write_picture(kind, path, &err), SDM_E_IO);
-            if (i > 0 && kind < 3) continue; // all kinds as PNG, only the plot in every format
+            // all kinds as PNG, only the plot in every format and by a child process
+            if ((i > 0 || in_child) && kind < 3) continue;
             for (unsigned long n = 1;; n++) {
                 sdm_alloc_fail_after(n);
                 const sdm_status s = write_picture(kind, known[i], &err);
@@ -270,6 +274,59 @@ static void test_full_disk(void **state)
     }
 }
 
+static int draw_in_child(void **state)
+{
+    (void)state;
+    sdm_picture_in_child(in_child = true);
+    return 0;
+}
+
+static int draw_here(void **state)
+{
+    (void)state;
+    sdm_picture_in_child(in_child = false);
+    return 0;
+}
+
+/* A picture by a child process has the bytes of one by the process itself. */
+static void test_child_draws_the_same(void **state)
+{
+    (void)state;
+    static const char *const paths[2][3] = {{"here.png", "here.svg", "here.pdf"},
+                                            {"child.png", "child.svg", "child.pdf"}};
+    for (int kind = 0; kind < 4; kind++) {
+        for (int i = 0; i < 3; i++) {
+            char *data[2];
+            size_t size[2];
+            for (int child = 0; child < 2; child++) {
+                sdm_picture_in_child(child);
+                assert_int_equal(write_picture(kind, paths[child][i], NULL), SDM_OK);
+                data[child] = read_file(paths[child][i], &size[child]);
+                remove(paths[child][i]);
+            }
+            assert_int_equal(size[0], size[1]);
+            assert_memory_equal(data[0], data[1], size[0]);
+            free(data[0]);
+            free(data[1]);
+        }
+    }
+}
+
+/* A crash of the child is an error, and no file is left. Only the child reads the title. */
+static void test_child_crashes(void **state)
+{
+    (void)state;
+    static const double x[] = {0, 1};
+    const sdm_curve curve = {"", x, x, 2};
+    const char *nowhere = (const char *)(uintptr_t)64;
+    const int files = count_files(".");
+    sdm_error err;
+    assert_int_equal(sdm_picture_plot("crash.png", nowhere, "x", "y", false, &curve, 1, &err),
+                     SDM_E_NOMEM);
+    assert_non_null(strstr(err.text, "crash.png: cairo crashed"));
+    assert_int_equal(count_files("."), files);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -277,6 +334,10 @@ int main(void)
         cmocka_unit_test(test_pdf_has_text),
         cmocka_unit_test(test_failures_leave_no_file),
         cmocka_unit_test(test_full_disk),
+        cmocka_unit_test_setup_teardown(test_failures_leave_no_file, draw_in_child, draw_here),
+        cmocka_unit_test_setup_teardown(test_full_disk, draw_in_child, draw_here),
+        cmocka_unit_test_teardown(test_child_draws_the_same, draw_here),
+        cmocka_unit_test_setup_teardown(test_child_crashes, draw_in_child, draw_here),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "comm_types.h"
+#include "sdm/internal/picture_child.h"
 #include "sdm/internal/processor.h"
 #include "sdm/memory.h"
 
@@ -79,6 +80,8 @@ sdm_status sdm_comm_mpi(sdm_comm **out, sdm_error *err)
                         m->name, started, dlerror(), m->package, m->option, started);
     const sdm_status s = SDM_ALLOC(out, 1, "ranks", err);
     if (s) return s;
+    // the drivers of some networks do not survive a fork
+    sdm_picture_in_child(false);
     (*out)->backend = entry.call(&(*out)->state, &(*out)->rank, &(*out)->size);
     return level_processors(*out, err);
 }

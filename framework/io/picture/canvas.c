@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "bytes.h"
+#include "drawer.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
@@ -39,6 +40,8 @@ struct sdm_canvas {
     cairo_surface_t *surface;
     cairo_t *cr;
     sdm_outfile *file;
+    /* this process is the child that draws, and ends with the canvas */
+    bool in_child;
     /* SVG: the document by cairo, and the text elements to put at its end */
     sdm_text document, labels;
     /* the images of SVG and PDF files, which live as long as the surface: cairo 1.16 would copy an
@@ -108,6 +111,16 @@ static sdm_status canvas_fail(const sdm_canvas *c, cairo_status_t status, sdm_er
     return sdm_fail(err, SDM_E_INTERNAL, "%s: cairo: %s", c->path, cairo_status_to_string(status));
 }
 
+/* In the parent of a child that has drawn the picture: writes the file under its final name, or
+ * removes it after an error of the child. */
+static sdm_status close_drawn(sdm_canvas *c, sdm_status s, sdm_error *err)
+{
+    if (!s) s = sdm_outfile_commit(&c->file, err);
+    sdm_outfile_discard(&c->file);
+    sdm_free(c);
+    return s;
+}
+
 static void create_surface(sdm_canvas *c, int w, int h)
 {
     if (c->format == FORMAT_PNG) {
@@ -155,6 +168,10 @@ sdm_status sdm_canvas_create(const char *path, int w, int h, sdm_canvas **out, s
     c->path = path;
     c->format = format_of(path);
     s = sdm_outfile_open(path, &c->file, err);
+    sdm_drawer_part part = SDM_DRAWS_ITSELF;
+    if (!s) s = sdm_drawer_start(path, &part, err);
+    if (part == SDM_HAS_CHILD_DRAWN) return close_drawn(c, s, err);
+    c->in_child = part == SDM_DRAWS_AS_CHILD;
     if (!s) {
         cairo_begin(c);
         create_surface(c, w, h);
@@ -164,6 +181,7 @@ sdm_status sdm_canvas_create(const char *path, int w, int h, sdm_canvas **out, s
         cairo_end(c);
         if (status || c->error.status) s = canvas_fail(c, status, err);
     }
+    if (s && c->in_child) sdm_drawer_end(s, err);
     if (s) {
         sdm_canvas_discard(c);
         return s;
@@ -226,6 +244,10 @@ sdm_status sdm_canvas_finish(sdm_canvas *c, sdm_error *err)
     // cairo forgets errors of write_bytes() in PDF files
     sdm_status s = status || c->error.status ? canvas_fail(c, status, err) : SDM_OK;
     if (!s && c->format == FORMAT_SVG) s = write_svg(c, err);
+    if (c->in_child) {
+        if (!s) s = sdm_outfile_flush(c->file, err);
+        sdm_drawer_end(s, err);
+    }
     if (!s) s = sdm_outfile_commit(&c->file, err);
     sdm_canvas_discard(c);
     return s;
@@ -248,6 +270,10 @@ static void free_drawing(sdm_canvas *c)
 void sdm_canvas_discard(sdm_canvas *c)
 {
     if (!c) return;
+    if (c->in_child) {
+        const sdm_error none = {SDM_E_NOMEM, "no memory for the picture"};
+        sdm_drawer_end(SDM_E_NOMEM, c->error.status ? &c->error : &none);
+    }
     free_drawing(c);
     sdm_outfile_discard(&c->file);
     sdm_text_dispose(&c->document);

@@ -23,7 +23,10 @@ typedef struct sdm_box {
 typedef struct sdm_canvas sdm_canvas;
 
 /* A white canvas for the file `path`, which must stay valid until sdm_canvas_finish(). SDM_E_ARG
-   for a side of more than 16384 pixels; SDM_E_UNSUPPORTED for an unknown ending; SDM_E_IO. */
+   for a side of more than 16384 pixels; SDM_E_UNSUPPORTED for an unknown ending; SDM_E_IO. *out =
+   NULL: the call has returned a second time, after a child process has drawn the picture
+   (drawer.h), and the file is complete, or the error is that of the child. The child returns from
+   no call of sdm_canvas_finish() or sdm_canvas_discard(). */
 sdm_status sdm_canvas_create(const char *path, int w, int h, sdm_canvas **out, sdm_error *err);
 
 /* Writes the file under its final name, frees the canvas in every case, and returns the first error

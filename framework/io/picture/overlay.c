@@ -136,7 +136,7 @@ sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const flo
     sdm_canvas *c = NULL;
     const int height = TOP + tall + SDM_SECTION_BELOW + FOOT;
     s = sdm_canvas_create(path, w < 480 ? 480 : w, height, &c, err);
-    if (s) return s;
+    if (s || !c) return s;
     draw_overlay(c, &o, height, title);
     return sdm_canvas_finish(c, err);
 }

@@ -250,7 +250,7 @@ sdm_status sdm_picture_plot(const char *path, const char *title, const char *x_l
     find_window(&w, curves, n_curves);
     sdm_canvas *c = NULL;
     const sdm_status s = sdm_canvas_create(path, WIDTH, HEIGHT, &c, err);
-    if (s) return s;
+    if (s || !c) return s;
     draw_x_axis(c, &w);
     draw_y_axis(c, &w);
     for (size_t i = 0; i < n_curves; i++) draw_curve(c, &w, &curves[i], i);

@@ -184,7 +184,7 @@ sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid, const sdm_
     layout_place(&l, &w, &h);
     sdm_canvas *c = NULL;
     s = sdm_canvas_create(path, w, h, &c, err);
-    if (s) return s;
+    if (s || !c) return s;
     for (size_t m = 0; m < n_maps; m++) draw_column(c, &l, m, h - FOOT);
     return sdm_canvas_finish(c, err);
 }

@@ -307,7 +307,7 @@ static sdm_status draw_surfaces(const char *path, const sdm_picture_surface *sur
     const int rows = (int)((n + columns - 1) / columns), h = rows * row_height(&sc) + GAP + FOOT;
     sdm_status s =
         sdm_canvas_create(path, 2 * SIDE + (int)columns * (sc.width + GAP) - GAP, h, &c, err);
-    if (s) return s;
+    if (s || !c) return s;
     s = draw_scene(&sc, c, h - FOOT, caption, err);
     if (!s) return sdm_canvas_finish(c, err);
     sdm_canvas_discard(c);

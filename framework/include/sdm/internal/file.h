@@ -48,6 +48,10 @@ bool sdm_outfile_is_temp(const char *name, const char *of);
 SDM_INTERNAL_API sdm_status sdm_outfile_write(sdm_outfile *f, const void *data, size_t size,
                                               sdm_error *err);
 
+/* Writes what is in the buffer. After a fork the process that has written calls it before another
+ * one commits the file. SDM_E_IO. */
+SDM_INTERNAL_API sdm_status sdm_outfile_flush(sdm_outfile *f, sdm_error *err);
+
 /* Appends formatted text. SDM_E_IO, SDM_E_NOMEM. */
 sdm_status sdm_outfile_printf(sdm_outfile *f, sdm_error *err, const char *fmt, ...)
     SDM_PRINTF(3, 4);

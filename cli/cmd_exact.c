@@ -22,7 +22,10 @@
 #include "sdm/internal/clock.h"
 #include "sdm/internal/methods.h"
 #include "sdm/internal/shape_box.h"
+#include "sdm/internal/shape_survey.h"
 #include "sdm/internal/threads.h"
+#include "sdm/internal/units.h"
+#include "sdm/internal/vec3.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
 #include "slicer/results_file.h"
@@ -258,6 +261,10 @@ static void notice_mesh(const job *j)
     if (inside && !j->args->points)
         cli_warn_cut_shape(&j->grid, j->mesh.vert, j->mesh.n_vert,
                            "a larger grid (--size, --spacing, --origin) holds it");
+    const double size = sqrt(v3_dist2(a->min, a->max));
+    if (size > 0 && (size < SDM_SURVEY_SIZE_MIN || size > SDM_SURVEY_SIZE_MAX))
+        cli_notice("the mesh measures %.3g mm across: is it in %s? lengths are mm", size,
+                   sdm_unit_near(size < SDM_SURVEY_SIZE_MIN ? 1e3 : 1e-3, NULL));
     // a closed part that meets no other cannot be inside out after the engine has turned it; the
     // audit of the single part of a file, which may be large, would only tell its thickness
     if (a->components > 1 || !a->closed || j->args->shape)

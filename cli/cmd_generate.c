@@ -298,7 +298,7 @@ static void notice_clamped(const job *j, size_t row)
     cli_clamp(begin, j->params, j->info->n_params, j->rows + row * j->info->n_params);
 }
 
-/* Warns if the grid cuts the shape of the row. */
+/* Warns if the grid cuts the shape of the row, or if its voxels are too large for it. */
 static void warn_cut(const job *j, size_t row)
 {
     char where[48];
@@ -308,6 +308,11 @@ static void warn_cut(const job *j, size_t row)
                          j->own ? "train with grid: auto, or give --size or --spacing and "
                                   "--outside exact"
                                 : "a larger grid (--size, --spacing, --origin) holds it");
+    if (j->values && !j->band.tile)
+        cli_warn_torn_map(where, &j->grid, j->values,
+                          j->own ? "train with a smaller grid.spacing"
+                                 : "give a smaller --spacing; where the grid of the training is "
+                                   "as coarse, train with a smaller grid.spacing");
 }
 
 /* Prints notices about a map by the exact engine and, with --check, the errors of the map. */

@@ -340,6 +340,11 @@ sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err)
     const cli_command *c = args->command;
     if (args->files.n < c->min_files)
         return sdm_fail(err, SDM_E_ARG, "usage: sdmgen %s %s", c->name, c->synopsis);
+    if (args->files.n > c->max_files && args->measure)
+        return sdm_fail(err, SDM_E_ARG,
+                        "%s: unexpected argument '%s': --measure has no value, it prints all "
+                        "measures",
+                        c->name, args->files.items[c->max_files]);
     if (args->files.n > c->max_files)
         return sdm_fail(err, SDM_E_ARG, "%s: unexpected argument '%s'; usage: sdmgen %s %s",
                         c->name, args->files.items[c->max_files], c->name, c->synopsis);

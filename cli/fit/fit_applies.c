@@ -31,7 +31,7 @@ sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err)
     // images state their frame; --ras is about coordinates of the command line and of points
     const bool places =
         !isnan(a->start_centre[0]) || !isnan(a->start_axis[0]) || !isnan(a->region[0]);
-    // the table of docs/fitting.md says the same
+    // the table of docs/fitting-reference.md says the same
     const struct {
         const char *option;
         unsigned kinds;

@@ -26,6 +26,9 @@ void cli_fit_print_verdict(const cli_fit *f)
         if (!isnan(x->limit)) printf(", limit %.3g", x->limit);
         printf("%s%s\n", *x->text ? ": " : "", x->text);
     }
+    if (v->grade != SDM_FIT_PASSED && f->opts.turns == SDM_FIT_TURNS_NONE &&
+        !isnan(f->args->pose.rotation[0]))
+        printf("  --rotation gives one start: without it the fit tries 60 rotations\n");
 }
 
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *j)

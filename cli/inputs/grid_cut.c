@@ -1,4 +1,5 @@
-/* Warns of a grid that cuts a shape, by the vertices of its mesh or by its map. */
+/* Warns of a grid that cuts a shape, by the vertices of its mesh or by its map, and of voxels that
+ * are too large for it. */
 #include "grid_cut.h"
 
 #include <math.h>
@@ -48,4 +49,40 @@ void cli_warn_cut_map(const char *where, const sdm_grid *g, const float *values,
                 }
         }
     warn(where, beyond, true, mend);
+}
+
+/* a torn place is told from this share of the voxels on the surface on, and from this number; fewer
+ * are the tips of shapes */
+#define TORN_SHARE 0.005
+enum { TORN_MIN = 4 };
+
+/* Is none of the 26 neighbours of an inner voxel inside? */
+static bool is_alone(const float *v, int64_t line, int64_t plane)
+{
+    for (int k = -1; k <= 1; k++)
+        for (int j = -1; j <= 1; j++)
+            for (int i = -1; i <= 1; i++)
+                if (v[k * plane + j * line + i] < 0) return false;
+    return true;
+}
+
+void cli_warn_torn_map(const char *where, const sdm_grid *g, const float *values, const char *mend)
+{
+    const int64_t line = g->n[0], plane = g->n[0] * g->n[1];
+    const float half = (float)(0.5 * fmin(g->spacing[0], fmin(g->spacing[1], g->spacing[2])));
+    size_t n = 0, torn = 0;
+    double first[3] = {0};
+    for (int64_t k = 1; k + 1 < g->n[2]; k++)
+        for (int64_t j = 1; j + 1 < g->n[1]; j++)
+            for (int64_t i = 1; i + 1 < g->n[0]; i++) {
+                const float *v = values + k * plane + j * line + i;
+                if (!(fabsf(*v) < half)) continue;
+                n++;
+                if (*v < 0 || !is_alone(v, line, plane)) continue;
+                if (!torn++) sdm_grid_world(g, (double[3]){(double)i, (double)j, (double)k}, first);
+            }
+    if (torn < TORN_MIN || (double)torn < TORN_SHARE * (double)n) return;
+    cli_warn("%sthe surface is torn: at %zu of the %zu voxels on it no voxel is inside (the first "
+             "at %.4g %.4g %.4g mm): the shape is thinner than a voxel there, %.3g mm; %s",
+             where, torn, n, first[0], first[1], first[2], sdm_grid_coarsest(g), mend);
 }

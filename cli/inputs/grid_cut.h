@@ -1,4 +1,4 @@
-/* Warns of a grid that cuts a shape. */
+/* Warns of a grid that cuts a shape or whose voxels do not show it. */
 #pragma once
 
 #include "sdm/grid.h"
@@ -11,3 +11,7 @@ void cli_warn_cut_shape(const sdm_grid *g, const double *vertex, size_t n, const
  * that lies `depth` inside has a ball of this radius about it that is inside, too. `where` begins
  * the line: "" or "row 2: ". */
 void cli_warn_cut_map(const char *where, const sdm_grid *g, const float *values, const char *mend);
+
+/* Warns in one line if the surface of the map is torn: if it passes within half a voxel of voxels
+ * beside which no voxel is inside. Something is thinner than a voxel there. */
+void cli_warn_torn_map(const char *where, const sdm_grid *g, const float *values, const char *mend);

@@ -12,6 +12,7 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/isolation.h"
 #include "sdm/internal/model_hash.h"
+#include "sdm/internal/text.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
 
@@ -235,6 +236,9 @@ static bool parse_any_real(const char *text, double *out)
     return true;
 }
 
+// parameters that a message lists
+enum { NAMES_TOLD = 12 };
+
 static sdm_status find_param(const sdm_param *params, size_t n, const char *name, size_t *index,
                              sdm_error *err)
 {
@@ -250,7 +254,15 @@ static sdm_status find_param(const sdm_param *params, size_t n, const char *name
     if (near)
         return sdm_fail(err, SDM_E_ARG, "unknown parameter '%.100s'; did you mean '%s'?", name,
                         near);
-    return sdm_fail(err, SDM_E_ARG, "unknown parameter '%.100s'", name);
+    sdm_text all = {0};
+    for (size_t i = 0; i < n && i < NAMES_TOLD; i++)
+        sdm_text_add(&all, "%s%s", i ? ", " : "", params[i].name);
+    if (n > NAMES_TOLD) sdm_text_add(&all, " and %zu more", n - NAMES_TOLD);
+    const sdm_status s =
+        sdm_fail(err, SDM_E_ARG, "unknown parameter '%.100s'; the parameters are %s", name,
+                 all.size && !all.failed ? all.data : "none");
+    sdm_text_dispose(&all);
+    return s;
 }
 
 static sdm_status read_param(const sdm_param *params, size_t n, const char *word, bool *seen,

@@ -126,12 +126,17 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
 
 void cli_warn_audit(const sdm_audit *a)
 {
-    if (a->nonmanifold_edges > 0)
-        cli_notice("%zu edges with more than two triangles", a->nonmanifold_edges);
+    // parts that share an edge are fine where as many triangles run one way as the other
+    if (a->nonmanifold_edges > 0 && !a->closed)
+        cli_notice("%zu %s more than two triangles", a->nonmanifold_edges,
+                   a->nonmanifold_edges == 1 ? "edge has" : "edges have");
     if (a->misoriented_edges > 0)
-        cli_warn("%zu edges with triangles of opposite orientation", a->misoriented_edges);
-    if (a->degenerate > 0) cli_notice("%zu degenerate triangles", a->degenerate);
-    if (a->duplicate > 0) cli_notice("%zu duplicate triangles", a->duplicate);
+        cli_warn("%zu %s two triangles that run along it in the same direction",
+                 a->misoriented_edges, a->misoriented_edges == 1 ? "edge has" : "edges each have");
+    if (a->degenerate > 0)
+        cli_notice("%zu degenerate triangle%s", a->degenerate, a->degenerate == 1 ? "" : "s");
+    if (a->duplicate > 0)
+        cli_notice("%zu duplicate triangle%s", a->duplicate, a->duplicate == 1 ? "" : "s");
 }
 
 /* "part 2 of 3 (12 triangles, vertices 8 .. 15, box ...) " */

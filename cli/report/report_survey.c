@@ -127,8 +127,8 @@ static void tell_turned(teller *t)
     if (!c->shapes) return;
     add_count(t->s, c, "parts that are inside out and that the exact engine turns", &text);
     const bool always = c->shapes == t->s->found.n - t->s->found.untested;
-    if (!always) sdm_text_add(&text, ": at other parameters they are not");
-    tell(t, always ? SDM_OK : SDM_E_QUALITY, &text);
+    sdm_text_add(&text, always ? "; " CLI_MEND_SHAPE : ": at other parameters they are not");
+    tell(t, SDM_E_QUALITY, &text);
 }
 
 /* Inner walls that pass through each other, and where they begin to. */
@@ -141,7 +141,8 @@ static void tell_folded(teller *t)
     if (!c->shapes) return;
     const double *p = f->p + c->worst * f->n_params;
     sdm_text_add(&text, "walls pass through each other ");
-    add_share(t->s, c, &text);
+    sdm_text_add(&text, "in %zu of the %zu shapes that were followed from the default shape",
+                 c->shapes, f->fold_tested);
     sdm_text_add(&text, ": on the way from the default shape to ");
     add_params(t->s, c->worst, SIZE_MAX, &text);
     sdm_text_add(&text, " %.2g %% of the surface turns over, at about", 100 * c->amount);
@@ -211,6 +212,22 @@ static void grid_box(const sdm_grid *g, double low[3], double high[3])
     }
 }
 
+/* Appends the keys of a grid that holds the shapes, with voxels that show their thinnest part. */
+static void add_proposal(const cli_survey *s, sdm_text *text)
+{
+    sdm_text use = {0};
+    if (!s->config) return;
+    sdm_config config = *s->config;
+    if (s->found.thin.shapes > 0) {
+        const double most = 0.5 * sdm_grid_coarsest(s->grid) / s->found.thin.amount,
+                     unit = pow(10, floor(log10(most)) - 1), spacing = floor(most / unit) * unit;
+        for (int a = 0; a < 3; a++) config.grid.spacing[a] = fmin(config.grid.spacing[a], spacing);
+    }
+    if (!sdm_train_grid_proposal(&config, s->shape, &use, NULL))
+        sdm_text_add(text, "; use %s", use.data);
+    sdm_text_dispose(&use);
+}
+
 static void tell_cut(teller *t)
 {
     const sdm_shape_survey *f = &t->s->found;
@@ -240,10 +257,7 @@ static void tell_cut(teller *t)
             between = ", ";
         }
     sdm_text_add(&text, ")");
-    sdm_text use = {0};
-    if (t->s->config && !sdm_train_grid_proposal(t->s->config, t->s->shape, &use, NULL))
-        sdm_text_add(&text, "; use %s", use.data);
-    sdm_text_dispose(&use);
+    add_proposal(t->s, &text);
     tell(t, f->cut.shapes ? SDM_E_QUALITY : SDM_OK, &text);
 }
 

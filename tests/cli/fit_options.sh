@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# sdmgen fit: which options apply to which kind of target, against the table in docs/fitting.md.
+# sdmgen fit: which options apply to which kind of target, against the table in docs/fitting-reference.md.
 # Tests: fit_applies.c fit_size.c fit_labels.c fit_target.c option_names.c
 . "$(dirname "$0")/common.sh"
 shape='--shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2'
@@ -32,8 +32,8 @@ while IFS='|' read -r _ options yes_no; do
             fi
         done
     done < <(grep -o '`--[^`]*`' <<<"$options" | tr -d '`')
-done < <(sed -n '/^| option | image |/,/^$/p' "$source_folder/docs/fitting.md" | tail -n +3 | grep '^|')
-[ "$rows" -eq "${#value[@]}" ] || bad "$rows options in docs/fitting.md, ${#value[@]} here"
+done < <(sed -n '/^| option | image |/,/^$/p' "$source_folder/docs/fitting-reference.md" | tail -n +3 | grep '^|')
+[ "$rows" -eq "${#value[@]}" ] || bad "$rows options in docs/fitting-reference.md, ${#value[@]} here"
 expect 2 'these apply: --keep appearance, --point-sd$' sdmgen fit $shape points.csv --cavity 2
 # --ras is about points and about coordinates of the command line
 expect 2 '--ras .*does nothing in a fit to image' sdmgen fit $shape image.nii --ras --start-points missing.csv

@@ -1,7 +1,7 @@
 /* The verdict of a fit: robust noise, right fits that pass, wrong ones that are refused with a
  * reason, the mirror image.
- * Tests: blob.c coverage.c finding.c fit_mirrored.c judgement.c misfit.c next_pose.c noise.c
- * residuals.c rival.c suffice.c */
+ * Tests: blob.c bounds.c coverage.c finding.c fit_mirrored.c judgement.c misfit.c next_pose.c
+ * noise.c residuals.c rival.c suffice.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -101,6 +101,7 @@ static void parts_that_are_inside_out(void **state)
     s = survey("body");
     assert_int_equal(s.turned.shapes, s.n);
     assert_int_equal(s.inside_out.shapes, s.n);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
     sdm_shape_survey_dispose(&s);
 }
 

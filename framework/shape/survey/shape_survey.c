@@ -290,6 +290,7 @@ static sdm_status find_folds(survey *v, int n_threads, sdm_error *err)
     const size_t all = 1 + s->n_corners + FOLD_SAMPLES, n = s->n < all ? s->n : all;
     sdm_status status = SDM_ALLOC(&v->fold, n, "folds", err);
     if (!status) status = run(v->opts, n_threads, "folds", n, find_fold, v, err);
+    s->fold_tested = n - 1;
     for (size_t i = 0; i < n && !status; i++) {
         const survey_fold *fold = &v->fold[i];
         if (!(fold->share > SDM_SURVEY_FOLD_MIN)) continue;
@@ -496,8 +497,7 @@ size_t sdm_survey_samples(const sdm_instance *shape, size_t samples)
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
 {
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
-    bool bad = s->inside_out.shapes || s->folded.shapes ||
-               (s->turned.shapes && s->turned.shapes < s->n - s->untested) || s->resized.shapes ||
+    bool bad = s->inside_out.shapes || s->folded.shapes || s->turned.shapes || s->resized.shapes ||
                s->rewired.shapes || s->cut.shapes || s->thin.shapes || s->unlike ||
                s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
                s->scale.odd_speed || s->scale.odd_angle;

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "blob.h"
+#include "bounds.h"
 #include "coverage.h"
 #include "finding.h"
 #include "rival.h"
@@ -25,12 +26,16 @@
 #define SERIOUS_MIN 0.02
 // voxels larger than this share of the radius of the largest ball inside explain residuals
 #define COARSE 0.5
+// the same where the voxels are so large: only residuals beyond this multiple of their limit
+#define THIN_BEYOND 1.2
 // labels and points: residuals beyond this multiple of their limit refuse the fit
 #define FAR_BEYOND 3.0
 // the same where they contradict little of the volume
 #define VERY_FAR_BEYOND 6.0
 // largest share of points that may belong to another surface
 #define STRAY_MAX 0.35
+// the same where the data want a parameter beyond its bound: these points may show the rest
+#define STRAY_AT_BOUND_MAX 0.02
 // part of a voxel by which the border of the maps may be inside the shape
 #define BORDER_MAX 0.1
 // largest fraction of the shapes of its family that a good network's grid cuts
@@ -97,23 +102,44 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
             r->inside_share, o->least_inside,
             "only %.0f %% of the shape lies in the image, need %.0f %% (sdm_fit_opts.least_inside)",
             100 * r->inside_share, 100 * o->least_inside);
-    size_t bounds = 0;
-    for (size_t k = 0; k < p->n_params && !o->keep_params; k++) bounds += r->at_bound[k];
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, !bounds, SDM_FIT_DOUBTFUL, (double)bounds, 0,
-                      "%zu of %zu parameters at an end of their range", bounds, p->n_params);
+}
+
+static bool has_passed(const sdm_fit_verdict *v, sdm_fit_check_kind kind)
+{
+    for (size_t i = 0; i < v->n_findings; i++)
+        if (v->findings[i].kind == kind) return v->findings[i].grade == SDM_FIT_PASSED;
+    return true;
+}
+
+// Parameters at an end of their range. Where the data want more and do not match the shape as it
+// is, the fit has not found the shape of the data.
+static void check_bounds(const fit_problem *p, const fit_at_bounds *b, const sdm_fit_result *r,
+                         sdm_fit_verdict *v)
+{
+    const bool matched =
+                   r->outliers <= STRAY_AT_BOUND_MAX && has_passed(v, SDM_FIT_CHECK_RESIDUALS) &&
+                   has_passed(v, SDM_FIT_CHECK_EMPTY) && has_passed(v, SDM_FIT_CHECK_MISSING) &&
+                   has_passed(v, SDM_FIT_CHECK_COVERED),
+               refused = b->n_wanted && !matched && !(p->opts->tolerance > 0);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, !b->n, refused ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL,
+                      (double)b->n, 0, "%zu of %zu parameters at an end of their range%s%s%s", b->n,
+                      p->n_params, b->n_wanted ? ": " : "", b->text,
+                      refused ? ", and do not match the shape as it is: a wider range, or another "
+                                "shape (sdm_fit_opts.tolerance accepts a difference)"
+                              : "");
 }
 
 // The residuals on both sides of the surface. The older observation model is biased in blurred
 // images, and labels and points show a surface with errors of their own: their residuals are not
 // noise alone, so that only a multiple of the limit refuses the fit.
 static void check_residuals(const fit_problem *p, const fit_misfit *m, fit_coarseness coarse,
-                            sdm_fit_verdict *v)
+                            const fit_at_bounds *bounds, sdm_fit_verdict *v)
 {
     const double voxel = fit_longest_edge(&p->maps.grid), beyond = m->chi_square[1] / m->limit[1];
     const bool image = sdm_fit_is_image(p), points = p->target->kind == SDM_FIT_POINTS,
                serious = m->empty + m->missing > SERIOUS_MIN,
                thin = voxel > COARSE * sdm_fit_inradius(&p->maps),
-               refused = image ? p->maps.share && (serious || thin)
+               refused = image ? p->maps.share && (serious || (thin && beyond > THIN_BEYOND))
                                : beyond > (serious ? FAR_BEYOND : VERY_FAR_BEYOND);
     const sdm_fit_grade inside =
         refused && !(p->opts->tolerance > 0) ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL;
@@ -123,14 +149,23 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, fit_coars
                           "shape: nothing tests this fit");
         return;
     }
-    char cause[200] = "another shape lies there, or the organ differs from the model (then say by "
-                      "how much it may: sdm_fit_opts.tolerance)";
-    if (isfinite(coarse.edge))
+    // the likely causes in their order
+    char cause[400] = "";
+    if (bounds->n_wanted)
+        snprintf(cause, sizeof cause, "%s", bounds->text);
+    else if (isfinite(coarse.advice))
         snprintf(
             cause, sizeof cause,
             "the voxels of the maps, %.2g mm, are coarse beside %s: try exact maps with voxels "
-            "of %.2g mm (sdm_fit_source.grid)",
-            voxel, coarse.detail, coarse.edge);
+            "of %.2g mm (sdm_fit_source.grid), or another shape lies there",
+            voxel, coarse.detail, coarse.advice);
+    else
+        snprintf(cause, sizeof cause,
+                 "%s, or the organ differs from the model (then say by how much it may: "
+                 "sdm_fit_opts.tolerance)",
+                 refused ? "another shape lies there"
+                         : "the data have errors of their own, the fit stopped beside the best "
+                           "place, another shape lies there");
     sdm_fit_judge_add(
         v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1], inside, m->chi_square[1],
         m->limit[1],
@@ -261,20 +296,22 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     const double robust = s ? 0 : sdm_fit_residual_correlation(&residuals);
     *factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
     if (sdm_fit_is_image(p)) r->evidence = evidence_of(p, r, *factor);
-    const fit_coarseness coarse = sdm_fit_coarseness(p);
+    const fit_coarseness coarse = sdm_fit_coarseness(p, sdm_fit_is_image(p) ? r->blur : 0);
+    const fit_at_bounds bounds = sdm_fit_at_bounds(p, r, *factor);
     check_basics(p, r, v);
     check_maps(p, v);
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     if (!s) {
-        check_residuals(p, &misfit, coarse, v);
+        check_residuals(p, &misfit, coarse, &bounds, v);
         check_volumes(p, &misfit, r, v);
         v->n_units = misfit.n_units[0] + misfit.n_units[1];
         v->chi_square = misfit.noise_chi_square;
     }
     if (!s && p->target->kind == SDM_FIT_POINTS) s = sdm_fit_check_points(p, &residuals, v, err);
     if (!s && p->target->kind == SDM_FIT_POINTS) s = sdm_fit_check_coverage(p, v, err);
+    if (!s) check_bounds(p, &bounds, r, v);
     if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
-    if (!s) sdm_fit_check_voxels(p, coarse, sdm_fit_is_image(p) ? r->blur : 0, v);
+    if (!s) sdm_fit_check_voxels(p, coarse, v);
     if (!s) sdm_fit_check_determined(p, r, v);
     sdm_fit_residuals_dispose(&residuals);
     if (!s) s = sdm_fit_check_blob(p, *factor, v, err);

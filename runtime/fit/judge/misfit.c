@@ -17,6 +17,13 @@
 #define MEAN_SD_MIN 0.02
 // rms error of the place of a surface that labels show, in voxels
 #define LABEL_ERROR 0.12
+// sd of a place that is known to a whole voxel
+#define STEP_SD 0.28867513459481287
+// the density at the quantile of the share a is close to DENSITY a (1 - a)
+#define DENSITY 1.6
+// shares below this and above 1 less this tell no distance
+#define SHARE_MIN 0.02
+#define TURN 6.283185307179586
 // relative uncertainty of the variance of the noise
 #define NOISE_UNCERTAINTY 0.2
 // standard normal deviate that noise exceeds once in a thousand fits
@@ -73,6 +80,25 @@ typedef struct unit_mean {
     double mean, noise, variance, expected;
 } unit_mean;
 
+/* Labels show a surface in steps of a voxel. Where a surface runs obliquely through a unit, the
+ * steps average out; where it is parallel to the voxels, all of it is off by the same part of a
+ * step. Returns the sd of this error of the mean share: the sd of a step, where the distances of
+ * the members from the surface are the same modulo a voxel, and less where they are not: times the
+ * length of the mean of exp(2 pi i distance). The members count by their change of the share. */
+static double unit_steps(const fit_residuals *r, const member *m, size_t n)
+{
+    double all = 0, turn[2] = {0};
+    for (size_t k = 0; k < n && r->label_width > 0; k++) {
+        const double a = fmin(fmax(r->expected[m[k].sample], SHARE_MIN), 1 - SHARE_MIN),
+                     slope = DENSITY * a * (1 - a) / r->label_width,
+                     distance = r->label_width * log(a / (1 - a)) / DENSITY;
+        all += slope;
+        turn[0] += slope * cos(TURN * distance);
+        turn[1] += slope * sin(TURN * distance);
+    }
+    return all > 0 ? STEP_SD * (turn[0] * turn[0] + turn[1] * turn[1]) / (all * (double)n) : 0;
+}
+
 static unit_mean unit_measure(const fit_residuals *r, const member *m, size_t n, double least)
 {
     double sum = 0, variance = 0, expected = 0, maps = 0;
@@ -83,8 +109,10 @@ static unit_mean unit_measure(const fit_residuals *r, const member *m, size_t n,
         variance += r->sd[m[k].sample] * r->sd[m[k].sample];
     }
     const double one = 1 / (double)n, shared = (1 - one) * mean_correlation(r, m, n);
-    const double noise = variance * one * (one + shared) + least * least;
-    return (unit_mean){sum * one, noise, noise + maps * one * maps * one, expected * one};
+    const double noise = variance * one * (one + shared) + least * least,
+                 steps = unit_steps(r, m, n);
+    return (unit_mean){sum * one, noise, noise + maps * one * maps * one + steps * steps,
+                       expected * one};
 }
 
 // The share of a unit that the data contradict. At most the expected share can be empty: a value

@@ -15,6 +15,9 @@
 // with fewer of them, in a shape thinner than the point spread, the tissue of the fit is the
 // measure
 #define DEEP_LEAST 8
+// images: inside voxels that measure the noise there; of fewer the variance is known to less than
+// a sixth
+#define INSIDE_MIN 300
 // most values of which a median is computed; of more, every second, third ... one is taken
 #define VALUES_MAX 20000
 // a value so many sd beyond that of the inside is a third material (air beside fluid)
@@ -120,22 +123,34 @@ static bool is_pure(const fit_residuals *r, size_t i, int side, double limit)
     return fabs(r->expected[i] - side) <= limit;
 }
 
+// the value of the inside at sample i, of which a part may lie outside
+static double inside_value(const fit_problem *p, const fit_residuals *r, size_t i)
+{
+    const double a = r->expected[i], outside = r->middle[0] + outside_shift(p, i);
+    return ((double)p->samples.value[i] - (1 - a) * outside) / a;
+}
+
 // middle and spread of the values on one side
 static void side_measure(const fit_problem *p, fit_residuals *r, int side, double *list)
 {
+    const bool unmix = side == 1 && !is_labels(p);
+    const size_t least = unmix ? INSIDE_MIN : DEEP_MIN;
     double limit = DEEP;
     size_t n = 0;
-    for (int attempt = 0; attempt < 2 && n < DEEP_MIN; attempt++, limit = NEARLY_DEEP) {
+    for (size_t i = 0; i < r->n; i++) n += is_pure(r, i, side, limit);
+    while (n < least && limit < NEARLY_DEEP) {
+        limit = unmix ? fmin(2 * limit, NEARLY_DEEP) : NEARLY_DEEP;
         n = 0;
         for (size_t i = 0; i < r->n; i++) n += is_pure(r, i, side, limit);
-        const size_t step = n / VALUES_MAX + 1;
-        size_t seen = 0, kept = 0;
-        for (size_t i = 0; i < r->n; i++)
-            if (is_pure(r, i, side, limit) && seen++ % step == 0)
-                list[kept++] = (double)p->samples.value[i];
-        r->n_deep[side] = n;
-        r->middle[side] = sdm_fit_shortest_half(list, kept, &r->spread[side]);
     }
+    const size_t step = n / VALUES_MAX + 1;
+    size_t seen = 0, kept = 0;
+    for (size_t i = 0; i < r->n; i++)
+        if (is_pure(r, i, side, limit) && seen++ % step == 0)
+            list[kept++] = unmix ? inside_value(p, r, i) : (double)p->samples.value[i];
+    r->n_deep[side] = n;
+    r->deep[side] = unmix ? limit : DEEP;
+    r->middle[side] = sdm_fit_shortest_half(list, kept, &r->spread[side]);
     if (r->n_deep[side] < DEEP_LEAST) {
         const sdm_fit_law *tissue = main_tissue(p, side);
         r->middle[side] = tissue->mean, r->spread[side] = tissue->sd;
@@ -234,11 +249,11 @@ static size_t differences(const fit_residuals *r, const lookup *l, int axis, int
         int32_t at[3] = {r->place[3 * i], r->place[3 * i + 1], r->place[3 * i + 2]};
         at[axis] += lag;
         const uint32_t *found = lookup_at(l, at);
-        if ((only >= 0 && side != only) || !r->used[i] || !is_pure(r, i, side, DEEP) || !found ||
-            !*found)
+        if ((only >= 0 && side != only) || !r->used[i] || !is_pure(r, i, side, r->deep[side]) ||
+            !found || !*found)
             continue;
         const size_t j = *found - 1;
-        if (!r->used[j] || !is_pure(r, j, side, DEEP)) continue;
+        if (!r->used[j] || !is_pure(r, j, side, r->deep[side])) continue;
         list[n++] = r->residual[i] / r->sd[i] - r->residual[j] / r->sd[j];
     }
     return n;
@@ -303,6 +318,7 @@ static void map_errors_fill(const fit_problem *p, fit_residuals *r, double radiu
 {
     const double error = maps_error(p, radius), h = is_voxels(p) ? p->target->grid.spacing[0] : 0,
                  width = hypot(p->state.blur, h / sqrt(12));
+    r->label_width = is_voxels(p) && is_labels(p) ? width / h : 0;
     for (size_t i = 0; i < r->n; i++)
         r->map_error[i] = is_voxels(p) ? error * 1.6 * r->expected[i] * (1 - r->expected[i]) / width
                                        : error / radius;

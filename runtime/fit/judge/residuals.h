@@ -26,6 +26,9 @@ typedef struct fit_residuals {
        network, and of the interpolation between voxels of a surface as curved as the largest ball
        inside */
     double *map_error;
+    /* labels: width of the edge of the expected shares, in voxels: the share changes by
+       1.6 share (1 - share) / label_width where the surface moves by a voxel; else 0 */
+    double label_width;
     /* [n] false: the sample holds a third material, and its residual says nothing */
     bool *used;
     /* [n][3] place of the sample, in steps of the image (points: in halves of the largest radius)
@@ -39,6 +42,8 @@ typedef struct fit_residuals {
        number of these voxels; points: 0 */
     double middle[2], spread[2];
     size_t n_deep[2];
+    /* such a voxel's share differs from 0 or 1 by at most this much */
+    double deep[2];
 } fit_residuals;
 
 /* Computes the residuals at problem->state from its samples. Call sdm_fit_residuals_dispose() even

@@ -11,14 +11,16 @@
 // smallest median distance of the points from their middle, over the reach of the shape
 #define SPREAD_MIN 0.1
 
-// edge of a voxel that shows the thickness, over the radius of the largest ball inside
-#define VOXEL_OVER_RADIUS 0.4
-// the same for voxels that are noticed
+// longest edge of a voxel that shows the thickness, over the radius of the largest ball inside
 #define VOXEL_OVER_RADIUS_MAX 0.5
 // larger voxels bias the standard deviations: edge over the sd of the point spread
 #define VOXEL_OVER_BLUR_MAX 1.5
 // labels: edge over that of a voxel of the labels
 #define VOXEL_OVER_LABEL_MAX 1.5
+// edge that is advised, over the longest one
+#define ADVISED 0.8
+// the limit by the details is known to this share of it: an edge so little beyond passes
+#define LIMIT_ERROR 0.05
 // shortest gradient of a distance whose details are shown
 #define GRADIENT_MIN 0.8
 // largest share of the surface with a shorter gradient
@@ -117,39 +119,41 @@ static double detail_share(const fit_maps *m)
     return all > 0 ? bent / all : 0;
 }
 
-fit_coarseness sdm_fit_coarseness(const fit_problem *p)
+static void coarseness_limit(fit_coarseness *c, double limit, const char *detail)
 {
-    fit_coarseness c = {INFINITY, ""};
+    if (limit < c->limit) c->limit = limit, c->detail = detail;
+}
+
+fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
+{
+    fit_coarseness c = {INFINITY, INFINITY, ""};
     if (fit_maps_direct(&p->maps)) return c;
     const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
                  details = detail_share(&p->maps);
-    if (details > DETAILS_MAX) // at edges: the share grows with the voxel
-        c = (fit_coarseness){voxel * DETAILS_MAX / details, "the details of the shape"};
-    if (voxel > VOXEL_OVER_RADIUS_MAX * radius && VOXEL_OVER_RADIUS * radius < c.edge)
-        c = (fit_coarseness){VOXEL_OVER_RADIUS * radius, "the thickness of the shape"};
-    const bool labels = p->given_labels || p->target->kind == SDM_FIT_LABEL;
-    const double label = labels ? fit_longest_edge(&p->target->grid) : INFINITY;
-    if (voxel > VOXEL_OVER_LABEL_MAX * label && label < c.edge)
-        c = (fit_coarseness){label, "the voxels of the labels"};
+    if (details > 0) // at edges: the share grows with the voxel
+        coarseness_limit(&c, voxel * DETAILS_MAX / details * (1 + LIMIT_ERROR),
+                         "the details of the shape");
+    coarseness_limit(&c, VOXEL_OVER_RADIUS_MAX * radius, "the thickness of the shape");
+    if (p->given_labels || p->target->kind == SDM_FIT_LABEL)
+        coarseness_limit(&c, VOXEL_OVER_LABEL_MAX * fit_longest_edge(&p->target->grid),
+                         "the voxels of the labels");
+    if (blur > 0) coarseness_limit(&c, VOXEL_OVER_BLUR_MAX * blur, "the point spread of the image");
+    if (voxel > c.limit) c.advice = ADVISED * c.limit;
     return c;
 }
 
-void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, double blur,
-                          sdm_fit_verdict *v)
+void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_verdict *v)
 {
     const double voxel = fit_longest_edge(&p->maps.grid);
     if (p->opts->keep_params || fit_maps_direct(&p->maps)) return;
-    if (blur > 0 && voxel > VOXEL_OVER_BLUR_MAX * blur && blur < coarse.edge)
-        coarse = (fit_coarseness){blur, "the point spread of the image"};
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_VOXELS, !isfinite(coarse.edge), SDM_FIT_DOUBTFUL, voxel,
-                      fmin(coarse.edge, voxel),
-                      "the voxels of the maps are coarse beside %s: estimates are less exact, and "
-                      "standard deviations %s; exact maps with voxels of %.2g mm "
-                      "(sdm_fit_source.grid) show it",
-                      coarse.detail,
-                      p->target->kind == SDM_FIT_POINTS ? "larger, by an estimate of the error"
-                                                        : "too small",
-                      coarse.edge);
+    sdm_fit_judge_add(
+        v, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit), SDM_FIT_DOUBTFUL, voxel, coarse.limit,
+        "the voxels of the maps are coarse beside %s: estimates are less exact, and "
+        "standard deviations %s; exact maps with voxels of %.2g mm "
+        "(sdm_fit_source.grid) show it",
+        coarse.detail,
+        p->target->kind == SDM_FIT_POINTS ? "larger, by an estimate of the error" : "too small",
+        coarse.advice);
 }
 
 void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)

@@ -8,22 +8,23 @@
 sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sdm_fit_verdict *v,
                                 sdm_error *err);
 
-/* What the voxels of the maps do not show. */
+/* What the voxels of the maps show. */
 typedef struct fit_coarseness {
-    /* longest edge (mm) of voxels that show the shape, or the voxels of labels; INFINITY: these do
-     */
-    double edge;
-    /* what they show then, "the thickness of the shape" */
+    /* longest edge (mm) of voxels that show the shape and the data; INFINITY: any do */
+    double limit;
+    /* where the voxels of the maps are longer than that: an edge that clearly shows them, below the
+     * limit; else INFINITY */
+    double advice;
+    /* what limits the edge, "the thickness of the shape" */
     const char *detail;
 } fit_coarseness;
 
-/* Judges the maps by the fitted shape and by labels. */
-fit_coarseness sdm_fit_coarseness(const fit_problem *p);
+/* Judges the maps by the fitted shape, by labels and by the point spread. blur: its sd, mm; 0: the
+ * target is no image. */
+fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur);
 
-/* Adds the finding "map voxels", unless the parameters are kept. blur: sd of the point spread, mm;
- * 0: the target is no image. */
-void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, double blur,
-                          sdm_fit_verdict *v);
+/* Adds the finding "map voxels", unless the parameters are kept. */
+void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_verdict *v);
 
 /* Adds the finding "data" if nothing failed before, and the data determine none of the parameters.
  */

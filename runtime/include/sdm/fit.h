@@ -349,7 +349,7 @@ typedef struct sdm_fit_finding {
     /* the figure, and the limit that separates passed from the rest; NaN: none */
     double figure, limit;
     /* why it did not pass; empty if it passed */
-    char text[240];
+    char text[320];
 } sdm_fit_finding;
 
 /* All checks of a fit in the order of their kinds, those that do not apply left out. */

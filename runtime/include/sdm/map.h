@@ -9,7 +9,8 @@ extern "C" {
 #endif
 
 /* gradient[3][nz][ny][nx] = derivatives of values[nz][ny][nx] along the world axes x, y, z (LPS),
-   for any orientation of the grid. The gradient has length 1 where the map is a distance. Finite
+   for any orientation of the grid. The gradient has length 1 where the map is a distance; that of
+   a network's map has about this length only, so divide it by its length for a normal. Finite
    differences of second order with spacing h: central, (f(i+1) - f(i-1)) / 2h; at the border
    one-sided, (-3 f(0) + 4 f(1) - f(2)) / 2h. On an axis of two voxels the differences are of first
    order, on an axis of one voxel they are 0. On the medial axis, where the nearest surface point

@@ -117,6 +117,7 @@ typedef struct sdm_shape_survey {
      * straight way from shape 0: walls pass through each other; amount: the share of these
      * triangles of the area, which is above SDM_SURVEY_FOLD_MIN */
     sdm_survey_count folded;
+    size_t fold_tested;    /* number of shapes that were compared with shape 0 */
     double folded_at;      /* where on the way to the worst of them: 0 at shape 0, 1 at the worst */
     sdm_survey_jump *jump; /* [n_params] the worst break along each parameter */
     bool has_velocity;     /* the shape has a callback of this name */
@@ -141,8 +142,8 @@ void sdm_shape_survey_dispose(sdm_shape_survey *s);
 size_t sdm_survey_samples(const sdm_instance *shape, size_t samples);
 
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
- * are usable, but a training or derivatives would suffer: parts that are inside out (at some of the
- * parameters also those that the engine turns), walls that pass through each other, sizes,
+ * are usable, but a training or derivatives would suffer: parts that are inside out (also those
+ * that the engine turns), walls that pass through each other, sizes,
  * triangles or vertices that jump, a grid that cuts or is too coarse for a part, wrong velocities,
  * results that differ from call to call, or an odd size or speed (another unit than mm, or a
  * parameter that does nothing). Else SDM_OK. */

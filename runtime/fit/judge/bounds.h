@@ -1,0 +1,19 @@
+/* Parameters that end at a bound of their range, and whether the data want them beyond it. */
+#pragma once
+
+#include "fit/solver/problem.h"
+
+/* Parameters at their bounds. */
+typedef struct fit_at_bounds {
+    /* number of them, and of those of which the data want more (or less) */
+    size_t n, n_wanted;
+    /* "base ends at its bound: the data want more than 60, the largest value of its range", of
+       the parameter that the data want farthest beyond; else "" */
+    char text[200];
+} fit_at_bounds;
+
+/* Looks at the derivative of the log-likelihood at the estimate *r. The data want a parameter
+ * beyond its bound if the Newton step of this parameter alone would gain more than
+ * SDM_FIT_PREFERRED in log-likelihood of independent samples; factor: number of correlated samples
+ * that count as one. */
+fit_at_bounds sdm_fit_at_bounds(const fit_problem *p, const sdm_fit_result *r, double factor);

@@ -5,6 +5,7 @@
  * ranges.c sample_plan.c train.c workbench.c */
 #include <math.h>
 #include <setjmp.h>
+#include <stdatomic.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -136,7 +137,8 @@ static void watch_progress(void *user, const sdm_progress *p)
     w->reports++;
 }
 
-static int64_t calls, stop_after;
+static atomic_llong calls; // of the hook, by any thread
+static int64_t stop_after;
 // Number of calls of the hook until each phase, for 600 steps.
 enum { IN_DATA = 20, IN_FIT = 400, IN_REFINEMENT = 700 };
 
@@ -173,7 +175,7 @@ static void resume_is_bit_exact(void **state)
     const int64_t stops[] = {IN_DATA, IN_FIT, IN_REFINEMENT};
     for (size_t i = 0; i < 3; i++) {
         run_files_remove();
-        calls = 0, stop_after = stops[i];
+        atomic_store(&calls, 0), stop_after = stops[i];
         watch w = {0};
         const sdm_train_hooks hooks = {.cancelled = stop, .progress = watch_progress, .user = &w};
         assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
@@ -213,7 +215,7 @@ static void resume_with_another_budget(void **state)
         sdm_train_report r;
         run_files_remove();
         read_config(&c, (const char *const[]){budgets[i][0]}, 1);
-        calls = 0, stop_after = i < 2 ? IN_REFINEMENT : IN_FIT;
+        atomic_store(&calls, 0), stop_after = i < 2 ? IN_REFINEMENT : IN_FIT;
         const sdm_train_hooks hooks = {.cancelled = stop};
         assert_int_equal(sdm_train(&c, capsule, folder, false, &hooks, NULL, &e), SDM_E_CANCELLED);
         read_config(&c, (const char *const[]){budgets[i][1]}, 1);
@@ -251,7 +253,7 @@ static void model_cannot_be_written(void **state)
     assert_non_null(strstr(e.text, "model.sdm: cannot write"));
     assert_int_equal(rmdir(in_folder("model.sdm")), 0);
     // Enough calls to make the data again, but no training step.
-    calls = 0, stop_after = 2 * IN_DATA + 300;
+    atomic_store(&calls, 0), stop_after = 2 * IN_DATA + 300;
     const sdm_train_hooks no_step = {.cancelled = stop};
     if (sdm_train(&c, capsule, folder, true, &no_step, NULL, &e)) fail_msg("%s", e.text);
     assert_true(hash_of("model.sdm") == whole && hash_of("metrics.jsonl") == metrics);
@@ -268,17 +270,17 @@ static void older_run_gives_way(void **state)
     read_config(&other, (const char *const[]){"train.steps=600", "network.width=16"}, 2);
     run_files_remove();
     const sdm_train_hooks stopped = {.cancelled = stop};
-    calls = 0, stop_after = IN_FIT;
+    atomic_store(&calls, 0), stop_after = IN_FIT;
     assert_int_equal(sdm_train(&c, capsule, folder, false, &stopped, NULL, &e), SDM_E_CANCELLED);
     const uint64_t config = hash_of("config.yaml"), checkpoint = hash_of("checkpoint.sdmc");
-    calls = 0, stop_after = IN_DATA;
+    atomic_store(&calls, 0), stop_after = IN_DATA;
     assert_int_equal(sdm_train(&other, capsule, folder, false, &stopped, NULL, &e),
                      SDM_E_CANCELLED);
     assert_true(hash_of("config.yaml") == config && hash_of("checkpoint.sdmc") == checkpoint);
     // First the older run left a checkpoint, then a model.
     const sdm_train_hooks looking = {.cancelled = old_files_watch};
     for (int i = 0; i < 2; i++) {
-        calls = 0, old_files = true;
+        atomic_store(&calls, 0), old_files = true;
         if (sdm_train(i ? &c : &other, capsule, folder, false, &looking, NULL, &e))
             fail_msg("%s", e.text);
         assert_false(old_files);
@@ -293,7 +295,7 @@ static void unwritable_folder_is_found_early(void **state)
     sdm_config c;
     sdm_error e = {0};
     read_config(&c, NULL, 0);
-    calls = 0, stop_after = 0;
+    atomic_store(&calls, 0), stop_after = 0;
     const sdm_train_hooks hooks = {.cancelled = stop};
     assert_int_equal(sdm_train(&c, capsule, "/proc", false, &hooks, NULL, &e), SDM_E_IO);
 }

@@ -88,7 +88,7 @@ has '^ellipsoid fitted to ct.nii.gz$'
 has 'rx +3\.[0-9]+ \+- 0\.0'
 has 'reference: Dice 0.9'
 has 'converged after'
-has '^  map voxels   doubtful  0.35, limit 0.1.*coarse beside the point spread of the image: .*with voxels of 0.1[0-9]* mm \(--exact --spacing\)'
+has '^  map voxels   doubtful  0.35, limit 0.2.*coarse beside the point spread of the image: .*with voxels of 0.2[0-9]* mm \(--exact --spacing\)'
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --blur 0.3 --keep blur
 has 'point spread 0.3 mm'
 ! grep -q 'are coarse' out || bad 'maps of 0.35 mm are fine beside a point spread of 0.3 mm'

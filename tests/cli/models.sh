@@ -45,7 +45,8 @@ expect 5 "parameter 'a' = 7 mm, allowed .*; --policy clamp moves it into the ran
 expect 5 'nan' sdmgen generate $model -p a=nan -o x.npy
 expect 5 'inf' sdmgen generate $model -p a=1e999 --policy clamp -o x.npy
 expect 5 'a' sdmgen generate $model -p a=5.000000000000001 -o x.npy
-expect 2 "unknown parameter 'aa'; the parameters are " sdmgen generate $model -p aa=3 -o x.npy
+expect 2 "unknown parameter 'aa'; did you mean 'a'" sdmgen generate $model -p aa=3 -o x.npy
+expect 2 "unknown parameter 'length'; the parameters are a, alpha" sdmgen generate $model -p length=3 -o x.npy
 expect 2 'is not a number' sdmgen generate $model -p a=3mm -o x.npy
 expect 2 'an output is needed' sdmgen generate $model
 expect 2 'its name must end in' sdmgen generate $model -o x.txt

@@ -155,7 +155,9 @@ static sdm_status train_run(trainer *t, bool resume, bool found, sdm_outfile **c
  * measurement of the model. */
 static void tell_overrun(trainer *t, double measured)
 {
-    const double budget = t->config->train.minutes * 60, over = trainer_seconds(t) - budget;
+    // the first of two trainings may use the share of the second
+    const double minutes = is_second(t) ? t->config->train.minutes : t->turns->budget,
+                 budget = minutes * 60, over = trainer_seconds(t) - budget;
     if (!trainer_by_time(t) || over < fmax(1, 0.02 * budget)) return;
     trainer_message(
         t,

@@ -119,6 +119,20 @@ static sdm_status take_case(cohort_run *r, size_t i, const cli_words *w, const c
     return SDM_OK;
 }
 
+/* Removes leases that processes left that were killed after the record of the case was written. */
+static sdm_status drop_leases(const cohort_run *r, size_t i, sdm_error *err)
+{
+    const char *id = cli_cohort_id(&r->cohort, i);
+    char first[CLI_CASE_PATH_MAX], folder[CLI_CASE_PATH_MAX], holder[200];
+    cli_lease lease = {.number = 0};
+    cli_case_path(r->cohort.out, id, CLI_CASE_LEASE "-1", first);
+    if (access(first, F_OK)) return SDM_OK;
+    cli_case_path(r->cohort.out, id, NULL, folder);
+    const sdm_status s = cli_lease_take(folder, &lease, holder, err);
+    if (!s && lease.number) cli_lease_release(&lease, true);
+    return s;
+}
+
 static sdm_status do_case(cohort_run *r, size_t i, sdm_error *err)
 {
     cli_words w = {0};
@@ -130,6 +144,7 @@ static sdm_status do_case(cohort_run *r, size_t i, sdm_error *err)
     if (!s && is_done(r, cli_cohort_id(&r->cohort, i), key, &end)) {
         r->done[end.state]++;
         r->n_earlier++;
+        s = drop_leases(r, i, err);
     } else if (!s) {
         s = take_case(r, i, &w, key, err);
     }

@@ -5,8 +5,8 @@
  * ranges.c sample_plan.c train.c workbench.c */
 #include <math.h>
 #include <setjmp.h>
-#include <stdatomic.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>

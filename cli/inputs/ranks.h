@@ -16,7 +16,8 @@ typedef struct cli_ranks_use {
     int64_t *memory; /* [n] largest resident memory of each so far, bytes; free with sdm_free() */
 } cli_ranks_use;
 
-/* Called by all ranks. */
+/* *out = the number of ranks, the way they were started and the memory of each. Collective: every
+ * rank must call it. */
 sdm_status cli_ranks_measure(sdm_comm *comm, cli_ranks_use *out, sdm_error *err);
 
 /* Leaves the other processes; s, *err: the result of this one. Rank 0 returns s. The others end

@@ -126,8 +126,7 @@ static void tell_turned(teller *t)
     sdm_text text = {0};
     if (!c->shapes) return;
     add_count(t->s, c, "parts that are inside out and that the exact engine turns", &text);
-    const bool always = c->shapes == t->s->found.n - t->s->found.untested;
-    sdm_text_add(&text, always ? "; " CLI_MEND_SHAPE : ": at other parameters they are not");
+    sdm_text_add(&text, "; " CLI_MEND_SHAPE);
     tell(t, SDM_E_QUALITY, &text);
 }
 

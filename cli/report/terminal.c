@@ -147,18 +147,29 @@ int cli_report(const sdm_error *err)
     return exit_code_of(err->status);
 }
 
-/* Prints a notice or a warning; `kind` is its key in JSON, `begin` its beginning elsewhere. Without
- * memory a text longer than that of an error is cut. */
-static void print_line(const char *kind, const char *begin, const char *fmt, va_list args)
+/* The formatted text: `room` if it fits there, else memory that the caller frees. Without memory
+ * the result is `room` with the beginning of the text, and *cut is true. */
+static char *format_text(char room[SDM_ERROR_TEXT_MAX], bool *cut, const char *fmt, va_list args)
 {
-    char start[SDM_ERROR_TEXT_MAX], room[ROOM_BYTES], *whole = NULL;
     va_list again;
     va_copy(again, args);
-    const int length = vsnprintf(start, sizeof start, fmt, args);
-    if (length >= (int)sizeof start) whole = malloc((size_t)length + 1);
+    const int length = vsnprintf(room, SDM_ERROR_TEXT_MAX, fmt, args);
+    const bool fits = length >= 0 && length < SDM_ERROR_TEXT_MAX;
+    char *whole = fits || length < 0 ? NULL : malloc((size_t)length + 1);
     if (whole) vsnprintf(whole, (size_t)length + 1, fmt, again);
     va_end(again);
-    const char *text = length < 0 ? fmt : whole ? whole : start;
+    *cut = !fits && !whole;
+    if (length < 0) snprintf(room, SDM_ERROR_TEXT_MAX, "%s", fmt);
+    return whole ? whole : room;
+}
+
+/* Prints a notice or a warning; `kind` is its key in JSON, `begin` its beginning elsewhere. Without
+ * memory a text longer than the longest error message is cut. */
+static void print_line(const char *kind, const char *begin, const char *fmt, va_list args)
+{
+    char start[SDM_ERROR_TEXT_MAX], room[ROOM_BYTES];
+    bool cut;
+    char *text = format_text(start, &cut, fmt, args);
     if (form == CLI_FORM_JSON) {
         print_json_message(kind, text);
     } else {
@@ -167,26 +178,24 @@ static void print_line(const char *kind, const char *begin, const char *fmt, va_
         fprintf(stderr, "%s%s\n", begin, shown.data ? shown.data : start);
         end_text(&shown, room);
     }
-    free(whole);
+    if (text != start) free(text);
 }
 
 void cli_print(const char *fmt, ...)
 {
+    char start[SDM_ERROR_TEXT_MAX];
     sdm_text shown = {0};
-    va_list args, again;
+    bool cut;
+    va_list args;
     va_start(args, fmt);
-    va_copy(again, args);
-    const int length = vsnprintf(NULL, 0, fmt, args);
+    char *text = format_text(start, &cut, fmt, args);
     va_end(args);
-    char *text = length < 0 ? NULL : malloc((size_t)length + 1);
-    if (text) vsnprintf(text, (size_t)length + 1, fmt, again);
-    va_end(again);
-    if (text) sdm_text_add_shown(&shown, text);
-    if (!text || shown.failed)
+    if (!cut) sdm_text_add_shown(&shown, text);
+    if (cut || shown.failed)
         unprinted = true;
     else if (shown.data)
         fputs(shown.data, stdout);
-    free(text);
+    if (text != start) free(text);
     sdm_text_dispose(&shown);
 }
 

@@ -1,12 +1,12 @@
-/* Remembers for each thread the library of other authors that is at work in it. */
+/* Remembers for each thread which third-party library it is calling. */
 #include "sdm/internal/foreign.h"
 
 #include <stdatomic.h>
 #include <stddef.h>
 
 static _Thread_local sdm_foreign running;
-static atomic_int n_running;               /* threads in which a library is at work */
-static _Atomic(const char *) last_library; /* the last one that began */
+static atomic_int n_running;               /* threads that are calling a library */
+static _Atomic(const char *) last_library; /* the library that was called last */
 
 sdm_foreign sdm_foreign_enter(sdm_foreign now)
 {

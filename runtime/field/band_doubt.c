@@ -1,4 +1,5 @@
-/* Finds the blocks in doubt from the smallest and the largest coefficient of bins. */
+/* Finds the blocks that the coefficients of a spline do not decide. The coefficients are divided
+   into bins; the smallest and the largest of a bin bound the values of the spline there. */
 #include "band_doubt.h"
 
 #include <string.h>

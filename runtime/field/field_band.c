@@ -15,7 +15,7 @@ typedef struct job {
     float radius; /* mm from the centre of a block to its voxels at the corners */
     bool parallel;
     spline_grid places;  /* of the voxels, up to the end of the last blocks; parallel grids only */
-    spline_part part;    /* what candidates of a parallel grid need of its rows */
+    spline_part part;    /* the rows that the candidates of a parallel grid need */
     float *rows;         /* of sdm_spline_rows(), for this part */
     brick_span *span[3]; /* of the blocks along the axes of a parallel grid */
     uint8_t *doubt;      /* [blocks] of sdm_band_doubt(); parallel grids only */
@@ -33,7 +33,7 @@ enum { PIECE = 256, PIECE_OF_ONE = 8 };
 /* Pieces of rows that fill 4 MB, for which sdm_alloc_unset() takes large pages. */
 enum { MANY_PIECES = 1 << 17 };
 
-/* What the values of a candidate show. */
+/* The place of a candidate, judged by its values. */
 typedef enum block_kind { BLOCK_OUTSIDE = 0, BLOCK_INSIDE, BLOCK_NEAR, BLOCK_REFUSED } block_kind;
 
 static void block_position(const sdm_blocks *b, size_t number, int64_t at[3])
@@ -193,7 +193,8 @@ static sdm_status find_change(job *j, sdm_error *err)
     return s;
 }
 
-/* Whether block at[3] with this value at its centre may meet the band. */
+/* Whether the block number at[3] along the axes may meet the band; centre: the value of the field
+   at its centre. */
 static bool may_meet(const job *j, float centre, const int64_t at[3])
 {
     const float beyond = beyond_band(j, centre);
@@ -263,7 +264,7 @@ static void mark_pieces(const job *j, uint8_t *wanted)
 {
     const size_t *first = j->part.first, *n = j->part.n;
     for (size_t i = 0, next; i < j->n; i = next) {
-        // candidates in a row
+        // the candidates i .. next - 1 are neighbours along x
         size_t low[3], end[3];
         int64_t at[3], other[3];
         block_position(j->out, j->candidate[i], at);

@@ -168,17 +168,35 @@ static inline void transpose(four r[4])
     r[3] = __builtin_shufflevector(c, d, 2, 3, 6, 7);
 }
 
-/* The last of the groups of four elements of a row overlaps the one before, if need be. */
-static inline size_t next_four(size_t i, size_t n)
+/* The first of four rows or columns from i on; at the end the last four of all n. */
+static inline size_t four_from(size_t i, size_t n) { return i + 4 <= n ? i : n - 4; }
+
+/* to[column][row] = from[row][column]; rows of `from` are from_step floats apart, rows of `to` are
+   to_step floats apart. */
+static void transpose_matrix(const float *from, size_t from_step, size_t n_rows, size_t n_columns,
+                             float *to, size_t to_step)
 {
-    return i + 4 < n && i + 8 > n ? n - 4 : i + 4;
+    if (n_rows < 4 || n_columns < 4) {
+        for (size_t row = 0; row < n_rows; row++)
+            for (size_t i = 0; i < n_columns; i++)
+                to[i * to_step + row] = from[row * from_step + i];
+        return;
+    }
+    for (size_t i = 0; i < n_rows; i += 4)
+        for (size_t j = 0; j < n_columns; j += 4) {
+            const size_t row = four_from(i, n_rows), column = four_from(j, n_columns);
+            four r[4];
+            for (size_t k = 0; k < 4; k++) r[k] = load(from + (row + k) * from_step + column);
+            transpose(r);
+            for (size_t k = 0; k < 4; k++) *(four_u *)(to + (column + k) * to_step + row) = r[k];
+        }
 }
 
 typedef float lanes __attribute__((vector_size(64)));
 _Static_assert(SPLINE_LINES == 32, "the rows are two vectors");
 
-/* solve() for SPLINE_LINES lines, neighbours in memory: what a step needs of the one before
-   stays in registers, and the two vectors wait for it at the same time. */
+/* solve() for SPLINE_LINES lines, neighbours in memory: the elements of the step before stay in
+   registers, and the two vectors wait for them at the same time. */
 static void solve_rows(lanes (*c)[2], size_t n, const float *factor)
 {
     const size_t last = n - 1;
@@ -200,29 +218,9 @@ static void solve_rows(lanes (*c)[2], size_t n, const float *factor)
 static void fit_rows(const float *values, size_t n, size_t from, const float *factor, float *c,
                      size_t to, float *memory)
 {
-    if (n < 4) {
-        for (size_t l = 0; l < SPLINE_LINES; l++)
-            for (size_t i = 0; i < n; i++) memory[i * SPLINE_LINES + l] = values[l * from + i];
-    }
-    for (size_t i = 0; n >= 4 && i < n; i = next_four(i, n))
-        for (size_t l = 0; l < SPLINE_LINES; l += 4) {
-            four r[4];
-            for (size_t k = 0; k < 4; k++) r[k] = load(values + (l + k) * from + i);
-            transpose(r);
-            for (size_t k = 0; k < 4; k++) *(four_u *)(memory + (i + k) * SPLINE_LINES + l) = r[k];
-        }
+    transpose_matrix(values, from, SPLINE_LINES, n, memory, SPLINE_LINES);
     solve_rows((lanes(*)[2])memory, n, factor);
-    if (n < 4) {
-        for (size_t l = 0; l < SPLINE_LINES; l++)
-            for (size_t i = 0; i < n; i++) c[l * to + i] = memory[i * SPLINE_LINES + l];
-    }
-    for (size_t i = 0; n >= 4 && i < n; i = next_four(i, n))
-        for (size_t l = 0; l < SPLINE_LINES; l += 4) {
-            four r[4];
-            for (size_t k = 0; k < 4; k++) r[k] = load(memory + (i + k) * SPLINE_LINES + l);
-            transpose(r);
-            for (size_t k = 0; k < 4; k++) *(four_u *)(c + (l + k) * to + i) = r[k];
-        }
+    transpose_matrix(memory, SPLINE_LINES, n, SPLINE_LINES, c, to);
 }
 
 static float value(const float *c, size_t line, size_t plane, const float (*weight)[4])

@@ -108,7 +108,8 @@ void write_archive(const char *path, const std::string &temp, const Grid::Ptr &g
 namespace
 {
 
-// reads the temporary file of `path`
+// Reads the level set back from `temp`, the file that will be renamed to `path`. Null: the file is
+// damaged.
 Grid::Ptr read_back(const char *path, const std::string &temp, sdm_error *err)
 {
     bool sealed = false;

@@ -111,8 +111,8 @@ expect 0 - sdmgen collect one -o again.csv -q
 printf 'id,image,label,turns-sphere\nslow,data/l1.nrrd,1,4000\nfast,data/l1.nrrd,1,1\n' >two.csv
 "$program" fit $shape --spacing 1 --eps 1e-2 --cases two.csv -o crash -q >out 2>err &
 pid=$!
-for _ in $(seq 300); do child=$(cat /proc/$pid/task/$pid/children 2>/dev/null) && [ -n "$child" ] && [ -e crash/slow/log.txt ] && break || sleep 0.02; done
-kill -KILL $child || bad 'no child to kill'
+await $pid [ -e crash/slow/log.txt ]
+kill -KILL $(cat /proc/$pid/task/$pid/children) || { bad 'no child to kill'; kill -KILL $pid; }
 wait $pid
 [ $? = 6 ] || bad "a crash: $(cat err)"
 grep -q '^slow,137,"the fit was ended by signal 9 (Killed)' crash/failed.csv || bad "crash: $(cat crash/failed.csv)"
@@ -122,7 +122,7 @@ present crash/fast/fit.json
 printf 'id,image,label,turns-sphere\nslow,data/l1.nrrd,1,4000\n' >slow.csv
 "$program" fit $shape --spacing 1 --eps 1e-2 --cases slow.csv -o stop -q >out 2>err &
 pid=$!
-for _ in $(seq 300); do [ -e stop/slow/log.txt ] && break || sleep 0.02; done
+await $pid [ -e stop/slow/log.txt ]
 present stop/slow/lease-1
 kill -TERM $pid
 wait $pid

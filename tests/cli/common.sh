@@ -11,7 +11,12 @@ coarse_grids=no
 unset SDMGEN_PLUGIN_PATH
 export LC_ALL=C
 
-sdmgen() { "$program" "$@"; }
+# sdmgen ARGUMENT...: runs the program. One that does not end is killed before the time of the whole test is over: so the test tells which.
+if [ "${program##*/emulated/}" = "$program" ]; then
+    sdmgen() { timeout --foreground --signal=KILL 600 "$program" "$@"; }
+else
+    sdmgen() { "$program" "$@"; } # emulators are slow
+fi
 # sdmgen_without PATTERN ARGUMENT...: runs sdmgen without the lines of its stderr that match PATTERN.
 sdmgen_without() {
     local pattern=$1 code
@@ -47,6 +52,21 @@ expect() {
     fi
 }
 
+# await PID COMMAND...: waits until COMMAND succeeds. Fails if the process PID ends before, or after two minutes; then the process is killed.
+await() {
+    local pid=$1 end=$((SECONDS + 120))
+    shift
+    until "$@" 2>/dev/null; do
+        if ! kill -0 "$pid" 2>/dev/null || [ $SECONDS -gt $end ]; then
+            "$@" 2>/dev/null && break # it came true since
+            kill -KILL "$pid" 2>/dev/null
+            bad "never true: $*"
+            return 1
+        fi
+        sleep 0.02
+    done
+}
+
 # stopped_at PATTERN ARGUMENT...: runs sdmgen and sends SIGTERM when its stderr (file `err`) matches PATTERN; the exit code must be 130.
 stopped_at() {
     local pattern=$1 pid code
@@ -54,8 +74,8 @@ stopped_at() {
     : >err # empty it now: the job may start late, and grep would find the text of the previous command
     "$program" "$@" >out 2>err &
     pid=$!
-    for _ in $(seq 300); do grep -Eq -- "$pattern" err && break || sleep 0.2; done
-    kill -TERM $pid
+    await $pid grep -Eq -- "$pattern" err
+    kill -TERM $pid 2>/dev/null
     wait $pid
     code=$?
     [ $code -eq 130 ] || bad "exit code $code when stopped: $* ($(cat err))"

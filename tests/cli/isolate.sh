@@ -43,13 +43,11 @@ for file in map%.nrrd jacobian%.npy run%/model.sdm; do
 done
 
 # a worker ends with the program
+has_children() { [ -n "$(cat "/proc/$1/task/$1/children")" ]; }
 "$program" mesh --shape faulty -O fault=hang "${isolated[@]}" --isolate-seconds 100 -o x.ply 2>err &
 pid=$!
-for _ in $(seq 100); do
-    worker=$(cat /proc/$pid/task/$pid/children 2>err)
-    [ -n "$worker" ] && break || sleep 0.05
-done
-[ -n "$worker" ] || bad "no worker"
+await $pid has_children $pid
+worker=$(cat /proc/$pid/task/$pid/children)
 sleep 0.3
 kill -KILL $pid
 wait $pid 2>err

@@ -45,7 +45,7 @@ children() {
 # One process is killed: all end soon, with one line; the folder has no temporary files.
 "$program" train "$config" data.sampling=error train.steps=1000000 train.checkpoint_seconds=0.1 --out killed -q --ranks 3 2>err &
 pid=$!
-for _ in $(seq 600); do [ -e killed/checkpoint.sdmc ] && break || sleep 0.1; done
+await $pid [ -e killed/checkpoint.sdmc ]
 mapfile -t others < <(children $pid)
 [ ${#others[@]} -eq 2 ] || bad "${#others[@]} processes instead of two"
 begin=$SECONDS
@@ -65,7 +65,7 @@ metrics.jsonl' ] || bad "files after a process was killed: $(ls killed)"
 stopped() {
     "$program" train "$config" data.sampling=error train.steps=1000000 train.checkpoint_seconds=0.05 --out "$1" -q --ranks 3 2>err &
     local pid=$!
-    for _ in $(seq 600); do [ -e "$1/checkpoint.sdmc" ] && break || sleep 0.1; done
+    await $pid [ -e "$1/checkpoint.sdmc" ]
     kill -TERM $pid
     wait $pid
     [ $? -eq 130 ] || bad "exit code after an interrupt: $(cat err)"

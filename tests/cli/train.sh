@@ -11,7 +11,7 @@ interrupted() {
     shift
     "$program" train "$@" train.steps=1000000000 --out "$folder" >out 2>err &
     pid=$!
-    for _ in $(seq 600); do grep -qs '"step": 500,' "$folder/metrics.jsonl" && break || sleep 0.1; done
+    await $pid grep -qs '"step": 500,' "$folder/metrics.jsonl"
     kill -TERM $pid
     wait $pid
     code=$?
@@ -73,7 +73,7 @@ has '^  time        one map on one core: network [0-9.]+ ms, exact engine not me
 # A model that cannot be written, because a folder has its name: the error names the checkpoint, and --quiet does not hide that.
 "$program" train "$tiny" train.steps=2000 --out unwritten --quiet >out 2>err &
 pid=$!
-for _ in $(seq 600); do grep -qs '"step": 50,' unwritten/metrics.jsonl && break || sleep 0.1; done
+await $pid grep -qs '"step": 50,' unwritten/metrics.jsonl
 mkdir unwritten/model.sdm
 wait $pid && bad 'a model that cannot be written: exit code 0'
 grep -q '^sdmgen: error: .*; a checkpoint is in unwritten: go on with --resume$' err || bad "no word of the checkpoint: $(cat err)"

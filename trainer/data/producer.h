@@ -16,11 +16,12 @@ sdm_status trainer_producer_start(dataset *d, size_t first, int n_threads, produ
 /* Lets the workers compute the samples below n_planned, whose points are in d->plan. */
 void trainer_producer_allow(producer *p, size_t n_planned);
 
-/* Number of finished samples that can be taken now without waiting. Called by all ranks. */
+/* Number of finished samples that can be taken now without waiting. Collective: every rank
+   must call it. */
 size_t trainer_producer_ready(producer *p);
 
 /* Moves finished samples into the pool until it holds `until` random samples; waits for unfinished
-   ones. Returns the error of the first sample that failed. Called by all ranks. */
+   ones. Returns the error of the first sample that failed. Collective: every rank must call it. */
 sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err);
 
 /* Stops the workers and frees the producer; NULL does nothing. */

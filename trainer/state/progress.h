@@ -7,7 +7,8 @@
  * which the maps were computed again does not. */
 double trainer_seconds(const trainer *t);
 
-/* The same on all ranks, for decisions: trainer_seconds() of rank 0. Called by all ranks. */
+/* trainer_seconds() of rank 0, on every rank, so that all ranks decide alike. Collective: every
+ * rank must call it. */
 double trainer_shared_seconds(const trainer *t);
 
 /* Seconds of train.minutes in which the network is trained and measured: all, or all but a tenth if
@@ -51,7 +52,7 @@ void trainer_warn(const trainer *t, const char *fmt, ...) SDM_PRINTF(2, 3);
    [any thread] */
 bool trainer_cancelled(const trainer *t);
 
-/* The same on all ranks. Called by all ranks. */
+/* trainer_cancelled() of any rank, on every rank. Collective: every rank must call it. */
 bool trainer_all_cancelled(const trainer *t);
 
 /* true: this rank writes the files of the run. */

@@ -17,7 +17,7 @@
 #define VOXEL_OVER_BLUR_MAX 1.5
 // labels: edge over that of a voxel of the labels
 #define VOXEL_OVER_LABEL_MAX 1.5
-// edge that is advised, over the longest one
+// advised edge of a voxel, over the longest edge that passes
 #define ADVISED 0.8
 // the limit by the details is known to this share of it: an edge so little beyond passes
 #define LIMIT_ERROR 0.05

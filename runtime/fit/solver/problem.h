@@ -34,7 +34,7 @@ typedef struct fit_pose_param {
     double motion[FIT_MOTIONS_MAX];
 } fit_pose_param;
 
-/* The last iterations, see sdm_fit_unrest(). */
+/* The unknowns in the last iterations, from which sdm_fit_unrest() judges convergence. */
 typedef struct fit_recent {
     /* rings of [n_params + 6]: sum of the steps of each unknown so far; the undamped step */
     double position[FIT_RECENT][FIT_PARAMS_MAX + 6], step[FIT_RECENT][FIT_PARAMS_MAX + 6];

@@ -2,6 +2,7 @@
  * forged checkpoints.
  * Tests: checkpoint.c data_files.c file.c history.c progress.c refine.c train_folder.c train.c */
 #include <errno.h>
+#include <pthread.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -116,11 +117,10 @@ static const char *block;
 
 /* Puts a folder in the place of the file `block` while the training runs, and takes it away later.
  */
-static bool block_for_a_while(void *user)
+static void block_or_free(void)
 {
-    (void)user;
     enum { FROM = 150, TO = 300 };
-    if (++calls < FROM || !block) return false;
+    if (++calls < FROM || !block) return;
     if (calls < TO && !blocked) {
         unlink(in_folder(block));
         blocked = !mkdir(in_folder(block), 0700);
@@ -128,6 +128,17 @@ static bool block_for_a_while(void *user)
         assert_int_equal(rmdir(in_folder(block)), 0);
         blocked = 0, block = NULL;
     }
+}
+
+/* The hooks are called by any thread of the training; one at a time works. */
+static pthread_mutex_t hook = PTHREAD_MUTEX_INITIALIZER;
+
+static bool block_for_a_while(void *user)
+{
+    (void)user;
+    pthread_mutex_lock(&hook);
+    block_or_free();
+    pthread_mutex_unlock(&hook);
     return false;
 }
 
@@ -162,7 +173,10 @@ static void files_that_cannot_be_written_do_not_end_a_training(void **state)
 static bool stop_in_training(void *user)
 {
     (void)user;
-    return exists("metrics.jsonl") && ++calls > 60;
+    pthread_mutex_lock(&hook);
+    const bool stop = exists("metrics.jsonl") && ++calls > 60;
+    pthread_mutex_unlock(&hook);
+    return stop;
 }
 
 /* The checkpoint as it is on disk; rewritten with one section changed. */

@@ -15,8 +15,10 @@ static sdm_status compare_map(const sdm_map_store *store, const dataset *d, work
     if (!s) s = trainer_workbench_exact(w, d, m.p, err);
     if (s || !memcmp(map, w->exact, d->n_voxels * sizeof *map)) return s;
     double largest = 0;
-    for (size_t v = 0; v < d->n_voxels; v++)
-        largest = fmax(largest, fabs((double)map[v] - (double)w->exact[v]));
+    for (size_t v = 0; v < d->n_voxels; v++) {
+        const double by = fabs((double)map[v] - (double)w->exact[v]);
+        if (by > largest) largest = by;
+    }
     return sdm_fail(err, SDM_E_CONFIG,
                     "%s: map %zu differs from the one that this program makes by up to %.2g mm: "
                     "another version of sdmgen (%s there, " SDM_VERSION_TEXT

@@ -37,4 +37,17 @@ has '"name": *"mirror image", *"grade": *"failed"'
 has "the mirror image of the shape fits better, by [0-9.]+ .*the other value of the option 'ear' is right"
 expect 4 '^sdmgen: error: left.nii: ' $ear -O ear=right --mirror no --json
 grep -q '"mirror' out && bad '--mirror no fits no mirror image'
+
+# An ellipsoid that covers a torus and its hole: half of what lies deep inside is not labelled, which is no noise.
+cat >hole.yaml <<'END'
+experiment: {title: a torus fitted by an ellipsoid, seed: 6, pictures: no}
+fit: {phantoms: 1, off_mm: 0.5, off_deg: 10, voxel: 0.3, range: 0.6, eps: 1e-4}
+grid: {spacing: 0.3}
+methods:
+  - {name: right, fit: exact, labels: yes, set: {shape.name: torus}}
+  - {name: wrong, fit: exact, labels: yes, shows: right, set: {shape.name: ellipsoid}}
+END
+expect 0 - sdmgen experiment hole.yaml --out hole -q
+grep -q '^1,true,' hole/right/fits.csv || bad "right fit: $(tail -n 1 hole/right/fits.csv)"
+grep -q '^1,false,.*the residuals inside the shape are not noise' hole/wrong/fits.csv || bad "wrong fit: $(tail -n 1 hole/wrong/fits.csv)"
 finish

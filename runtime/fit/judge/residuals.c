@@ -155,7 +155,10 @@ static void side_measure(const fit_problem *p, fit_residuals *r, int side, doubl
         const sdm_fit_law *tissue = main_tissue(p, side);
         r->middle[side] = tissue->mean, r->spread[side] = tissue->sd;
     }
-    if (is_labels(p)) r->middle[side] = side;
+    if (!is_labels(p)) return;
+    r->middle[side] = side;
+    // labels have no noise: where they vary deep inside, the shape lies on two materials
+    if (r->n_deep[side] >= DEEP_LEAST) r->spread[side] = 0;
 }
 
 // Sets place, expected and residual (observed share less expected share) of every voxel.

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "sdm/internal/file.h"
@@ -79,6 +80,20 @@ static void remove_leftovers(const char *folder)
     closedir(list);
 }
 
+/* Locks the file. A process that a killed run has begun may hold the lock a moment longer: the call
+ * waits for it, at most about a second. Returns 0 or the error number. */
+static int lock_file(int fd)
+{
+    const struct timespec pause = {0, 50000000};
+    int code = 0;
+    for (int i = 0; i < 20; i++) {
+        code = flock(fd, LOCK_EX | LOCK_NB) ? errno : 0;
+        if (code != EWOULDBLOCK) break;
+        nanosleep(&pause, NULL);
+    }
+    return code;
+}
+
 static sdm_status fail_taken(const char *folder, int fd, sdm_error *err)
 {
     char who[200] = "";
@@ -115,7 +130,7 @@ sdm_status trainer_folder_take(const char *folder, int *lock, sdm_error *err)
     for (*lock = -1; *lock < 0;) {
         const int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
         if (fd < 0) return sdm_fail(err, SDM_E_IO, "%s: cannot write: %s", path, strerror(errno));
-        const int code = flock(fd, LOCK_EX | LOCK_NB) ? errno : 0;
+        const int code = lock_file(fd);
         const sdm_status s = code == EWOULDBLOCK ? fail_taken(folder, fd, err) : SDM_OK;
         if (!code && is_in_place(path, fd)) {
             *lock = fd;

@@ -1,5 +1,5 @@
 /* Runs the fit of one case in a child process. */
-#define _GNU_SOURCE // prctl(), strsignal()
+#define _GNU_SOURCE // strsignal()
 #include "cohort.h"
 
 #include <errno.h>
@@ -10,25 +10,14 @@
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
-#ifdef __linux__
-#include <sys/prctl.h>
-#endif
 
 #include "report/terminal.h"
+#include "sdm/internal/child.h"
 #include "sdm/internal/clock.h"
 
 #define KILL_SECONDS 20 /* after an interrupt, a fit that does not end by itself is killed */
 
 /* ---- in the child ---- */
-
-/* The child must not go on without its parent, which renews the lease. */
-static void end_with_parent(pid_t parent)
-{
-#ifdef __linux__
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-#endif
-    if (getppid() != parent) _exit(CLI_EXIT_INTERRUPTED);
-}
 
 /* Sends stdout and stderr to the log. */
 static void open_log(const char *folder)
@@ -122,7 +111,7 @@ sdm_status cli_cohort_child(const cli_words *w, const char *folder, cli_cohort_f
     const pid_t child = fork();
     if (child == 0) {
         close(answer[0]);
-        end_with_parent(parent);
+        sdm_child_ends_with(parent); // which renews the lease
         open_log(folder);
         _exit(run_fit(w, folder, fit, answer[1]));
     }

@@ -19,6 +19,7 @@
 #endif
 
 #include "report/terminal.h"
+#include "sdm/internal/child.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/sanitized.h"
@@ -196,8 +197,9 @@ sdm_status cli_read_in_child(const char *path, const char *library, cli_reader *
     const task t = {path, library, read, user, limits_of(file_bytes)};
     int ends[2];
     if (pipe(ends)) return sdm_fail(err, SDM_E_IO, "%s: no pipe: %s", path, strerror(errno));
-    const pid_t pid = fork();
+    const pid_t parent = getpid(), pid = fork();
     if (pid == 0) {
+        sdm_child_ends_with(parent);
         close(ends[0]);
         child(&t, ends[1]);
     }

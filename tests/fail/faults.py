@@ -3,8 +3,8 @@
     faults.py PROGRAM SOURCE OUTPUT_SHIM MEMORY_SHIM [--sample N] [--only CASE] [--seed S]
 
 Each case is a command that writes files, some of which were there before. It is run once without a fault, and then with a fault at the
-n-th operation: by the shims fail_output.c and fail_memory.c. Without --sample all n up to 40 are tried, and 40 random ones beyond; of single
-allocations inside cairo and OpenVDB all n up to 1,000 and the primes beyond. With --sample N N random faults for each case, fewer cases, and
+n-th operation: by the shims fail_output.c and fail_memory.c. Without --sample all output operations are tried, of allocations all n up to 40 and 40
+random ones beyond; of single allocations inside cairo and OpenVDB all n up to 1,000 and the primes beyond. With --sample N N random faults for each case, fewer cases, and
 each k-th allocation where libraries crash or a part of the result may be missing (STRIDES). Whatever fails:
   - the program does not crash, and it ends: with the exit code 0 and every output complete, or with 1 and a message;
   - a file under its final name is the old one or a complete new one, and no temporary file stays (but after a kill);
@@ -204,13 +204,13 @@ class Runner:
         return counts
 
 
-def places(n, chance):
-    """The operations 1 .. n that fail."""
-    return list(range(1, min(n, EVERY) + 1)) + sorted(chance.sample(range(EVERY + 1, n + 1), min(BEYOND, max(0, n - EVERY))))
-
-
-def places_in_libraries(n, _):
-    """All allocations up to DENSE; beyond, those whose number is a prime."""
+def places(case, shim, mode, n, chance):
+    """Those of the operations 1 .. n that fail: all output operations; the first EVERY allocations and BEYOND of the others; of single allocations
+    of libraries the first DENSE and, beyond, those whose number is a prime."""
+    if shim == "output":
+        return list(range(1, n + 1))
+    if not case.of_libraries or mode != "once":
+        return list(range(1, min(n, EVERY) + 1)) + sorted(chance.sample(range(EVERY + 1, n + 1), min(BEYOND, max(0, n - EVERY))))
     return [at for at in range(1, n + 1) if at <= DENSE or all(at % k for k in range(2, int(at**0.5) + 1))]
 
 
@@ -228,8 +228,7 @@ def choose(case, counts, sample, chance):
         if case.name == "experiment":  # messages need no memory
             known += [("memory", "lasting", at) for at in (8, 30)]
         return known + [(shim, mode, chance.randint(1, counts[shim])) for shim, mode in (chance.choice(modes) for _ in range(n))]
-    faults = [(shim, mode, at) for shim, mode in modes
-              for at in (places_in_libraries if case.of_libraries and mode == "once" else places)(counts[shim], chance)]  # fmt: skip
+    faults = [(shim, mode, at) for shim, mode in modes for at in places(case, shim, mode, counts[shim], chance)]
     return faults + [("output", "random", seed) for seed in range(RANDOM_KILLS if case.name == "train" else 0)]
 
 

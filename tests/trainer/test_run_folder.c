@@ -13,6 +13,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -95,6 +96,35 @@ static void killed_run_gives_way(void **state)
     for (size_t i = 0; i < sizeof gone / sizeof *gone; i++) assert_false(exists(gone[i]));
     for (size_t i = 0; i < sizeof kept / sizeof *kept; i++)
         assert_int_equal(remove(in_folder(kept[i])), 0);
+    close(ready[0]);
+    close(ready[1]);
+}
+
+/* A run is killed while it has a child, which holds the lock for a while: the next run waits. */
+static void child_of_killed_run_gives_way(void **state)
+{
+    (void)state;
+    int lock, ready[2];
+    assert_int_equal(pipe(ready), 0);
+    const pid_t run = fork();
+    if (run == 0) {
+        const char got = trainer_folder_take(folder, &lock, NULL) == SDM_OK;
+        const pid_t child = fork();
+        if (child == 0) {
+            nanosleep(&(struct timespec){0, 300000000}, NULL);
+            _exit(0);
+        }
+        if (write(ready[1], &got, 1) == 1) pause();
+        _exit(1);
+    }
+    char got = 0;
+    assert_int_equal(read(ready[0], &got, 1), 1);
+    assert_int_equal(got, 1);
+    kill(run, SIGKILL);
+    assert_int_equal(waitpid(run, NULL, 0), run);
+    sdm_error e = {0};
+    assert_int_equal(trainer_folder_take(folder, &lock, &e), SDM_OK);
+    trainer_folder_leave(folder, lock);
     close(ready[0]);
     close(ready[1]);
 }
@@ -318,6 +348,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_run_has_the_folder),
         cmocka_unit_test(killed_run_gives_way),
+        cmocka_unit_test(child_of_killed_run_gives_way),
         cmocka_unit_test(planted_lock_is_refused),
         cmocka_unit_test(files_that_cannot_be_written_do_not_end_a_training),
         cmocka_unit_test(forged_counters_are_refused),

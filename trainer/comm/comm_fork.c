@@ -9,13 +9,13 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "comm_types.h"
+#include "sdm/internal/child.h"
 #include "sdm/memory.h"
 
 /* Bytes that a rank sends at a time. */
@@ -208,8 +208,7 @@ bool sdm_comm_is_forked(const sdm_comm *c) { return c->backend == &fork_backend;
 /* What a child does first. */
 static void begin_child(forked *f, int rank, pid_t parent)
 {
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != parent) _exit(1); // it has gone before the line above
+    sdm_child_ends_with(parent);
     f->rank = rank;
 }
 

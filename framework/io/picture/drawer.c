@@ -13,6 +13,7 @@
 #include <malloc.h>
 #endif
 
+#include "sdm/internal/child.h"
 #include "sdm/internal/picture_child.h"
 
 /* Seconds of processor time after which a child does not draw any more; the largest picture takes
@@ -24,10 +25,12 @@ static int to_parent; // in the child: the end of the pipe
 
 void sdm_picture_in_child(bool wanted) { child_wanted = wanted; }
 
-/* Prepares the child: a crash ends it without a word. Memory from malloc() is filled with a byte,
- * so that a jump to an address in it never leads back into a function of the program. */
-static void become_child(int fd)
+/* Prepares the child: it ends with its parent, and a crash ends it without a word. Memory from
+ * malloc() is filled with a byte, so that a jump to an address in it never leads back into a
+ * function of the program. */
+static void become_child(pid_t parent, int fd)
 {
+    sdm_child_ends_with(parent);
     static const int crashes[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
     for (size_t i = 0; i < sizeof crashes / sizeof *crashes; i++) signal(crashes[i], SIG_DFL);
     const struct rlimit time = {SECONDS_MAX, SECONDS_MAX}, core = {0, 0};
@@ -96,10 +99,10 @@ sdm_status sdm_drawer_start(const char *path, sdm_drawer_part *part, sdm_error *
     *part = SDM_DRAWS_ITSELF;
     int ends[2];
     if (!child_wanted || pipe(ends)) return SDM_OK;
-    const pid_t pid = fork();
+    const pid_t parent = getpid(), pid = fork();
     if (pid == 0) {
         close(ends[0]);
-        become_child(ends[1]);
+        become_child(parent, ends[1]);
         *part = SDM_DRAWS_AS_CHILD;
         return SDM_OK;
     }

@@ -186,7 +186,7 @@ static sdm_status open_model(job *j, sdm_error *err)
 static sdm_status check_options(const cli_args *args, sdm_error *err)
 {
     const bool grid = args->size[0] > 0 || args->spacing[0] > 0 || !isnan(args->origin[0]) ||
-                      !isnan(args->direction[0]);
+                      !isnan(args->direction[0]) || args->like;
     if (args->columns && !args->points)
         return sdm_fail(err, SDM_E_ARG, "generate: --columns belongs to --points FILE");
     if ((args->measure || args->depths) && (args->points || args->rows))
@@ -196,9 +196,10 @@ static sdm_status check_options(const cli_args *args, sdm_error *err)
     if (!(args->max_error > 0) && strcmp(args->error_of, "max"))
         return sdm_fail(err, SDM_E_ARG, "generate: --error-of does nothing without --max-error MM");
     if (cli_outside(args) != SDM_OUTSIDE_REFUSE && !grid && !args->points)
-        return sdm_fail(err, SDM_E_ARG,
-                        "generate: --outside does nothing on the grid of the model; it is for "
-                        "another grid (--size, --spacing, --origin, --direction) or --points");
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "generate: --outside does nothing on the grid of the model; it is for "
+            "another grid (--size, --spacing, --origin, --direction, --like) or --points");
     return cli_check_vdb_options(args, err);
 }
 

@@ -24,15 +24,18 @@ static sdm_status check_ending(const char *option, const char *path, const char 
 
 static sdm_status check_files(const cli_args *args, sdm_error *err)
 {
-    const char *label = args->phantom.label, *truth = args->phantom.truth;
-    if (args->outputs.n == 0 && !label && !truth && !args->json)
-        return sdm_fail(err, SDM_E_ARG,
-                        "phantom: an output is needed: -o FILE, --label, --truth or --json");
+    const char *label = args->phantom.label, *truth = args->phantom.truth,
+               *surface = args->phantom.surface;
+    if (args->outputs.n == 0 && !label && !truth && !surface && !args->json)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "phantom: an output is needed: -o FILE, --label, --surface, --truth or --json");
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < args->outputs.n && !s; i++)
         s = check_ending("output", args->outputs.items[i], CLI_VOLUME_ENDINGS " .npy", err);
     if (!s) s = check_ending("--label", label, CLI_VOLUME_ENDINGS, err);
     if (!s) s = check_ending("--truth", truth, ".json", err);
+    if (!s) s = check_ending("--surface", surface, CLI_MESH_ENDINGS " .csv .npy", err);
     return s ? s : cli_check_files(args, NULL, err);
 }
 
@@ -115,13 +118,20 @@ static sdm_status make_image(const cli_phantom *p, sdm_error *err)
     return s;
 }
 
+/* Is anything wanted but the surface? */
+static bool wants_image(const cli_args *args)
+{
+    return args->outputs.n > 0 || args->phantom.label || args->phantom.truth || args->json;
+}
+
 sdm_status cmd_phantom(const cli_args *args, sdm_error *err)
 {
     if (!args->shape) return sdm_fail(err, SDM_E_ARG, "phantom: --shape NAME is needed");
     cli_phantom p = {.args = args};
     sdm_status s = check_files(args, err);
     if (!s) s = cli_phantom_setup(&p, err);
-    if (!s) s = make_image(&p, err);
+    if (!s && wants_image(args)) s = make_image(&p, err);
+    if (!s) s = cli_phantom_surface(&p, err);
     cli_shape_dispose(&p.shape);
     return s;
 }

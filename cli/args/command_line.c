@@ -233,6 +233,7 @@ static void set_phantom_defaults(cli_phantom_args *p)
                                    .blur = {NAN, NAN, NAN},
                                    .texture = NAN,
                                    .noise = NAN,
+                                   .surface_noise = NAN,
                                    .type = "int16"};
     *p = none;
 }

@@ -236,6 +236,8 @@ const cli_option cli_options[] = {
     {"direction", 0, CLI_REAL9, "XX,XY,...", NULL, -1, 1, ON(CLI_GENERATE), AT(direction),
      "axes of the grid: orthonormal matrix, row by row, whose columns are the axes (default: the "
      "model's)"},
+    {"like", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_EXACT) | ON(CLI_GENERATE) | ON(CLI_PHANTOM),
+     AT(like), "the grid of a model (.sdm) or of an image, whole: size, spacing, place and axes"},
     {"outside", 0, CLI_CHOICE, NULL, "refuse|bound|exact", 0, 0, ON(CLI_GENERATE), AT(outside),
      "voxels outside the box of the model's voxel centres: refuse (default), a lower bound of the "
      "distance, or the exact distance"},
@@ -461,6 +463,14 @@ const cli_option cli_options[] = {
      ".mha"},
     {"truth", 0, CLI_TEXT, "FILE.json", NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.truth),
      "also write the truth: shape, parameters, pose, grid and the settings of the image"},
+    {"surface", 0, CLI_TEXT, "FILE", NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.surface),
+     "also write the surface in its pose: .ply .stl .obj .off .vtk .vtp, or points spread evenly "
+     "over it: .csv .npy"},
+    {"surface-points", 0, CLI_INT, "N", NULL, 1, 100000000, ON(CLI_PHANTOM),
+     AT(phantom.surface_points), "number of points of --surface FILE.csv (default 2000)"},
+    {"surface-noise", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_PHANTOM), AT(phantom.surface_noise),
+     "standard deviation of the noise along each axis in the points of --surface FILE.csv (default "
+     "0)"},
 
     /* fits: target and start */
     {"exact", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(fit.exact),

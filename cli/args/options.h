@@ -102,7 +102,9 @@ typedef struct cli_phantom_args {
     double blur[3], texture, noise;
     bool white_noise;
     int64_t supersample; /* 0: option missing */
-    const char *type, *label, *truth;
+    const char *type, *label, *truth, *surface;
+    int64_t surface_points; /* 0: option missing */
+    double surface_noise;
 } cli_phantom_args;
 
 /* Options of `fit` alone; numbers are NaN when their option is missing. */
@@ -191,6 +193,7 @@ struct cli_args {
     double max_mse;                  /* eval: mm^2 */
     double spacing[3], origin[3];    /* mm */
     double direction[9];             /* generate; direction[0] NaN: option missing */
+    const char *like;                /* exact, generate, phantom */
     const char *outside;             /* generate */
     int64_t size[3];                 /* voxels */
     int64_t samples;                 /* eval, verify, shapes */

@@ -36,6 +36,8 @@ sdm_status cli_model_grid(const cli_args *args, const sdm_grid *model, sdm_grid 
     const bool has_size = args->size[0] > 0, has_spacing = args->spacing[0] > 0,
                has_origin = isfinite(args->origin[0]), has_direction = isfinite(args->direction[0]);
     double centre[3], edge[3], middle[3], world[3];
+    *own = false;
+    if (args->like) return cli_like_grid(args, out, err);
     *out = *model;
     *own = !has_size && !has_spacing && !has_origin && !has_direction;
     if (*own) return SDM_OK;

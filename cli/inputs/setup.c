@@ -376,6 +376,7 @@ sdm_status cli_allocate_map(const sdm_grid *grid, float **values, sdm_error *err
 sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const double max[3],
                             sdm_grid *out, sdm_error *err)
 {
+    if (args->like) return cli_like_grid(args, out, err);
     const double longest = fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
     const double margin = 0.1 * longest;
     const bool has_size = args->size[0] > 0, has_spacing = args->spacing[0] > 0;

@@ -91,17 +91,23 @@ void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm
  * SDM_E_NOMEM: names the voxels and the options that make fewer. */
 sdm_status cli_allocate_map(const sdm_grid *grid, float **values, sdm_error *err);
 
-/* *out = the axis-aligned grid of --size, --spacing and --origin. Missing options are chosen so
- * that the grid covers the box min .. max (mm) with a margin of 0.1 times its longest edge;
- * without --size and --spacing it has 64 voxels along that edge, margins included. SDM_E_ARG. */
+/* *out = the grid of the file of --like, a model or an image. SDM_E_ARG: another option of the grid
+ * is given, too, or the file has another type; errors of sdm_model_open() and sdm_volume_read(). */
+sdm_status cli_like_grid(const cli_args *args, sdm_grid *out, sdm_error *err);
+
+/* *out = the grid of --like or the axis-aligned grid of --size, --spacing and --origin. Missing
+ * options are chosen so that the grid covers the box min .. max (mm) with a margin of 0.1 times its
+ * longest edge; without --size and --spacing it has 64 voxels along that edge, margins included.
+ * SDM_E_ARG; errors of cli_like_grid(). */
 sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const double max[3],
                             sdm_grid *out, sdm_error *err);
 
-/* *out = the grid of --size, --spacing, --origin and --direction for maps of a model. Without
+/* *out = the grid of --like, or of --size, --spacing, --origin and --direction, for maps of a
+ * model. Without
  * --size it fills the box of the voxel centres of the model's grid; without --spacing it is that of
  * the model, or with --size the smallest uniform one with which the grid covers the box; without
  * --origin the grid has the centre of the box; without --direction the axes are the model's. *own:
- * no option is given, the grid is that of the model. SDM_E_ARG. */
+ * no option is given, the grid is that of the model. SDM_E_ARG; errors of cli_like_grid(). */
 sdm_status cli_model_grid(const cli_args *args, const sdm_grid *model, sdm_grid *out, bool *own,
                           sdm_error *err);
 

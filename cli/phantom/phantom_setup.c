@@ -4,6 +4,7 @@
 
 #include "inputs/grid_cut.h"
 #include "phantom_command.h"
+#include "report/files.h"
 #include "report/report_audit.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
@@ -139,6 +140,22 @@ static void warn_cut(const sdm_grid *g, const double min[3], const double max[3]
     cli_warn_cut_shape(g, ends, 2, "a larger field of view (--size, --spacing, --origin) holds it");
 }
 
+/* The grid of --like. */
+static sdm_status grid_like(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
+{
+    const sdm_status s = cli_like_grid(p->args, &p->grid, err);
+    if (s) return s;
+    for (size_t v = 0; v < mesh->n_vert; v++) {
+        double *x = mesh->vert + 3 * v, index[3];
+        sdm_pose_apply(&p->pose, x, x);
+        sdm_grid_index(&p->grid, x, index);
+        for (int i = 0; i < 3; i++) p->cut |= index[i] < 0 || index[i] > (double)(p->grid.n[i] - 1);
+    }
+    cli_warn_cut_shape(&p->grid, mesh->vert, mesh->n_vert,
+                       "another pose (--translation, --rotation) or grid holds it");
+    return SDM_OK;
+}
+
 /* Makes the grid: fits it to the shape in the frame of the image, crops it, then moves it to the
  * world. */
 static sdm_status grid_make(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
@@ -149,6 +166,7 @@ static sdm_status grid_make(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
     const sdm_pose frame = {.rotation = {isnan(turn[0]) ? 0 : turn[0], isnan(turn[1]) ? 0 : turn[1],
                                          isnan(turn[2]) ? 0 : turn[2]}};
     double min[3], max[3];
+    if (args->like) return grid_like(p, mesh, err);
     mesh_to_image_frame(p, &frame, mesh, min, max);
     if (placed && !isnan(args->phantom.crop[0]))
         return sdm_fail(
@@ -178,6 +196,11 @@ static sdm_status check_options(const cli_args *args, sdm_error *err)
                         "phantom: --air does nothing without --air-cells SHARE,MM,CLEAR");
     if (a->white_noise && a->noise <= 0)
         return sdm_fail(err, SDM_E_ARG, "phantom: --white-noise does nothing with --noise 0");
+    if ((a->surface_points || !isnan(a->surface_noise)) &&
+        !(a->surface && cli_ends_with_any(a->surface, ".csv .npy")))
+        return sdm_fail(err, SDM_E_ARG,
+                        "phantom: --surface-%s does nothing without --surface FILE.csv or FILE.npy",
+                        a->surface_points ? "points" : "noise");
     return SDM_OK;
 }
 

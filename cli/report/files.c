@@ -65,13 +65,10 @@ static bool is_same_file(const char *a, const char *b)
  * options are included. */
 static sdm_status find_inputs(const cli_args *args, cli_list *out, sdm_error *err)
 {
-    const char *const single[] = {args->mesh,
-                                  args->rows,
-                                  args->points,
-                                  args->fit.reference,
-                                  args->fit.start_points,
-                                  args->import.surface,
-                                  args->import.particles};
+    const char *const single[] = {args->mesh,           args->rows,
+                                  args->points,         args->like,
+                                  args->fit.reference,  args->fit.start_points,
+                                  args->import.surface, args->import.particles};
     const size_t n_single = sizeof single / sizeof *single;
     const sdm_status s =
         SDM_ALLOC(&out->items, args->files.n + args->options.n + n_single, "names of files", err);
@@ -88,9 +85,10 @@ static sdm_status find_inputs(const cli_args *args, cli_list *out, sdm_error *er
 
 static sdm_status find_outputs(const cli_args *args, cli_list *out, sdm_error *err)
 {
-    const char *const single[] = {
-        args->closest,       args->normal, args->triangle,      args->jacobian,      args->gradient,
-        args->fit.label_out, args->report, args->phantom.label, args->phantom.truth, args->returns};
+    const char *const single[] = {args->closest,         args->normal,        args->triangle,
+                                  args->jacobian,        args->gradient,      args->fit.label_out,
+                                  args->report,          args->phantom.label, args->phantom.truth,
+                                  args->phantom.surface, args->returns};
     const size_t n_single = sizeof single / sizeof *single;
     const sdm_status s = SDM_ALLOC(&out->items, args->outputs.n + n_single, "names of files", err);
     if (s) return s;

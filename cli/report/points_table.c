@@ -68,11 +68,12 @@ sdm_status cli_points_check(const cli_args *args, cli_points_table *t, sdm_error
         return sdm_fail(err, SDM_E_ARG, "exact --points: an output is needed: -o FILE.csv or .npy");
     if (strcmp(args->method, "exact") || args->certify || args->narrow > 0 || args->json ||
         args->closest || args->normal || args->triangle || args->jacobian || args->size[0] > 0 ||
-        args->spacing[0] > 0 || !isnan(args->origin[0]))
-        return sdm_fail(err, SDM_E_ARG,
-                        "exact --points: options of maps (--size, --spacing, --origin, --method, "
-                        "--narrow, --certify, --json, --closest, --normal, --triangle, --jacobian) "
-                        "do not apply; use --columns");
+        args->spacing[0] > 0 || !isnan(args->origin[0]) || args->like)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "exact --points: options of maps (--size, --spacing, --origin, --like, --method, "
+            "--narrow, --certify, --json, --closest, --normal, --triangle, --jacobian) "
+            "do not apply; use --columns");
     return check_outputs(args, err);
 }
 
@@ -95,11 +96,12 @@ sdm_status cli_points_check_model(const cli_args *args, cli_points_table *t, sdm
                         "generate --points: an output is needed: -o FILE.csv or .npy, --jacobian");
     if (args->rows || args->check || args->max_error > 0 || args->gradient || args->json ||
         args->size[0] > 0 || args->spacing[0] > 0 || !isnan(args->origin[0]) ||
-        !isnan(args->direction[0]))
-        return sdm_fail(err, SDM_E_ARG,
-                        "generate --points: options of maps (--size, --spacing, --origin, "
-                        "--direction, --params, --check, --max-error, --gradient, --json) do not "
-                        "apply; use --columns");
+        !isnan(args->direction[0]) || args->like)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "generate --points: options of maps (--size, --spacing, --origin, "
+            "--direction, --like, --params, --check, --max-error, --gradient, --json) do not "
+            "apply; use --columns");
     if (args->jacobian && !cli_ends_with(args->jacobian, ".npy"))
         return sdm_fail(err, SDM_E_ARG, "--jacobian '%s': its name must end in .npy",
                         args->jacobian);

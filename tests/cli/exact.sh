@@ -142,6 +142,25 @@ for quiet in '' --quiet; do # a warning remains
     expect 0 '^sdmgen: warning: the mesh is open: [0-9]+ boundary edges' sdmgen exact --mesh open.off "${grid[@]}" -o open.npy $quiet
 done
 
+# --like: the grid of an image or of a model.
+sdmgen exact --mesh cube.off --size 12,11,10 --spacing 0.5 --origin=-2.75,-2.5,-2.25 --quiet -o grid.nrrd
+expect 0 - sdmgen exact --mesh cube.off --like grid.nrrd --quiet -o like.nrrd
+expect 0 - sdmgen exact --mesh cube.off --size 12,11,10 --spacing 0.5 --origin=-2.75,-2.5,-2.25 --quiet -o given.nrrd
+cmp given.nrrd like.nrrd || bad 'the grid of --like'
+model=$source_folder/tests/golden/pod_i8.sdm
+expect 0 - sdmgen generate "$model" --quiet -o of_model.nrrd
+expect 0 - sdmgen exact --shape capsule --like "$model" --quiet -o of_shape.nrrd
+head -n 12 of_model.nrrd | grep -aE '^(sizes|space)' >a.txt
+head -n 12 of_shape.nrrd | grep -aE '^(sizes|space)' >b.txt
+[ -s a.txt ] && cmp a.txt b.txt || bad 'the grid of a model'
+expect 2 'like and --spacing exclude each other' sdmgen exact --mesh cube.off --like grid.nrrd --spacing 1 -o x.npy
+expect 2 "like 'cube.off': its name must end in .sdm" sdmgen exact --mesh cube.off --like cube.off -o x.npy
+expect 1 'nix.nrrd' sdmgen exact --mesh cube.off --like nix.nrrd -o x.npy
+expect 2 "would overwrite the input 'grid.nrrd'" sdmgen exact --mesh cube.off --like grid.nrrd -o grid.nrrd
+expect 2 'options of maps .*--like' sdmgen exact --mesh cube.off --points points.csv --like grid.nrrd -o x.csv
+sdmgen exact --mesh cube.off --size 9,9,9 --spacing 9 --quiet -o wide.nrrd 2>/dev/null
+expect 5 'other points need --outside bound or exact' sdmgen generate "$model" --like wide.nrrd -o x.npy
+
 # --certify: signs compared with crossings along y and z.
 expect 0 '343 of 343 voxels compared with crossings along y and z, all agree' sdmgen exact --mesh cube.off "${grid[@]}" --json --certify
 near "$(json sign_checked)" 1 0

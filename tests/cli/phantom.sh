@@ -99,6 +99,33 @@ expect 2 "type 'float': need one of int16\|float32" sdmgen phantom $small -o x.n
 expect 5 'rx.* 9' sdmgen phantom $small -p rx=9 -o x.nii --label l.nii --truth t.json
 expect 5 'rx.* nan' sdmgen phantom $small -p rx=nan -o x.nii
 expect 2 "did you mean 'ellipsoid'" sdmgen phantom --shape elipsoid -o x.nii
+# The surface in its pose: a mesh, or points, whose noise has the stated standard deviation; nothing else is made.
+expect 0 - sdmgen phantom $small --translation 5,0,0 --surface moved.stl --quiet
+expect 0 - sdmgen mesh --mesh moved.stl --json
+[ "$(json closed)" = true ] || bad 'the surface of a phantom is open'
+expect 0 - sdmgen phantom $small --translation 5,0,0 --rotation 0,0,0.5 --surface even.csv --surface-points 3000 --quiet
+expect 0 - sdmgen phantom $small --translation 5,0,0 --rotation 0,0,0.5 --surface even.npy --surface-points 3000 --quiet
+expect 0 - sdmgen phantom $small --translation 5,0,0 --rotation 0,0,0.5 --surface noisy.csv --surface-points 3000 --surface-noise 0.2 --seed 7 --quiet
+[ "$(wc -l <noisy.csv)" = 3001 ] || bad 'number of points'
+# shellcheck disable=SC2046
+near $(paste -d, even.csv noisy.csv | awk -F, 'NR > 1 { for (i = 1; i < 4; i++) { d = $(i + 3) - $i; s += d * d; n++ } } END { print sqrt(s / n) }') 0.2 0.01
+# shellcheck disable=SC2046
+near $(awk -F, 'NR > 1 { s += $1; n++ } END { print s / n }' even.csv) 5 0.02
+[ "$(stat -c %s even.npy)" -gt 72000 ] || bad 'points as an array'
+expect 2 'surface-noise does nothing without --surface FILE.csv' sdmgen phantom $small --surface x.stl --surface-noise 1
+expect 2 'surface-points does nothing without --surface FILE.csv' sdmgen phantom $small --label x.nii --surface-points 9
+expect 2 "surface 'x.txt': its name must end in .ply .stl" sdmgen phantom $small --surface x.txt
+
+# --like: the grid of another image, turned axes included.
+expect 0 - sdmgen phantom $small --frame 0.3,0.2,0 -o frame.nrrd --quiet
+expect 0 - sdmgen phantom --shape ellipsoid --like frame.nrrd -o same.nrrd --quiet
+for file in frame same; do # to 12 digits: the axes are normalised when they are read
+    head -n 12 $file.nrrd | grep -aE '^(sizes|space)' | sed -E 's/([0-9]\.[0-9]{12})[0-9]*/\1/g' >$file.txt
+done
+[ -s same.txt ] && cmp frame.txt same.txt || bad 'another image on the same grid'
+expect 0 'the surface leaves the grid' sdmgen phantom --shape ellipsoid --like frame.nrrd --translation 3,0,0 -o far.nrrd
+expect 2 'like and --frame exclude each other' sdmgen phantom --shape ellipsoid --like frame.nrrd --frame 0,0,1 -o x.nii
+expect 2 'like and --crop exclude each other' sdmgen phantom --shape ellipsoid --like frame.nrrd --crop 0,0,0.5 -o x.nii
 # Work of long duration stops on SIGTERM.
 # --foreground: without it timeout sends the signal twice, and a second one stops the program at once, without a message
 expect 130 'stopped on request|interrupted' timeout --foreground --preserve-status -s TERM 1 "$program" phantom --shape ellipsoid --spacing 0.03 --supersample 16 -o x.nii

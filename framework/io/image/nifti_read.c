@@ -177,7 +177,7 @@ static void compare_frames(const nifti *f, const sdm_image_header *h, double mm,
         for (size_t row = 0; row < 3; row++) {
             double d = s.origin[row] - q.origin[row];
             for (size_t a = 0; a < 3; a++)
-                d += (corner >> a & 1) * (double)(h->n[a] - 1) *
+                d += (corner >> a & 1) * ((double)h->n[a] - 1) *
                      (s.step[3 * row + a] - q.step[3 * row + a]);
             square += d * d;
         }

@@ -64,9 +64,9 @@ typedef struct sdm_vdb_report {
    centres), and where the band leaves the grid it continues outside: by opts->map(), else by
    estimates (report->estimated_voxels).
 
-   SDM_E_ARG: nothing is inside; voxels of a level set are not uniform (the message names --dense);
-   voxels are below 2e-5 mm (1e-3 mm on rotated axes). The file ends with a checksum of all its
-   bytes, which other readers of OpenVDB files ignore. */
+   SDM_E_ARG: nothing is inside; voxels of a level set are not uniform (the message names the
+   remedy, opts->dense); voxels are below 2e-5 mm (1e-3 mm on rotated axes). The file ends with a
+   checksum of all its bytes, which other readers of OpenVDB files ignore. */
 SDM_API sdm_status sdm_vdb_write(const char *path, const sdm_grid *grid, const float *values,
                                  const sdm_vdb_opts *opts, sdm_vdb_report *report, sdm_error *err);
 

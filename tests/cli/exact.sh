@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen exact: values against closed forms, every type of output, bad meshes, no partial files.
-# Tests: cmd_exact.c json_describe.c json_values.c output.c report_audit.c grid_cut.c
+# Tests: cmd_exact.c json_describe.c json_values.c output.c report_audit.c grid_cut.c like_grid.c box_grid.c
 . "$(dirname "$0")/common.sh"
 
 # floats FILE SKIP: the float32 values after SKIP bytes, one per line.

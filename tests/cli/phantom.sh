@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen phantom: image, labels, truth; mistakes; no partial files.
-# Tests: cmd_phantom.c phantom_setup.c phantom_truth.c
+# Tests: cmd_phantom.c phantom_setup.c phantom_surface.c phantom_truth.c
 . "$(dirname "$0")/common.sh"
 
 # values FILE: all float32 values of a .npy file, one per line.

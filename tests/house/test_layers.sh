@@ -38,7 +38,7 @@ check() {
     function own(part, list,   n, p, i) { n = split(list, p, " "); for (i = 1; i <= n; i++) owner[p[i] ".h"] = part }
     BEGIN {
         own("core", "blocks export grid memory pose shape status") # shape: types alone
-         own("core", "block_border box checksum clock container distribution envelope file foreign heap json_describe json_read mat3 near processor rng rotation sampling sanitized sha256 shared table team text threads units utf8 vec3")
+         own("core", "block_border box checksum child clock container distribution envelope file foreign heap json_describe json_read mat3 near processor rng rotation sampling sanitized sha256 shared table team text threads units utf8 vec3")
          own("config", "config experiment mistakes")
         own("geom", "exact isosurface mesh")
         own("geom", "brute_force builder methods part_audit")

@@ -1,6 +1,7 @@
 /* The folder of a run: its lock, what killed runs leave, files that cannot be written for a while,
  * forged checkpoints.
- * Tests: checkpoint.c child.c data_files.c file.c history.c progress.c refine.c train_folder.c train.c */
+ * Tests: checkpoint.c child.c data_files.c file.c history.c progress.c refine.c train_folder.c
+ * train.c */
 #include <errno.h>
 #include <pthread.h>
 #include <setjmp.h>

@@ -111,7 +111,7 @@ sdm_status cli_cohort_child(const cli_words *w, const char *folder, cli_cohort_f
     const pid_t child = fork();
     if (child == 0) {
         close(answer[0]);
-        sdm_child_ends_with(parent); // which renews the lease
+        sdm_child_ends_with(parent); // only the parent renews the lease of the case
         open_log(folder);
         _exit(run_fit(w, folder, fit, answer[1]));
     }

@@ -1,4 +1,5 @@
-/* The grid of maps of a surface: that of --like, or one about its box. */
+/* Chooses the grid of a map: the one that --like names, or one that covers the bounding box of the
+ * surface. */
 #include <math.h>
 
 #include "setup.h"
@@ -15,7 +16,7 @@ sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const dou
                         "the surface is the single point (%g, %g, %g), and there is no voxel size "
                         "that suits it: give --spacing and --size",
                         min[0], min[1], min[2]);
-    // spacing
+    // the edge of a voxel along each axis, mm
     double spacing[3];
     int64_t n[3];
     for (int i = 0; i < 3; i++)
@@ -28,7 +29,7 @@ sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const dou
                                   (double)(args->size[i] > 1 ? args->size[i] - 1 : 1));
         for (int i = 0; i < 3; i++) spacing[i] = need;
     }
-    // number of voxels
+    // how many voxels cover the box along each axis
     for (int i = 0; i < 3; i++) {
         const double cells = (max[i] - min[i] + 2 * margin) / spacing[i];
         if (!has_size && !(cells < 1048576))
@@ -38,7 +39,7 @@ sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const dou
                 spacing[i], max[i] - min[i]);
         n[i] = has_size ? args->size[i] : (int64_t)ceil(cells - 1e-9) + 1;
     }
-    // origin
+    // the centre of the first voxel
     const double centre[3] = {0.5 * (min[0] + max[0]), 0.5 * (min[1] + max[1]),
                               0.5 * (min[2] + max[2])};
     *out = sdm_grid_centred(n, spacing[0], centre);

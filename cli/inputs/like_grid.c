@@ -1,6 +1,5 @@
-/* The grid of --like: that of a model or of an image. */
+/* Reads the grid of the file that --like names, a model or an image. */
 #include <math.h>
-#include <string.h>
 
 #include "report/files.h"
 #include "report/terminal.h"
@@ -24,7 +23,7 @@ static sdm_status check_options(const cli_args *args, sdm_error *err)
 static sdm_status read_model(const cli_args *args, sdm_grid *out, sdm_error *err)
 {
     sdm_model *model = NULL;
-    // --expect is the hash of the model whose maps are made
+    // --expect states the hash of the model that makes maps; this one only lends its grid
     cli_args other = *args;
     other.expect = NULL;
     const sdm_status s = cli_open_model(&other, args->like, &model, err);

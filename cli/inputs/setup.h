@@ -91,8 +91,9 @@ void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm
  * SDM_E_NOMEM: names the voxels and the options that make fewer. */
 sdm_status cli_allocate_map(const sdm_grid *grid, float **values, sdm_error *err);
 
-/* *out = the grid of the file of --like, a model or an image. SDM_E_ARG: another option of the grid
- * is given, too, or the file has another type; errors of sdm_model_open() and sdm_volume_read(). */
+/* *out = the grid of the file that --like names, a model or an image. SDM_E_ARG: --size or another
+ * option that states a grid is given, too, or the file has another type; errors of sdm_model_open()
+ * and sdm_volume_read(). */
 sdm_status cli_like_grid(const cli_args *args, sdm_grid *out, sdm_error *err);
 
 /* *out = the grid of --like or the axis-aligned grid of --size, --spacing and --origin. Missing

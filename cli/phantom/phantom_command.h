@@ -22,8 +22,8 @@ sdm_status cli_phantom_setup(cli_phantom *p, sdm_error *err);
 /* Number of points of --surface FILE.csv without --surface-points. */
 #define CLI_SURFACE_POINTS 2000
 
-/* Writes the file of --surface, if given: the mesh in its pose, or points on it. Errors of
- * sdm_instance_mesh(), sdm_fit_surface_points() and of writing. */
+/* Writes the surface to the file that --surface names, if the option is given: the mesh in its
+ * pose, or points on it. Errors of sdm_instance_mesh(), sdm_fit_surface_points() and of writing. */
 sdm_status cli_phantom_surface(const cli_phantom *p, sdm_error *err);
 
 /* Adds the truth as one JSON object; inside: the number of voxels with label 1. */

@@ -140,7 +140,8 @@ static void warn_cut(const sdm_grid *g, const double min[3], const double max[3]
     cli_warn_cut_shape(g, ends, 2, "a larger field of view (--size, --spacing, --origin) holds it");
 }
 
-/* The grid of --like. */
+/* Gives the image the grid of the file that --like names, and warns if the shape, moved to its pose
+ * here, leaves this grid. */
 static sdm_status grid_like(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
 {
     const sdm_status s = cli_like_grid(p->args, &p->grid, err);

@@ -1,14 +1,12 @@
 /* Writes the surface of a phantom in its pose: the mesh, or points on it. */
-#include <math.h>
-#include <string.h>
 
 #include "phantom_command.h"
 #include "report/files.h"
 #include "sdm/fit.h"
-#include "sdm/internal/file.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/npy.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/table.h"
 #include "sdm/internal/text.h"
 #include "sdm/meshfile.h"
 
@@ -24,17 +22,12 @@ static void add_noise(const cli_phantom *p, size_t n, double *points)
 
 static sdm_status write_table(const char *path, const double *points, size_t n, sdm_error *err)
 {
-    sdm_outfile *file = NULL;
     sdm_text text = {0};
     sdm_text_add(&text, "x,y,z\n");
     for (size_t i = 0; i < n; i++)
         sdm_text_add(&text, "%.9g,%.9g,%.9g\n", points[3 * i], points[3 * i + 1],
                      points[3 * i + 2]);
-    sdm_status s = text.failed ? sdm_fail(err, SDM_E_NOMEM, "%s: no memory for the points", path)
-                               : sdm_outfile_open(path, &file, err);
-    if (!s) s = sdm_outfile_write(file, text.data, text.size, err);
-    if (!s) s = sdm_outfile_commit(&file, err);
-    sdm_outfile_discard(&file);
+    const sdm_status s = sdm_text_write(&text, path, err);
     sdm_text_dispose(&text);
     return s;
 }

@@ -1,4 +1,4 @@
-/* Ends a child process with its parent. */
+/* Has the system kill a child process when its parent ends. */
 #include "sdm/internal/child.h"
 
 #ifdef __wasi__ // has no processes
@@ -16,6 +16,6 @@ void sdm_child_ends_with(long parent)
 #ifdef __linux__
     prctl(PR_SET_PDEATHSIG, SIGKILL);
 #endif
-    if (getppid() != parent) _exit(1); // the parent has ended before the line above
+    if (getppid() != parent) _exit(1); // the parent had ended before prctl(): no signal will come
 }
 #endif

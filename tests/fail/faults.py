@@ -3,9 +3,9 @@
     faults.py PROGRAM SOURCE OUTPUT_SHIM MEMORY_SHIM [--sample N] [--only CASE] [--seed S]
 
 Each case is a command that writes files, some of which were there before. It is run once without a fault, and then with a fault at the
-n-th operation: by the shims fail_output.c and fail_memory.c. Without --sample all output operations are tried, of allocations all n up to 40 and 40
-random ones beyond; of single allocations inside cairo and OpenVDB all n up to 1,000 and the primes beyond. With --sample N N random faults for each case, fewer cases, and
-each k-th allocation where libraries crash or a part of the result may be missing (STRIDES). Whatever fails:
+n-th operation: by the shims fail_output.c and fail_memory.c. Without --sample all output operations are tried, of allocations all n up to 40 and
+40 random ones beyond; of single allocations inside cairo and OpenVDB all n up to 1,000 and the primes beyond. With --sample N N random faults
+for each case, fewer cases, and each k-th allocation where libraries crash or a part of the result may be missing (STRIDES). Whatever fails:
   - the program does not crash, and it ends: with the exit code 0 and every output complete, or with 1 and a message;
   - a file under its final name is the old one or a complete new one, and no temporary file stays (but after a kill);
   - a training that was killed goes on with --resume to a model of the same bits.

@@ -11,8 +11,13 @@ coarse_grids=no
 unset SDMGEN_PLUGIN_PATH
 export LC_ALL=C
 
+# emulated: whether an emulator runs the program, by a script of one line; binary: the file of the program itself.
+emulated=no binary=$program
+if [ "${program##*/emulated/}" != "$program" ]; then
+    emulated=yes binary=$(sed -n "s/.*'\(.*\)'.*/\1/p" "$program")
+fi
 # sdmgen ARGUMENT...: runs the program. One that does not end is killed before the time of the whole test is over: so the test tells which.
-if [ "${program##*/emulated/}" = "$program" ]; then
+if [ $emulated = no ]; then
     sdmgen() { timeout --foreground --signal=KILL 600 "$program" "$@"; }
 else
     sdmgen() { "$program" "$@"; } # emulators are slow

@@ -145,7 +145,8 @@ done
 absent ended.ply
 expect 0 - sdmgen mesh --shape faulty -O fault=crash -p size=1.5 --plugin "$plugin" -o fine.ply
 
-# an angle in degrees that the plug-in takes for radians
+# an angle in degrees that the plug-in takes for radians; an emulated program cannot load the file that cc builds
+[ $emulated = no ] || { finish && exit 0; }
 sed -E 's/"mm"/"rad"/; s/\.min = [0-9.]+/.min = 120/; s/\.max = [0-9.]+/.max = 140/; s/\.def = [0-9.]+/.def = 130/' \
     "$source_folder/examples/plugin/octahedron.c" >degrees.c
 cc -shared -fPIC -I"$source_folder/framework/include" degrees.c -o degrees.so -lm || bad 'the plug-in degrees.so was not built'

@@ -12,7 +12,7 @@ unknown() { # unknown PROGRAM: the pieces of the messages that PROGRAM does not 
         grep -aqF -- "$piece" "$1" || echo "$piece"
     done
 }
-[ -z "$(unknown "$program")" ] || bad "the program has no such message: $(unknown "$program")"
+[ -z "$(unknown "$binary")" ] || bad "the program has no such message: $(unknown "$binary")"
 [ -n "$(unknown /bin/true)" ] || bad 'messages are found where they are not'
 
 # keys and options in the whole page

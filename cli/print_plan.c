@@ -69,8 +69,7 @@ static void print_text(const sdm_train_work *w, const sdm_train_plan *p, int nod
     if (w->fit_step > 0) printf(", %.3g steps a second on a core", 1 / w->fit_step);
     printf("\n");
     print_stages(w, p);
-    printf("  memory   %s on each node, and as much for each further rank on it\n",
-           format_bytes(p->memory, a));
+    printf("  memory   %s on each node, with one rank on it\n", format_bytes(p->memory, a));
     printf("  files    model %s, checkpoint up to %s; all maps would take %s if they were kept "
            "(sdmgen dataset)\n",
            format_bytes(p->model, a), format_bytes(p->checkpoint, b), format_bytes(p->dataset, c));

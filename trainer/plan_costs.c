@@ -11,17 +11,26 @@ const char *sdm_plan_stage_name(sdm_plan_stage stage)
     return names[stage];
 }
 
-/* Bytes that all nodes gather together in each stage; a node has its own part of them already. */
-static void gathered_bytes(const sdm_train_work *w, double bytes[SDM_PLAN_STAGES])
+/* Voxels of each training map that a node keeps: nodes that share the work keep equal parts. */
+static double kept_voxels(const sdm_train_work *w, double nodes)
+{
+    return w->shared ? w->n_voxels / nodes : w->n_voxels;
+}
+
+/* Bytes that a node has after each stage; the part that it has made itself is not sent. */
+static void gathered_bytes(const sdm_train_work *w, double nodes, double bytes[SDM_PLAN_STAGES])
 {
     const double row = 8 * w->n_params;
     for (int i = 0; i < SDM_PLAN_STAGES; i++) bytes[i] = 0;
     bytes[SDM_PLAN_MAPS] =
-        w->n_maps * (2 * w->n_voxels + row + 4) + w->n_holdout * (4 * w->n_voxels + row);
+        w->n_maps * (2 * kept_voxels(w, nodes) + row + 4) + w->n_holdout * (4 * w->n_voxels + row);
     if (!w->shared) return;
     // bases, mean map, eigenvalues; coefficients of all maps for modes, and again for the head
     bytes[SDM_PLAN_BASES] =
         4 * (w->basis + w->n_voxels) + 2 * 4 * (w->n_maps + w->n_holdout) * w->coefficients;
+    // four iterations with two products each; the coefficients of the maps by the modes
+    bytes[SDM_PLAN_MODES] =
+        4 * w->modes_kept * (4 * (w->n_maps + w->coefficients) + w->n_maps + w->n_holdout);
     // loss, predictions, activations with their slopes, gradient
     bytes[SDM_PLAN_FIT] = w->steps * (w->batch * (8 + 4 * w->modes_kept + 8 * w->depth * w->width) +
                                       4 * w->fit_weights);
@@ -41,15 +50,16 @@ static double gathers(const sdm_train_work *w, sdm_plan_stage stage)
     return 0;
 }
 
-static double memory_of(const sdm_train_work *w, double cores)
+static double memory_of(const sdm_train_work *w, double nodes, double cores)
 {
-    const double maps = w->n_pool * (2 * w->n_voxels + 8 * w->n_params + 4) +
+    const double kept = kept_voxels(w, nodes);
+    const double maps = w->n_pool * (2 * kept + 8 * w->n_params + 4) +
                         w->n_holdout * (4 * w->n_voxels + 8 * w->n_params);
     // exact maps in work on each core, as floats in the order of the map and of the blocks
     const double work = cores * 4 * (w->n_map_voxels + w->n_voxels);
     if (!w->shared) return maps + work + 5 * 4 * w->weights;
     // the bases while they are computed, or the coefficients of all maps, or the trained weights
-    const double bases = 4 * w->n_voxels * w->keep + 4 * w->basis,
+    const double bases = 4 * kept * w->keep + 4 * w->basis,
                  modes = 4 * (w->n_pool * (w->coefficients + 2 * w->modes_kept) +
                               w->modes_kept * w->coefficients),
                  weights = 6 * 4 * w->weights;
@@ -64,10 +74,10 @@ void sdm_train_plan_make(const sdm_train_work *w, int nodes, int cores, sdm_trai
         .seconds = {[SDM_PLAN_DESIGN] = w->design / m,
                     [SDM_PLAN_MAPS] = (w->n_maps + w->n_holdout) * w->map / (n * m),
                     [SDM_PLAN_BASES] = w->bases / (n * m),
-                    [SDM_PLAN_MODES] = w->modes / m,
+                    [SDM_PLAN_MODES] = (w->modes - w->modes_products * (1 - 1 / n)) / m,
                     [SDM_PLAN_FIT] = w->steps * w->fit_step / (steps_by * m),
                     [SDM_PLAN_REFINE] = w->refine_steps * w->refine_step / (steps_by * m)}};
-    gathered_bytes(w, bytes);
+    gathered_bytes(w, n, bytes);
     for (int i = 0; i < SDM_PLAN_STAGES; i++) {
         out->received[i] = bytes[i] * (n - 1) / n;
         out->seconds[i] += out->received[i] / SDM_PLAN_BANDWIDTH;
@@ -76,7 +86,7 @@ void sdm_train_plan_make(const sdm_train_work *w, int nodes, int cores, sdm_trai
         out->all_seconds += out->seconds[i];
         out->all_received += out->received[i];
     }
-    out->memory = memory_of(w, m);
+    out->memory = memory_of(w, n, m);
     out->model = w->weights * w->weight_bytes + 4 * w->n_voxels;
     out->checkpoint = 4 * 4 * fmax(w->weights, w->fit_weights);
     out->dataset = (w->n_maps + w->n_holdout) * (4 * w->n_map_voxels + 8 * w->n_params + 8);

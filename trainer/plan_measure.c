@@ -126,10 +126,13 @@ static sdm_status prepare(measurement *m, const sdm_config *c, const sdm_instanc
 
 /* ---- the sizes of the whole training ---- */
 
-/* Floating point operations of the global modes of n maps: subspace iterations. */
-static double modes_flops(double n, double coefficients, double modes)
+/* Times of the global modes of all maps, by subspace iterations: products of the coefficients and
+ * the modes, and orthonormalisations. */
+static void modes_times(double flops_per_second, sdm_train_work *w)
 {
-    return 16 * n * coefficients * modes + 24 * modes * modes * (n + coefficients);
+    const double n = w->n_maps, k = w->coefficients, r = w->modes_kept;
+    w->modes_products = 16 * n * k * r / flops_per_second;
+    w->modes = w->modes_products + 24 * r * r * (n + k) / flops_per_second;
 }
 
 static void pod_sizes(const trainer *t, const sdm_config *c, sdm_train_work *w)
@@ -217,7 +220,7 @@ static void extrapolate(const measurement *few, measurement *more, const sdm_con
                  per_map = fmax(0, (more->begin - few->begin) / (n2 - n1)),
                  fixed = fmax(0, more->begin - per_map * n2);
     w->bases = fixed + per_map * maps;
-    w->modes = modes_flops(w->n_maps, w->coefficients, w->modes_kept) / flops_per_second;
+    modes_times(flops_per_second, w);
 }
 
 /* Bytes of a weight in the model file. */

@@ -39,7 +39,7 @@ sdm_status trainer_set_up(trainer *t, sdm_error *err)
     const sdm_grid *grid = d->target.make ? d->target.grid : &c->grid;
     d->n_voxels = sdm_grid_count(grid);
     // before the blocks: for a grid that is too large its message names the memory needed
-    if ((s = trainer_dataset_create(d, c, err))) return s;
+    if ((s = trainer_dataset_size(d, c, err))) return s;
 
     // block edge 0 means map order: one block as large as the grid
     size_t block = t->kind->block(c);
@@ -50,7 +50,12 @@ sdm_status trainer_set_up(trainer *t, sdm_error *err)
     if ((s = SDM_ALLOC(&t->blocks, t->levels.first[t->levels.n], "blocks", err))) return s;
     sdm_pod_blocks(grid, block, &t->levels, t->blocks);
     d->blocks = t->blocks;
-    return SDM_OK;
+    if (d->comm && t->kind->shares) {
+        s = SDM_ALLOC(&d->share, (size_t)sdm_comm_size(d->comm) + 1, "shares of the ranks", err);
+        if (s) return s;
+        t->kind->shares(t, d->share);
+    }
+    return trainer_dataset_create(d, c, err);
 }
 
 /* Refuses a grid without a voxel inside any held-out shape: a network trained on it would have a

@@ -20,12 +20,20 @@ read -r all_seconds all_bytes <<<"$(sed 's/.*"cores": 8, "seconds": \([^,]*\), "
 equal "$all_seconds" "$(awk '{ s += $2 } END { printf "%.17g", s }' stages)"
 equal "$all_bytes" "$(awk '{ s += $3 } END { printf "%.17g", s }' stages)"
 bytes() { awk -v name="$1" '$1 == name { print $3 }' stages; }
-equal "$(bytes maps)" $(((176 * (2 * 2688 + 8 * 4 + 4) + 8 * (4 * 2688 + 8 * 4)) * 3 / 4))
+# each of the four nodes keeps a quarter of the voxels of training maps
+equal "$(bytes maps)" $(((176 * (2 * 2688 / 4 + 8 * 4 + 4) + 8 * (4 * 2688 + 8 * 4)) * 3 / 4))
+# 16 modes, K coefficients: 4 R (4 (n + K) + n + h), a multiple of 4 R
+[ $(($(bytes modes) % (3 * 16))) = 0 ] && [ "$(bytes modes)" -gt $((4 * 16 * (5 * 176 + 8) * 3 / 4)) ] || bad "bytes of the modes: $(bytes modes)"
 # 14 inputs (degree 2), one layer: weights and biases of 16 units, 16 modes
 equal "$(bytes fit)" $((36 * (16 * (8 + 4 * 16 + 8 * 16) + 4 * (15 * 16 + 16 * 16)) * 3 / 4))
 equal "$(json dataset_bytes)" $((184 * (4 * 2688 + 8 * 4 + 8)))
 awk '$1 != "design" && !($2 > 0) { exit 1 }' stages || bad "times: $(cat stages)"
 [ "$(grep -o '"nodes": [0-9]*, "seconds"' out | wc -l)" -eq 11 ] || bad "scaling: $(cat out)"
+
+# Memory: as nodes keep fewer voxels, they need less of it.
+four=$(json memory_bytes)
+expect 0 - sdmgen train "$tiny" --plan --nodes 1 --cores 8 --json -q
+[ "$four" -lt "$(json memory_bytes)" ] || bad "memory: $four bytes on one of four nodes, $(json memory_bytes) on one"
 
 # On one node nothing is sent. A template has a design, and by default no perceptron.
 cat >template.yaml <<'END'

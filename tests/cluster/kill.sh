@@ -20,7 +20,10 @@ told() {
     local text
     case $1 in
     fork) text="^sdmgen: error: rank $2 of $3 was killed by signal 9 \(Killed\): all ranks end$" ;;
-    openmpi) text="process rank $2 with PID .* exited on signal 9" ;;
+    openmpi) # in rare cases it does not tell the rank
+        text="process rank $2 with PID .* exited on signal 9"
+        grep -q "$text" err || text='^a non-zero exit code\. Per user-direction, the job has been aborted\.'
+        ;;
     mpich) text='EXIT CODE: 9$|process manager error waiting for completion$' ;; # the latter before all ranks have met
     esac
     [ "$(tr -d '\r' <err | grep -Ec "$text")" = 1 ] || bad "$1: rank $2 of $3 was killed, but the message is: $(cat err)"

@@ -1,6 +1,5 @@
-/* Ranks made by fork(): shares, broadcasts and gathers of more bytes than they send at a time,
- * agreement on an error, and the end of a rank that is killed.
- * Tests: comm.c comm_fork.c */
+/* Ranks made by fork(): shares, broadcasts, gathers and scatters of more bytes than they send at a
+ * time, agreement on an error, and the end of a rank that is killed. Tests: comm.c comm_fork.c */
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -67,6 +66,41 @@ static void data_arrive(void **state)
     sdm_comm *c = start();
     bool good[RANKS] = {false};
     good[sdm_comm_rank(c)] = exchange(c);
+    const sdm_status s = sdm_comm_gather_shares(c, good, RANKS, sizeof *good, NULL);
+    finish(c);
+    assert_int_equal(s, SDM_OK);
+    for (int r = 0; r < RANKS; r++) assert_true(good[r]);
+}
+
+/* true if this rank gets its parts of the arrays of the others; rank 1 has none, rank 0 has an
+ * empty part. */
+static bool scatter(sdm_comm *c)
+{
+    const int rank = sdm_comm_rank(c);
+    const size_t at[RANKS + 1] = {0, 0, 1700001, UNITS * UNIT}, own = at[rank + 1] - at[rank];
+    uint8_t *data = NULL, *parts = NULL;
+    if (SDM_ALLOC(&data, UNITS * UNIT, "test", NULL)) return false;
+    if (SDM_ALLOC(&parts, RANKS * UNITS * UNIT, "test", NULL)) return false;
+    for (size_t i = 0; i < UNITS * UNIT; i++) data[i] = (uint8_t)(value(i) + rank);
+    void *to[RANKS] = {parts, NULL, parts + UNITS * UNIT};
+    bool good = !sdm_comm_scatter(c, rank == 1 ? NULL : data, at, to, NULL);
+    for (int r = 0; r < RANKS; r += 2) {
+        const uint8_t *part = to[r];
+        for (size_t i = 0; i < own; i++)
+            good = good && part[i] == (uint8_t)(value(at[rank] + i) + r);
+        good = good && part[own] == 0; // nothing behind it
+    }
+    sdm_free(parts);
+    sdm_free(data);
+    return good;
+}
+
+static void parts_arrive(void **state)
+{
+    (void)state;
+    sdm_comm *c = start();
+    bool good[RANKS] = {false};
+    good[sdm_comm_rank(c)] = scatter(c);
     const sdm_status s = sdm_comm_gather_shares(c, good, RANKS, sizeof *good, NULL);
     finish(c);
     assert_int_equal(s, SDM_OK);
@@ -144,9 +178,11 @@ static void one_process_needs_no_others(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(data_arrive), cmocka_unit_test(all_learn_of_an_error),
-        cmocka_unit_test(a_killed_rank_ends_all), cmocka_unit_test(an_aborting_rank_tells_why),
-        cmocka_unit_test(one_process_needs_no_others)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(data_arrive),
+                                       cmocka_unit_test(parts_arrive),
+                                       cmocka_unit_test(all_learn_of_an_error),
+                                       cmocka_unit_test(a_killed_rank_ends_all),
+                                       cmocka_unit_test(an_aborting_rank_tells_why),
+                                       cmocka_unit_test(one_process_needs_no_others)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

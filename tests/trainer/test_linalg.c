@@ -120,10 +120,10 @@ static void leading_spaces_are_found(void **state)
     // Any number of threads gives the same bits.
     assert_int_equal(SDM_ALLOC(&one, K * N, "1", NULL), 0);
     assert_int_equal(SDM_ALLOC(&two, K * N, "2", NULL), 0);
-    assert_int_equal(trainer_leading_space(N, N, c, K, 9, 0, 1, one, NULL), 0);
+    assert_int_equal(trainer_leading_space(NULL, N, N, c, K, 9, 0, 1, one, NULL), 0);
     sdm_team *team;
     assert_int_equal(sdm_team_start(3, &team, NULL), 0);
-    assert_int_equal(trainer_leading_space(N, N, c, K, 9, 0, 3, two, NULL), 0);
+    assert_int_equal(trainer_leading_space(NULL, N, N, c, K, 9, 0, 3, two, NULL), 0);
     sdm_team_end(team);
     assert_memory_equal(one, two, K * N * sizeof *one);
     sdm_free(q);

@@ -448,7 +448,7 @@ static void maps_follow_the_distribution(void **state)
     sdm_instance_params(capsule, &d.n_params);
     if (sdm_train_ranges(&c, capsule, d.min, d.max, &e) ||
         sdm_train_distributions(&c, capsule, d.min, d.max, d.distribution, &e) ||
-        trainer_dataset_create(&d, &c, &e))
+        trainer_dataset_size(&d, &c, &e) || trainer_dataset_create(&d, &c, &e))
         fail_msg("%s", e.text);
     const sdm_pod_levels levels = sdm_pod_count(&c.grid, 4, 1);
     sdm_pod_block block;

@@ -1,4 +1,4 @@
-/* Broadcasts and gathers between ranks, for every back-end. */
+/* Broadcasts, gathers and scatters between ranks, for every back-end. */
 #include <string.h>
 
 #include "comm_types.h"
@@ -48,6 +48,12 @@ sdm_status sdm_comm_gather_shares(sdm_comm *c, void *data, size_t n, size_t byte
     if (!s) s = sdm_comm_gather(c, data, at, err);
     sdm_free(at);
     return s;
+}
+
+sdm_status sdm_comm_scatter(sdm_comm *c, const void *from, const size_t *at, void *const *to,
+                            sdm_error *err)
+{
+    return c ? result(c, c->backend->scatter(c->state, from, at, to), err) : SDM_OK;
 }
 
 sdm_status sdm_comm_least(sdm_comm *c, size_t *value, sdm_error *err)

@@ -10,7 +10,9 @@ typedef struct comm_backend {
     const char *name;
     bool (*broadcast)(void *state, int root, void *data, size_t bytes);
     bool (*gather)(void *state, void *data, const size_t *at); /* as sdm_comm_gather() */
-    bool (*broken)(const void *state);                         /* [any thread] */
+    /* As sdm_comm_scatter(). */
+    bool (*scatter)(void *state, const void *from, const size_t *at, void *const *to);
+    bool (*broken)(const void *state); /* [any thread] */
     /* Why another rank has ended early; valid after one of the above has told it. */
     const char *(*why)(const void *state);
     void (*abort)(void *state, const char *why);

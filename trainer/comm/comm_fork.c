@@ -125,6 +125,25 @@ static bool broadcast(void *state, int root, void *data, size_t bytes)
     return !is_broken(f);
 }
 
+static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
+
+static bool scatter(void *state, const void *from, const size_t *at, void *const *to)
+{
+    forked *f = state;
+    const size_t all = at[f->size], first = at[f->rank], end = at[f->rank + 1];
+    for (size_t begin = 0; begin < all; begin += PIECE, f->turn++) {
+        const size_t n = piece_size(all, begin);
+        if (to[f->rank]) memcpy(piece(f, f->rank), (const char *)from + begin, n);
+        if (!barrier(f)) return false;
+        // the bytes of this piece that are for this rank
+        const size_t here = first > begin ? first : begin, until = smaller(end, begin + n);
+        for (int r = 0; r < f->size && here < until; r++)
+            if (to[r])
+                memcpy((char *)to[r] + (here - first), piece(f, r) + (here - begin), until - here);
+    }
+    return !is_broken(f);
+}
+
 static void kill_children(const forked *f)
 {
     for (int r = 1; r < f->size; r++)
@@ -198,6 +217,7 @@ static void end(void *state)
 static const comm_backend fork_backend = {.name = "fork",
                                           .broadcast = broadcast,
                                           .gather = gather,
+                                          .scatter = scatter,
                                           .broken = is_broken,
                                           .why = why,
                                           .abort = abort_ranks,

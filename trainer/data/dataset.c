@@ -52,7 +52,7 @@ void trainer_dataset_random_params(const dataset *d, uint64_t k, double *p)
     sdm_sample_params(d->seed, STREAM_TRAIN, k, d->min, d->max, d->distribution, d->n_params, p);
 }
 
-sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
+sdm_status trainer_dataset_size(dataset *d, const sdm_config *config, sdm_error *err)
 {
     // the memory check refuses a static grid that is too large
     const sdm_status counted = trainer_dataset_static(d, config, err);
@@ -82,10 +82,17 @@ sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_erro
     if (d->n_static + d->n_start == 0 && !d->only_holdout)
         return sdm_fail(err, SDM_E_CONFIG,
                         "%s: data.static and data.start give no map to start from", config->file);
-    // arrays
+    return SDM_OK;
+}
+
+sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_error *err)
+{
+    const int rank = sdm_comm_rank(d->comm);
+    d->first_kept = d->share ? d->share[rank] : 0;
+    d->n_kept = d->share ? d->share[rank + 1] - d->first_kept : d->n_voxels;
     sdm_status s = SDM_ALLOC(&d->params, d->n_slots * d->n_params, "training parameters", err);
     size_t count = 0;
-    if (!s) s = sdm_mul(d->n_slots, d->n_voxels, &count, err);
+    if (!s) s = sdm_mul(d->n_slots, d->n_kept, &count, err);
     if (!s) s = sdm_alloc_unset((void **)&d->maps, count, sizeof *d->maps, "training maps", err);
     if (!s) s = SDM_ALLOC(&d->scale, d->n_slots, "training maps", err);
     if (!s)
@@ -94,12 +101,13 @@ sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_erro
     if (!s) s = SDM_ALLOC(&d->holdout, count, "held-out maps", err);
     if (!s)
         s = trainer_sample_plan_create(&d->plan, config->data.sampling == SDM_SAMPLING_ERROR,
-                                       n_random, err);
+                                       d->n_start + d->n_online, err);
     return s;
 }
 
 void trainer_dataset_dispose(dataset *d)
 {
+    sdm_free(d->share);
     sdm_free(d->params);
     sdm_free(d->maps);
     sdm_free(d->scale);

@@ -45,19 +45,37 @@ typedef struct dataset {
     size_t n_slots;   /* n_static + n_ring */
     size_t n_taken;   /* random samples put into the pool so far */
     sample_plan plan; /* Sobol' point of each random sample */
-    double *params;   /* [n_slots][P] */
-    int16_t *maps;    /* [n_slots][n_voxels] */
-    float *scale;     /* [n_slots] mm per unit; 0: no map yet */
+    /* First of the consecutive voxels that each rank keeps of every training map, [ranks + 1];
+       NULL: each rank keeps all. first_kept, n_kept: those of this rank. */
+    size_t *share;
+    size_t first_kept, n_kept;
+    double *params; /* [n_slots][P] */
+    int16_t *maps;  /* [n_slots][n_kept] */
+    float *scale;   /* [n_slots] mm per unit; 0: no map yet */
     size_t n_holdout;
     double *holdout_params; /* [n_holdout][P] */
     float *holdout;         /* [n_holdout][n_voxels], block order, mm */
 } dataset;
 
-/* Computes the sizes from the configuration and allocates the arrays. n_params and n_voxels must be
-   set. SDM_E_CONFIG: data.memory_gb is too small for the static grid, the held-out maps and the
-   maps before training. Call trainer_dataset_dispose() also after an error. */
+/* Computes the numbers of maps from the configuration. n_params and n_voxels must be set. They do
+   not depend on the number of ranks: data.memory_gb limits the maps of all ranks together.
+   SDM_E_CONFIG: it is too small for the static grid, the held-out maps and the maps before
+   training. */
+sdm_status trainer_dataset_size(dataset *d, const sdm_config *config, sdm_error *err);
+
+/* Allocates the arrays; after trainer_dataset_size(), and after `share` is set. Call
+   trainer_dataset_dispose() also after an error. */
 sdm_status trainer_dataset_create(dataset *d, const sdm_config *config, sdm_error *err);
+
+/* Frees the arrays, `share` too. */
 void trainer_dataset_dispose(dataset *d);
+
+/* The values of the map in `slot` from `voxel` on, up to the last voxel that this rank keeps; it
+   must keep `voxel`. */
+static inline const int16_t *trainer_dataset_values(const dataset *d, size_t slot, size_t voxel)
+{
+    return d->maps + slot * d->n_kept + (voxel - d->first_kept);
+}
 
 /* Sets counts and n_static from the configuration; a product beyond SIZE_MAX / 64 is that.
    SDM_E_CONFIG: the number of counts does not fit n_params. */

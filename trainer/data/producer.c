@@ -4,6 +4,7 @@
 #include <pthread.h>
 #include <string.h>
 
+#include "dataset_ranks.h"
 #include "sdm/memory.h"
 #include "workbench.h"
 
@@ -25,6 +26,7 @@ struct producer {
     sdm_error error; // error of sample `failed`
     size_t failed;   // lowest failed sample; SIZE_MAX: none
     bool stop;
+    size_t *slots; // [ranks] SIZE_MAX (trainer_dataset_spread())
     int n_workers;
     pthread_t workers[MAX_WORKERS];
 };
@@ -99,7 +101,10 @@ sdm_status trainer_producer_start(dataset *d, size_t first, int n_threads, produ
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->made, NULL);
     pthread_cond_init(&p->taken, NULL);
-    s = SDM_ALLOC(&p->params, WINDOW * d->n_params, "sample window", err);
+    const size_t ranks = (size_t)sdm_comm_size(d->comm);
+    s = SDM_ALLOC(&p->slots, ranks, "sample window", err);
+    for (size_t r = 0; r < ranks && !s; r++) p->slots[r] = SIZE_MAX;
+    if (!s) s = SDM_ALLOC(&p->params, WINDOW * d->n_params, "sample window", err);
     if (!s) s = SDM_ALLOC(&p->maps, WINDOW * d->n_voxels, "sample window", err);
     // workers: fewer than asked for are enough
     for (; !s && p->n_workers < n_threads && p->n_workers < MAX_WORKERS; p->n_workers++) {
@@ -137,7 +142,8 @@ size_t trainer_producer_ready(producer *p)
     return n;
 }
 
-/* Waits until this rank has made sample number p->base, and puts it into its slot. */
+/* Waits until this rank has made sample number p->base, and puts it into its slot; not the map if
+ * ranks keep parts of it. */
 static sdm_status take_own(producer *p, size_t slot, sdm_error *err)
 {
     const dataset *d = p->d;
@@ -153,21 +159,29 @@ static sdm_status take_own(producer *p, size_t slot, sdm_error *err)
     // workers do not touch this place until `base` moves on
     memcpy(d->params + slot * d->n_params, p->params + place * d->n_params,
            d->n_params * sizeof *d->params);
-    memcpy(d->maps + slot * d->n_voxels, p->maps + place * d->n_voxels,
-           d->n_voxels * sizeof *d->maps);
+    if (!d->share)
+        memcpy(d->maps + slot * d->n_kept, p->maps + place * d->n_voxels,
+               d->n_voxels * sizeof *d->maps);
     d->scale[slot] = p->scale[place];
     return SDM_OK;
 }
 
-/* Sends the sample in `slot` from the rank that has made it to the others. */
-static sdm_status spread(const dataset *d, int root, size_t slot, sdm_error *err)
+/* Sends sample number p->base, which goes into `slot`, from the rank that has made it to the
+ * others. */
+static sdm_status spread(const producer *p, int root, size_t slot, sdm_error *err)
 {
+    dataset *d = p->d;
     sdm_status s = sdm_comm_broadcast(d->comm, root, d->params + slot * d->n_params,
                                       d->n_params * sizeof *d->params, err);
-    if (!s)
-        s = sdm_comm_broadcast(d->comm, root, d->maps + slot * d->n_voxels,
-                               d->n_voxels * sizeof *d->maps, err);
-    return s ? s : sdm_comm_broadcast(d->comm, root, d->scale + slot, sizeof *d->scale, err);
+    if (!s) s = sdm_comm_broadcast(d->comm, root, d->scale + slot, sizeof *d->scale, err);
+    if (s) return s;
+    if (!d->share)
+        return sdm_comm_broadcast(d->comm, root, d->maps + slot * d->n_kept,
+                                  d->n_voxels * sizeof *d->maps, err);
+    p->slots[root] = slot;
+    s = trainer_dataset_spread(d, p->maps + p->base % WINDOW * d->n_voxels, p->slots, err);
+    p->slots[root] = SIZE_MAX;
+    return s;
 }
 
 sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err)
@@ -179,7 +193,7 @@ sdm_status trainer_producer_take(producer *p, size_t until, sdm_error *err)
         const int root = maker(d, p->base);
         sdm_status s = root == sdm_comm_rank(d->comm) ? take_own(p, slot, err) : SDM_OK;
         s = sdm_comm_agree(d->comm, s, err);
-        if (!s) s = spread(d, root, slot, err);
+        if (!s) s = spread(p, root, slot, err);
         if (s) return s;
         // free the place
         pthread_mutex_lock(&p->lock);
@@ -203,6 +217,7 @@ void trainer_producer_stop(producer *p)
     pthread_cond_destroy(&p->made);
     pthread_cond_destroy(&p->taken);
     pthread_mutex_destroy(&p->lock);
+    sdm_free(p->slots);
     sdm_free(p->params);
     sdm_free(p->maps);
     sdm_free(p);

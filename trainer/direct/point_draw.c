@@ -11,7 +11,7 @@ size_t trainer_point_draw(const sdm_config *c, const dataset *d, size_t slot, ui
     // largest number of voxels tried for one draw; if all are rejected, which is rare, the last one
     // is drawn
     enum { TRIES = 256 };
-    const int16_t *map = d->maps + slot * d->n_voxels;
+    const int16_t *map = trainer_dataset_values(d, slot, 0);
     const double keep = 1 / (1 + c->train.near_weight);
     size_t voxel = 0;
     for (uint64_t i = 0; i < TRIES; i++) {

@@ -128,7 +128,7 @@ static void gather_slice(void *user, size_t index, int member)
         for (size_t k = 0; k < p->group; k++) {
             point_set_input(g->t, p, i + k, d->params + slot * d->n_params, voxel + step[k]);
             p->target[i + k] =
-                d->scale[slot] * (float)d->maps[slot * d->n_voxels + voxel + step[k]];
+                d->scale[slot] * (float)*trainer_dataset_values(d, slot, voxel + step[k]);
         }
     }
 }
@@ -197,7 +197,7 @@ static sdm_status point_evaluate(const trainer *t, void *network, const float *w
                 (size_t)sdm_rng_below(t->config->seed, STREAM_EVALUATE, first + i, d->n_voxels);
             if (training) {
                 const size_t slot = trainer_dataset_measured_slot(d, map);
-                p->target[i] = d->scale[slot] * (float)d->maps[slot * d->n_voxels + voxel];
+                p->target[i] = d->scale[slot] * (float)*trainer_dataset_values(d, slot, voxel);
                 point_set_input(t, p, i, d->params + slot * d->n_params, voxel);
             } else {
                 p->target[i] = d->holdout[map * d->n_voxels + voxel];

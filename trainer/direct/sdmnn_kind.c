@@ -76,7 +76,7 @@ static void mean_map(const dataset *d, float *map)
     memset(map, 0, d->n_voxels * sizeof *map);
     for (size_t i = 0; i < n; i++) {
         const float share = d->scale[i] / (float)n;
-        const int16_t *from = d->maps + i * d->n_voxels;
+        const int16_t *from = trainer_dataset_values(d, i, 0);
         for (size_t v = 0; v < d->n_voxels; v++) map[v] += share * (float)from[v];
     }
 }
@@ -97,7 +97,7 @@ static void scale_params(const dataset *d, const double *params, float *x)
 /* map[n_voxels] = the map in `slot`, mm. */
 static void unpack(const dataset *d, size_t slot, float *map)
 {
-    const int16_t *from = d->maps + slot * d->n_voxels;
+    const int16_t *from = trainer_dataset_values(d, slot, 0);
     for (size_t v = 0; v < d->n_voxels; v++) map[v] = d->scale[slot] * (float)from[v];
 }
 

@@ -343,18 +343,31 @@ done:
     return s;
 }
 
-sdm_status trainer_leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed,
-                                 uint64_t stream, int n_threads, float *rows, sdm_error *err)
+/* to[k][n] = from[k][m] times a[m][n]; each rank computes some of the rows. */
+static sdm_status shared_product(sdm_comm *comm, size_t k, size_t n, size_t m, const float *from,
+                                 sdm_view a, float *to, int n_threads, sdm_error *err)
 {
+    const sdm_comm_part own = sdm_comm_own(comm, k);
+    sdm_gemm(own.end - own.first, n, m, (sdm_view){from + own.first * m, m, 1}, a, false,
+             to + own.first * n, n, n_threads);
+    return sdm_comm_gather_shares(comm, to, k, n * sizeof *to, err);
+}
+
+sdm_status trainer_leading_space(sdm_comm *comm, size_t m, size_t n, const float *y, size_t k,
+                                 uint64_t seed, uint64_t stream, int n_threads, float *rows,
+                                 sdm_error *err)
+{
+    const sdm_view values = {y, n, 1}, transposed = {y, 1, n};
     float *left = NULL;
     sdm_status s = SDM_ALLOC(&left, k * m, "global modes", err);
     if (s) return s;
     random_rows(k * n, seed, stream, rows);
     for (int i = 0; i < 4 && !s; i++) {
-        sdm_gemm(k, m, n, (sdm_view){rows, n, 1}, (sdm_view){y, 1, n}, false, left, m, n_threads);
-        if ((s = orthonormalise_rounds(k, m, left, ROUNDS / 2, n_threads, err))) break;
-        sdm_gemm(k, n, m, (sdm_view){left, m, 1}, (sdm_view){y, n, 1}, false, rows, n, n_threads);
-        s = orthonormalise_rounds(k, n, rows, i + 1 < 4 ? ROUNDS / 2 : ROUNDS, n_threads, err);
+        s = shared_product(comm, k, m, n, rows, transposed, left, n_threads, err);
+        if (!s) s = orthonormalise_rounds(k, m, left, ROUNDS / 2, n_threads, err);
+        if (!s) s = shared_product(comm, k, n, m, left, values, rows, n_threads, err);
+        if (!s)
+            s = orthonormalise_rounds(k, n, rows, i + 1 < 4 ? ROUNDS / 2 : ROUNDS, n_threads, err);
     }
     sdm_free(left);
     return s;

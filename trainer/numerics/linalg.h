@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "sdm/internal/comm.h"
 #include "sdm/status.h"
 
 /* Eigenvalues values[n], in descending order, and eigenvectors of the symmetric a[n][n]; on return
@@ -33,6 +34,8 @@ sdm_status trainer_leading_eigenvectors(size_t n, const float *c, size_t k, uint
                                         sdm_error *err);
 
 /* rows[k][n] = an orthonormal basis of the space of the k leading right singular vectors of
-   y[m][n], by subspace iteration from random numbers (seed, stream). */
-sdm_status trainer_leading_space(size_t m, size_t n, const float *y, size_t k, uint64_t seed,
-                                 uint64_t stream, int n_threads, float *rows, sdm_error *err);
+   y[m][n], by subspace iteration from random numbers (seed, stream). The ranks of comm, which all
+   have y, share the products with it. */
+sdm_status trainer_leading_space(sdm_comm *comm, size_t m, size_t n, const float *y, size_t k,
+                                 uint64_t seed, uint64_t stream, int n_threads, float *rows,
+                                 sdm_error *err);

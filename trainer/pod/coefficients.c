@@ -20,14 +20,14 @@ void trainer_coefficients_block_rows(const pod_state *pod, const sdm_pod_block *
     for (size_t i = 0; i < n; i++) {
         // a block has a few lines of each map: the processor does not foresee the next ones
         if (i + AHEAD < n && !holdout) {
-            const int16_t *next = d->maps + slots[i + AHEAD] * d->n_voxels + b->voxel;
+            const int16_t *next = trainer_dataset_values(d, slots[i + AHEAD], b->voxel);
             for (size_t v = 0; v < voxels; v += LINE) __builtin_prefetch(next + v);
         }
         if (holdout) {
             const float *from = d->holdout + slots[i] * d->n_voxels + b->voxel;
             for (size_t v = 0; v < voxels; v++) rows[i * voxels + v] = from[v] - mean[v];
         } else {
-            const int16_t *from = d->maps + slots[i] * d->n_voxels + b->voxel;
+            const int16_t *from = trainer_dataset_values(d, slots[i], b->voxel);
             const float scale = d->scale[slots[i]];
             for (size_t v = 0; v < voxels; v++)
                 rows[i * voxels + v] = scale * (float)from[v] - mean[v];

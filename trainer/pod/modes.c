@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "coefficients.h"
+#include "data/dataset_ranks.h"
 #include "data/streams.h"
 #include "numerics/linalg.h"
 #include "sdm/internal/kernels.h"
@@ -41,12 +42,16 @@ static sdm_status subtract_polynomials(const pod_state *pod, size_t n, const flo
     return SDM_OK;
 }
 
-/* c[n][R] = mode coefficients, computed from the coefficients y[n][K] of the highest level. */
-static void modes_from_coefficients(const pod_state *pod, size_t n, const float *y, float *c)
+/* c[n][R] = mode coefficients, computed from the coefficients y[n][K] of the highest level; each
+ * rank computes those of some maps. */
+static sdm_status modes_from_coefficients(const pod_state *pod, size_t n, const float *y, float *c,
+                                          sdm_error *err)
 {
     const size_t k = pod->arch.n_coefficients, r = pod->n_modes;
-    sdm_gemm(n, r, k, (sdm_view){y, k, 1}, (sdm_view){pod->modes, 1, k}, false, c, r,
-             trainer_threads(pod->t));
+    const sdm_comm_part own = sdm_comm_own(pod->t->hooks.comm, n);
+    sdm_gemm(own.end - own.first, r, k, (sdm_view){y + own.first * k, k, 1},
+             (sdm_view){pod->modes, 1, k}, false, c + own.first * r, r, trainer_threads(pod->t));
+    return sdm_comm_gather_shares(pod->t->hooks.comm, c, n, r * sizeof *c, err);
 }
 
 sdm_status trainer_modes_project(pod_state *pod, const size_t *slots, size_t n, sdm_error *err)
@@ -64,10 +69,8 @@ sdm_status trainer_modes_project(pod_state *pod, const size_t *slots, size_t n, 
         memcpy(phi + i * pod->n_poly, row, pod->n_poly * sizeof *phi);
         targets[i] = pod->target + slots[i] * r;
     }
-    if (!s) {
-        modes_from_coefficients(pod, n, y, c);
-        s = subtract_polynomials(pod, n, phi, c, targets, err);
-    }
+    if (!s) s = modes_from_coefficients(pod, n, y, c, err);
+    if (!s) s = subtract_polynomials(pod, n, phi, c, targets, err);
     sdm_free(targets);
     sdm_free(phi);
     sdm_free(c);
@@ -208,24 +211,29 @@ static double square_sum(const float *x, size_t n)
     return sum;
 }
 
-/* Returns the mean square error (mm^2) that remains with the exact mode coefficients c[n][R] of the
+/* *floor = mean square error (mm^2) that remains with the exact mode coefficients c[n][R] of the
  * maps in slots 0 .. n - 1, on a sample of these maps. */
-static double training_floor(const pod_state *pod, size_t n, const float *c)
+static sdm_status training_floor(const pod_state *pod, size_t n, const float *c, double *floor,
+                                 sdm_error *err)
 {
     enum { SAMPLE = 64 };
     const dataset *d = &pod->t->data;
     const size_t sample = n < SAMPLE ? n : SAMPLE;
     double energy = 0;
-    for (size_t i = 0; i < sample; i++) {
+    int16_t *values = NULL;
+    sdm_status s = SDM_ALLOC(&values, d->n_voxels, "training map", err);
+    for (size_t i = 0; i < sample && !s; i++) {
         const size_t map = i * n / sample;
-        const int16_t *values = d->maps + map * d->n_voxels;
+        if ((s = trainer_dataset_whole(d, map, values, err))) break;
         for (size_t v = 0; v < d->n_voxels; v++) {
             const double e = d->scale[map] * (float)values[v] - pod->mean[v];
             energy += e * e;
         }
         energy -= square_sum(c + map * pod->n_modes, pod->n_modes);
     }
-    return fmax(0, energy / ((double)sample * (double)d->n_voxels));
+    *floor = fmax(0, energy / ((double)sample * (double)d->n_voxels));
+    sdm_free(values);
+    return s;
 }
 
 /* Computes the targets of the held-out maps, and the mean square error on these maps that remains
@@ -241,8 +249,8 @@ static sdm_status project_holdout(pod_state *pod, sdm_error *err)
     // mode coefficients of the held-out maps
     if (!s) s = trainer_dataset_first_slots(h, &slots, err);
     if (!s) s = trainer_coefficients_project(pod, true, slots, h, y, err);
+    if (!s) s = modes_from_coefficients(pod, h, y, c, err);
     if (!s) {
-        modes_from_coefficients(pod, h, y, c);
         // orthonormal bases and modes: energy of the map minus that of its mode coefficients
         double energy = 0, left_out = 0;
         for (size_t i = 0; i < h; i++) {
@@ -302,11 +310,11 @@ sdm_status trainer_modes_make(pod_state *pod, size_t n, sdm_error *err)
     }
     // modes, and the polynomial part of their coefficients
     if (!s)
-        s = trainer_leading_space(n, k, y, r, pod->t->config->seed, STREAM_BASES, pod->t->n_threads,
-                                  pod->modes, err);
+        s = trainer_leading_space(pod->t->hooks.comm, n, k, y, r, pod->t->config->seed,
+                                  STREAM_BASES, pod->t->n_threads, pod->modes, err);
+    if (!s) s = modes_from_coefficients(pod, n, y, c, err);
+    if (!s) s = training_floor(pod, n, c, &pod->training_floor, err);
     if (!s) {
-        modes_from_coefficients(pod, n, y, c);
-        pod->training_floor = training_floor(pod, n, c);
         // inputs and target rows of the slots
         for (size_t i = 0; i < n; i++) {
             pod_phi(pod, pod->t->data.params + i * pod->t->data.n_params,

@@ -11,6 +11,7 @@
 #include "mode_fit.h"
 #include "modes.h"
 #include "pod_parts.h"
+#include "pod_ranks.h"
 #include "refine.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/rng.h"
@@ -216,6 +217,7 @@ static void pod_dispose(trainer *t)
 
 const train_kind trainer_kind_pod = {.block = pod_block,
                                      .levels = pod_levels,
+                                     .shares = trainer_pod_shares,
                                      .begin = pod_begin,
                                      .samples_taken = pod_samples_taken,
                                      .errors = pod_errors,

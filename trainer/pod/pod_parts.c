@@ -5,6 +5,7 @@
 
 #include "head.h"
 #include "mlp.h"
+#include "pod_ranks.h"
 #include "sdm/internal/kernels.h"
 #include "sdm/internal/team.h"
 #include "sdm/memory.h"
@@ -23,15 +24,17 @@ typedef struct measured_maps {
     size_t n;
 } measured_maps;
 
-/* The loop over the trees for the maps first .. first + rows - 1. */
+/* The loop over the trees of this rank for the maps first .. first + rows - 1. */
 typedef struct parts_loop {
     const pod_state *pod;
     const measured_maps *maps;
-    size_t first, rows, root; // root: block number of the first tree
-    float *c, *dc;            // [ROWS][K]
-    float *scratch;           // [members][tree_floats]
+    size_t first, rows;
+    size_t root; // block number of tree 0
+    pod_share share;
+    float *c, *dc;  // [ROWS][K]
+    float *scratch; // [members][tree_floats]
     size_t tree_floats;
-    double *network, *bases; // [trees] sums of squared errors, mm^2
+    double *network, *bases; // [all trees] sums of squared errors, mm^2
 } parts_loop;
 
 /* w->delta[rows][voxels] = exact maps minus predicted ones. Returns the sum of the squares. */
@@ -49,7 +52,7 @@ static double remainder_of(const parts_loop *l, const tree_work *w)
             for (size_t v = 0; v < voxels; v++) delta[v] = exact[v] - predicted[v];
         } else {
             const size_t slot = l->maps->slots[map];
-            const int16_t *exact = d->maps + slot * d->n_voxels + first;
+            const int16_t *exact = trainer_dataset_values(d, slot, first);
             for (size_t v = 0; v < voxels; v++)
                 delta[v] = d->scale[slot] * (float)exact[v] - predicted[v];
         }
@@ -60,9 +63,10 @@ static double remainder_of(const parts_loop *l, const tree_work *w)
 
 /* Error of the network's coefficients; then gradient steps of unit length towards those with the
    smallest error. */
-static void measure_tree(void *user, size_t i, int member)
+static void measure_tree(void *user, size_t index, int member)
 {
     const parts_loop *l = user;
+    const size_t i = l->share.first + index;
     const pod_state *pod = l->pod;
     const float *weights = pod->refine.average;
     const size_t root = l->root + i, rank = pod->blocks[root].rank, top = pod->arch.levels.n - 1;
@@ -109,7 +113,7 @@ static sdm_status measure(const pod_state *pod, const measured_maps *maps, doubl
     const size_t root = a->levels.first[a->levels.n - 1],
                  trees = a->levels.first[a->levels.n] - root;
     const size_t most = (size_t)pod->t->n_threads, members = trees < most ? trees : most;
-    parts_loop l = {.pod = pod, .maps = maps, .root = root};
+    parts_loop l = {.pod = pod, .maps = maps, .root = root, .share = trainer_pod_share(pod)};
     float *x = NULL, *z = NULL, *workspace = NULL;
     for (size_t i = 0; i < trees; i++) {
         const size_t floats = trainer_tree_floats(pod, ROWS, root + i);
@@ -126,8 +130,11 @@ static sdm_status measure(const pod_state *pod, const measured_maps *maps, doubl
     for (; l.first < maps->n && !s; l.first += ROWS) {
         l.rows = maps->n - l.first < ROWS ? maps->n - l.first : ROWS;
         network_coefficients(&l, x, z, workspace);
-        sdm_team_run((int)members, trees, measure_tree, &l);
+        sdm_team_run((int)members, l.share.end - l.share.first, measure_tree, &l);
     }
+    const size_t top = a->levels.n - 1, size = sizeof *l.network;
+    if (!s) s = trainer_pod_gather(pod, top, trainer_pod_place_root, size, l.network, err);
+    if (!s) s = trainer_pod_gather(pod, top, trainer_pod_place_root, size, l.bases, err);
     *network = *bases = 0;
     const double voxels = (double)maps->n * (double)a->n_voxels;
     for (size_t i = 0; i < trees && !s; i++)

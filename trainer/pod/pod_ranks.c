@@ -61,6 +61,14 @@ pod_share trainer_pod_share(const pod_state *pod)
     return (pod_share){first_tree(pod, rank), first_tree(pod, rank + 1)};
 }
 
+void trainer_pod_shares(trainer *t, size_t *share)
+{
+    const pod_state pod = {
+        .t = t, .blocks = t->blocks, .arch = {.levels = t->levels, .n_voxels = t->data.n_voxels}};
+    for (int r = 0; r <= sdm_comm_size(t->hooks.comm); r++)
+        share[r] = first_voxel(&pod, first_tree(&pod, r));
+}
+
 size_t trainer_pod_place_matrix(const pod_state *pod, size_t b) { return pod->matrix_at[b]; }
 
 size_t trainer_pod_place_coefficient(const pod_state *pod, size_t b)

@@ -12,6 +12,9 @@ typedef struct pod_share {
 
 pod_share trainer_pod_share(const pod_state *pod);
 
+/* train_kind.shares: the voxels of the trees of each rank. */
+void trainer_pod_shares(trainer *t, size_t *share);
+
 /* First block of `level` in the trees from number `tree` on; with the number of trees, the end of
    the level. */
 size_t trainer_pod_first_block(const pod_state *pod, size_t level, size_t tree);

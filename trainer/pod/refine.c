@@ -177,7 +177,7 @@ static void tree_train(void *user, size_t index, int member)
     trainer_tree_forward(pod, pod->refine.w, b->rows, &w);
     double sum = 0;
     for (size_t r = 0; r < b->rows; r++) {
-        const int16_t *target = pod->t->data.maps + b->slots[r] * pod->t->data.n_voxels + first;
+        const int16_t *target = trainer_dataset_values(&pod->t->data, b->slots[r], first);
         const float scale = pod->t->data.scale[b->slots[r]];
         float *delta = w.delta + r * voxels;
         for (size_t v = 0; v < voxels; v++) delta[v] = scale * (float)target[v];

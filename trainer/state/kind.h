@@ -32,6 +32,9 @@ struct train_kind {
     size_t (*block)(const sdm_config *c);
     /* Number of levels of blocks (sdm/internal/pod.h); NULL: 1. */
     size_t (*levels)(const sdm_config *c);
+    /* share[ranks + 1] = first voxel, in the order of t->blocks, whose values in training maps each
+       rank needs; consecutive ranks have consecutive voxels. NULL: each rank needs whole maps. */
+    void (*shares)(trainer *t, size_t *share);
     /* Called after the maps that precede training have been made: allocates t->state, designs the
        network, sets its initial weights. */
     sdm_status (*begin)(trainer *t, sdm_error *err);

@@ -229,6 +229,8 @@ static size_t template_block(const sdm_config *c) { return trainer_kind_pod.bloc
 
 static size_t template_levels(const sdm_config *c) { return trainer_kind_pod.levels(c); }
 
+static void template_shares(trainer *t, size_t *share) { trainer_kind_pod.shares(t, share); }
+
 static sdm_status template_begin(trainer *t, sdm_error *err)
 {
     return state_of(t)->corrected ? trainer_kind_pod.begin(t, err) : SDM_OK;
@@ -301,6 +303,7 @@ static void template_dispose(trainer *t)
 const train_kind trainer_kind_template = {.prepare = template_prepare,
                                           .block = template_block,
                                           .levels = template_levels,
+                                          .shares = template_shares,
                                           .begin = template_begin,
                                           .samples_taken = template_samples_taken,
                                           .run = template_run,

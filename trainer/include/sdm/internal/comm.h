@@ -1,7 +1,8 @@
 /* Processes that share the work of one training. They are called ranks and have numbers from 0. All
    run the same program on the same configuration and call the functions below in the same order, on
    one thread; rank 0 alone writes files and reads the clock. Data travel only by broadcasts and
-   gathers, never as sums of floats, so that results have the same bits for any number of ranks.
+   gathers and scatters, never as sums of floats, so that results have the same bits for any number
+   of ranks.
 
    NULL as sdm_comm means one process: rank 0 of 1, and every function below returns at once.
    When a rank ends early, all functions fail on the others, with SDM_E_IO and the reason. */
@@ -56,6 +57,12 @@ sdm_status sdm_comm_gather(sdm_comm *c, void *data, const size_t *at, sdm_error 
 
 /* The same for n units of `bytes` each, of which every rank has those of sdm_comm_first(). */
 sdm_status sdm_comm_gather_shares(sdm_comm *c, void *data, size_t n, size_t bytes, sdm_error *err);
+
+/* Every rank r for which to[r] is not NULL has an array from[at[size]]; its bytes at[q] ..
+   at[q + 1] - 1 come to to[r] on rank q. at[size + 1] and the NULLs among to[size] must be the same
+   on all ranks. from: NULL on a rank that has no array. */
+sdm_status sdm_comm_scatter(sdm_comm *c, const void *from, const size_t *at, void *const *to,
+                            sdm_error *err);
 
 /* *value becomes the smallest one of all ranks. */
 sdm_status sdm_comm_least(sdm_comm *c, size_t *value, sdm_error *err);

@@ -13,7 +13,7 @@ typedef enum sdm_plan_stage {
     SDM_PLAN_DESIGN = 0, /* before any map: of a template, else nothing */
     SDM_PLAN_MAPS,
     SDM_PLAN_BASES, /* local bases and projections of the maps */
-    SDM_PLAN_MODES, /* global modes: every node computes all of them */
+    SDM_PLAN_MODES, /* global modes: nodes share the products, not the rest */
     SDM_PLAN_FIT,
     SDM_PLAN_REFINE,
     SDM_PLAN_STAGES
@@ -32,7 +32,8 @@ typedef struct sdm_train_work {
     double steps, refine_steps;
     double design;                /* of all that precedes the maps */
     double map;                   /* of one exact map */
-    double bases, modes;          /* of all maps */
+    double bases;                 /* of all maps */
+    double modes, modes_products; /* of all maps; the part of the products of matrices */
     double fit_step, refine_step; /* of one step */
     /* pod: coefficients of the highest level, latent variables, values of all bases, trees, modes,
        layers, width; rows of a batch, also of the refinement; functions kept of a lowest block. */

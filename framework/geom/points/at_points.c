@@ -57,6 +57,13 @@ static void closest_point(const sdm_nearest *s, uint32_t slot, const double x[3]
     (void)sdm_frame_closest(&s->frames[slot], nearer, q, feature);
 }
 
+/* Distance from the surface, mm, up to which rounding may decide on which side of its nearest feature
+   a point with coordinates of at most `largest` lies. */
+static inline double side_margin(const sdm_points_job *job, double largest)
+{
+    return job->seam + 16 * DBL_EPSILON * largest;
+}
+
 /* Stores the answer for x in element `index`: its nearest feature, the squared distance, and the
    side by this feature. */
 static void point_finish(const sdm_points_job *job, const double x[3], uint32_t number, double d2,
@@ -69,7 +76,7 @@ static void point_finish(const sdm_points_job *job, const double x[3], uint32_t 
     const bool wants_point = out->closest || out->gradient;
     // near the surface rounding decides on which side of the feature the point lies
     const double largest = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
-    if (!(d > job->seam + 16 * DBL_EPSILON * largest)) side = SDM_SIDE_UNKNOWN;
+    if (!(d > side_margin(job, largest))) side = SDM_SIDE_UNKNOWN;
     if (wants_point || side == SDM_SIDE_UNKNOWN) closest_point(s, slot, x, d, q, &feature);
     if (side == SDM_SIDE_UNKNOWN ? sdm_sign_inside(job->sign, x, slot, q, feature)
                                  : side == SDM_SIDE_INSIDE)
@@ -155,51 +162,83 @@ static sdm_status scratch_start(const sdm_features *f, sdm_point_scratch **out, 
     return st;
 }
 
-/* Answers for the block of sorted points key[n], 0 < n <= SDM_POINT_BLOCK, of x[][3]. The first
-   `ahead` of the keys are those of this block and the next one. */
-static void block_find(const sdm_points_job *job, sdm_point_kernel *kernel, sdm_point_scratch *s,
-                       const double *x, const sdm_point_key *key, size_t n, size_t ahead,
-                       const sdm_exact_at *out)
+/* Points that are sorted together. */
+typedef struct chunk {
+    const double *x;
+    // their box, not much larger than that of the surface, over which they are sorted
+    double lo[3], hi[3];
+    // all points are usable
+    bool usable;
+    // so they are, and distances are wanted and nothing else
+    bool plain;
+    // a point farther from the surface than this, mm, lies on the side that its feature tells
+    double certain;
+    const sdm_exact_at *out;
+} chunk;
+
+/* Stores the answers for the block of sorted points key[n] that are in the scratch memory. */
+static void block_finish(const sdm_points_job *job, const chunk *c, const sdm_point_scratch *s,
+                         const sdm_point_key *key, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        const size_t index = key[i].index;
+        const double *p = c->x + 3 * index, d = sqrt(s->d2[i]);
+        if (c->plain && s->side[i] != SDM_SIDE_UNKNOWN && d > c->certain)
+            c->out->distance[index] = s->side[i] == SDM_SIDE_INSIDE ? -d : d;
+        else if (c->usable || is_point(p))
+            point_finish(job, p, s->number[i], s->d2[i], s->side[i], c->out, index);
+        else
+            point_refuse(c->out, index);
+    }
+}
+
+/* Answers for the block of sorted points key[n], 0 < n <= SDM_POINT_BLOCK. The first `ahead` of the
+   keys are those of this block and the next one. */
+static void block_find(const sdm_points_job *job, const chunk *c, sdm_point_kernel *kernel,
+                       sdm_point_scratch *s, const sdm_point_key *key, size_t n, size_t ahead)
 {
     // sorted points and their distances lie anywhere in memory: the processor fetches those of the
     // next block while it works on this one
     for (size_t i = n; i < ahead; i++) {
-        __builtin_prefetch(x + 3 * (size_t)key[i].index);
-        if (out->distance) __builtin_prefetch(out->distance + key[i].index, 1);
+        __builtin_prefetch(c->x + 3 * (size_t)key[i].index);
+        if (c->out->distance) __builtin_prefetch(c->out->distance + key[i].index, 1);
     }
     for (size_t i = 0; i < SDM_POINT_BLOCK; i++) {
-        const double *p = x + 3 * (size_t)key[i < n ? i : n - 1].index;
+        const double *p = c->x + 3 * (size_t)key[i < n ? i : n - 1].index;
         // a point that is not usable is replaced by any other
-        if (!is_point(p)) p = job->surface->features.centre;
+        if (!c->usable && !is_point(p)) p = job->surface->features.centre;
         for (int a = 0; a < 3; a++) s->x[i / 8][a][i % 8] = p[a];
     }
     kernel(job->surface, s);
-    for (size_t i = 0; i < n; i++) {
-        const double *p = x + 3 * (size_t)key[i].index;
-        if (is_point(p))
-            point_finish(job, p, s->number[i], s->d2[i], s->side[i], out, key[i].index);
-        else
-            point_refuse(out, key[i].index);
-    }
+    block_finish(job, c, s, key, n);
 }
 
-/* Box over which the points are sorted: that of the points, but not much larger than that of the
-   surface. */
-static void points_box(const sdm_features *f, const double *x, size_t n, double lo[3], double hi[3])
+/* Describes the points x[n][3]. */
+static chunk chunk_start(const sdm_points_job *job, const double *x, size_t n,
+                         const sdm_exact_at *out)
 {
+    const sdm_features *f = &job->surface->features;
+    chunk c = {.x = x, .out = out, .usable = true};
     for (size_t a = 0; a < 3; a++) {
-        lo[a] = f->centre[a] + 4 * f->radius;
-        hi[a] = f->centre[a] - 4 * f->radius;
+        c.lo[a] = INFINITY;
+        c.hi[a] = -INFINITY;
     }
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
+        c.usable &= is_point(x + 3 * i);
         for (size_t a = 0; a < 3; a++) {
-            lo[a] = x[3 * i + a] < lo[a] ? x[3 * i + a] : lo[a];
-            hi[a] = x[3 * i + a] > hi[a] ? x[3 * i + a] : hi[a];
+            c.lo[a] = x[3 * i + a] < c.lo[a] ? x[3 * i + a] : c.lo[a];
+            c.hi[a] = x[3 * i + a] > c.hi[a] ? x[3 * i + a] : c.hi[a];
         }
-    for (size_t a = 0; a < 3; a++) {
-        lo[a] = fmax(lo[a], f->centre[a] - 4 * f->radius);
-        hi[a] = fmin(hi[a], f->centre[a] + 4 * f->radius);
     }
+    double largest = 0;
+    for (size_t a = 0; a < 3; a++) {
+        largest = fmax(largest, fmax(fabs(c.lo[a]), fabs(c.hi[a])));
+        c.lo[a] = fmax(c.lo[a], f->centre[a] - 4 * f->radius);
+        c.hi[a] = fmin(c.hi[a], f->centre[a] + 4 * f->radius);
+    }
+    c.plain = c.usable && out->distance && !out->triangle && !out->closest && !out->gradient;
+    c.certain = side_margin(job, largest);
+    return c;
 }
 
 /* Answers for up to CHUNK points. */
@@ -207,9 +246,8 @@ static sdm_status chunk_find(const sdm_points_job *job, const double *x, size_t 
                              sdm_point_key *key, int n_threads, const sdm_exact_at *out,
                              sdm_error *err)
 {
-    double lo[3], hi[3];
-    points_box(&job->surface->features, x, n, lo, hi);
-    sdm_point_order(x, n, lo, hi, keys_choose(), n_threads, key, key + n);
+    const chunk c = chunk_start(job, x, n, out);
+    sdm_point_order(x, n, c.lo, c.hi, keys_choose(), n_threads, key, key + n);
     sdm_point_kernel *kernel = kernels_choose().block;
     const size_t n_block = (n + SDM_POINT_BLOCK - 1) / SDM_POINT_BLOCK;
     const size_t n_job = (n_block + BLOCKS - 1) / BLOCKS;
@@ -226,9 +264,9 @@ static sdm_status chunk_find(const sdm_points_job *job, const double *x, size_t 
             sdm_status s = ready;
             for (size_t b = part * BLOCKS; b < (part + 1) * BLOCKS && b < n_block && !s; b++) {
                 const size_t first = b * SDM_POINT_BLOCK, left = n - first;
-                block_find(job, kernel, scratch, x, key + first,
+                block_find(job, &c, kernel, scratch, key + first,
                            left < SDM_POINT_BLOCK ? left : SDM_POINT_BLOCK,
-                           left < 2 * SDM_POINT_BLOCK ? left : 2 * SDM_POINT_BLOCK, out);
+                           left < 2 * SDM_POINT_BLOCK ? left : 2 * SDM_POINT_BLOCK);
             }
             if (!s && sdm_cancelled(job->opts))
                 s = sdm_fail(&local, SDM_E_CANCELLED, "points stopped on request");

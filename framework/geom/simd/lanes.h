@@ -103,6 +103,11 @@ static inline v4d v4_if_negative(v4d m, v4d x, v4d y)
 {
     return (v4d)_mm256_blendv_pd((__m256d)y, (__m256d)x, (__m256d)m);
 }
+/* The eight doubles of a and b as floats. */
+static inline v8f v8_of_doubles(v4d a, v4d b)
+{
+    return (v8f)_mm256_set_m128(_mm256_cvtpd_ps((__m256d)b), _mm256_cvtpd_ps((__m256d)a));
+}
 /* Transposes a matrix of 4 x 4 doubles in place, r[row] with one column in each lane. */
 static inline void v4_transpose(v4d r[4])
 {

@@ -172,6 +172,11 @@ static inline v4d v4_if_negative(v4d m, v4d x, v4d y)
 {
     return (v4d){v2d_if_negative(m.low, x.low, y.low), v2d_if_negative(m.high, x.high, y.high)};
 }
+static inline v8f v8_of_doubles(v4d a, v4d b)
+{
+    return (v8f){{(float)a.low[0], (float)a.low[1], (float)a.high[0], (float)a.high[1]},
+                 {(float)b.low[0], (float)b.low[1], (float)b.high[0], (float)b.high[1]}};
+}
 static inline void v4_transpose(v4d r[4])
 {
     const v4d a = r[0], b = r[1], c = r[2], d = r[3];

@@ -57,8 +57,8 @@ static void closest_point(const sdm_nearest *s, uint32_t slot, const double x[3]
     (void)sdm_frame_closest(&s->frames[slot], nearer, q, feature);
 }
 
-/* Distance from the surface, mm, up to which rounding may decide on which side of its nearest feature
-   a point with coordinates of at most `largest` lies. */
+/* Distance from the surface, mm, up to which rounding may decide on which side of its nearest
+   feature a point with coordinates of at most `largest` lies. */
 static inline double side_margin(const sdm_points_job *job, double largest)
 {
     return job->seam + 16 * DBL_EPSILON * largest;

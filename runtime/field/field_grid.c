@@ -95,28 +95,77 @@ static field_place voxel_place(const sdm_field *f, const sdm_grid *g, int64_t i,
     return field_find(f, world);
 }
 
-/* The derivatives by the parameters at a voxel, slopes[n_params][n]. */
-static void turned_slopes(const sdm_field *f, const field_place *p, size_t n, float value,
-                          float *slopes)
+/* Replaces the spline's value at a voxel of the map by the map's, and then a value outside of the
+   box by the bound; slopes[n_params][n], the derivatives by the parameters (NULL: none), alike. */
+static void turned_apart(const sdm_field *f, const field_place *p, size_t n, float *value,
+                         float *slopes)
 {
-    float factor = 1;
-    if (p->outside) factor = fmaxf(field_inside(f, p, 0), 0) / value;
-    for (size_t q = 0; q < f->info->n_params; q++)
-        slopes[q * n] = factor * field_inside(f, p, q + 1);
+    const size_t n_slopes = slopes ? f->info->n_params : 0;
+    if (p->node >= 0) {
+        *value = field_inside(f, p, 0);
+        for (size_t q = 0; q < n_slopes; q++) slopes[q * n] = field_inside(f, p, q + 1);
+    }
+    if (!p->outside) return;
+    const float d = *value;
+    *value = field_bound(d, field_square(p->beyond));
+    for (size_t q = 0; q < n_slopes; q++) slopes[q * n] *= fmaxf(d, 0) / *value;
 }
 
-/* A turned grid: point by point. */
+/* Row 0 of a turned grid. */
+static spline_line turned_line(const sdm_field *f, const sdm_grid *grid)
+{
+    spline_line line = {.frame = f->frame};
+    for (int a = 0; a < 3; a++) {
+        line.origin[a] = grid->origin[a];
+        line.along[a] = grid->dir[3 * a] * grid->spacing[0];
+        line.n[a] = f->shape.n[a];
+        line.step[a] = f->shape.step[a];
+    }
+    return line;
+}
+
+/* Moves to row (j, k): the sums of sdm_grid_world(). */
+static void move_line(const sdm_grid *grid, int64_t j, int64_t k, spline_line *line)
+{
+    for (int a = 0; a < 3; a++) {
+        line->across[a] = grid->dir[3 * a + 1] * grid->spacing[1] * (double)j;
+        line->up[a] = grid->dir[3 * a + 2] * grid->spacing[2] * (double)k;
+    }
+}
+
+/* Row r of a turned grid; values and slopes are those of the whole grid. */
+static void turned_row(const sdm_field *f, const sdm_grid *grid, const spline_line *line, int64_t r,
+                       float *values, float *slopes)
+{
+    const size_t nx = (size_t)grid->n[0], all = sdm_grid_count(grid), begin = (size_t)r * nx;
+    const size_t n_maps = slopes ? f->info->n_params + 1 : 1;
+    spline_run run;
+    for (size_t first = 0; first < nx; first += SPLINE_RUN) {
+        const size_t n = nx - first < SPLINE_RUN ? nx - first : SPLINE_RUN;
+        float *to = values + begin + first, *by = slopes ? slopes + begin + first : NULL;
+        f->kernels->places(line, first, n, &run);
+        for (size_t q = 0; q < n_maps; q++)
+            f->kernels->run(f->splines + q * f->shape.count, f->shape.step, n, &run,
+                            q ? by + (q - 1) * all : to);
+        for (size_t i = 0; i < n; i++) {
+            if (!run.apart[i]) continue;
+            const field_place p = voxel_place(f, grid, (int64_t)(first + i), r);
+            turned_apart(f, &p, all, to + i, by ? by + i : NULL);
+        }
+    }
+}
+
+/* A turned grid: row by row. */
 static void turned_map(const sdm_field *f, const sdm_grid *grid, float *values, float *slopes)
 {
-    const int64_t nx = grid->n[0], rows = grid->n[1] * grid->n[2];
+    const int64_t rows = grid->n[1] * grid->n[2];
+    const spline_line first = turned_line(f, grid);
 #pragma omp parallel for schedule(static) num_threads(f->n_threads) if (f->n_threads > 1)
-    for (int64_t r = 0; r < rows; r++)
-        for (int64_t i = 0; i < nx; i++) {
-            const field_place p = voxel_place(f, grid, i, r);
-            values[r * nx + i] = field_value(f, &p);
-            if (slopes)
-                turned_slopes(f, &p, (size_t)(rows * nx), values[r * nx + i], slopes + r * nx + i);
-        }
+    for (int64_t r = 0; r < rows; r++) {
+        spline_line line = first;
+        move_line(grid, r % grid->n[1], r / grid->n[1], &line);
+        turned_row(f, grid, &line, r, values, slopes);
+    }
 }
 
 /* Replaces the values outside of the box by exact distances. */

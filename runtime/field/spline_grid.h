@@ -10,21 +10,8 @@ typedef struct spline_grid {
     int32_t *memory;
 } spline_grid;
 
-/* The map from world coordinates (mm) to indices: index = to_index (world - origin), row-major. */
-typedef struct spline_frame {
-    double origin[3], to_index[9], spacing[3], dir[9];
-} spline_frame;
-
+/* The frame of a map. */
 spline_frame sdm_spline_frame(const sdm_grid *map);
-
-/* index[3] = the index of a world position. */
-static inline void sdm_spline_index(const spline_frame *f, const double world[3], double index[3])
-{
-    const double d[3] = {world[0] - f->origin[0], world[1] - f->origin[1], world[2] - f->origin[2]};
-    for (int a = 0; a < 3; a++)
-        index[a] = f->to_index[3 * a] * d[0] + f->to_index[3 * a + 1] * d[1] +
-                   f->to_index[3 * a + 2] * d[2];
-}
 
 /* Whether every axis of `grid` is parallel to one of the map (to 1e-9). */
 bool sdm_spline_is_parallel(const spline_frame *f, const sdm_grid *grid);

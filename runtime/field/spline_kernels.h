@@ -6,6 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "spline_place.h"
+
 /* A block of 8 x 8 x 8 positions of a grid. */
 typedef struct spline_block {
     const float *rows;           /* interpolated along x: the eight positions of the first row */
@@ -14,6 +16,26 @@ typedef struct spline_block {
     const int32_t *cell[2];      /* [8] y and z: the first of the four coefficients */
     const float (*weight[2])[4]; /* [8] */
 } spline_block;
+
+/* A row of voxels of a turned grid, and the map. Voxel i has the world coordinates
+   ((origin + along i) + across) + up, in this order of sums, and the index of sdm_spline_index()
+   in the map of n voxels. */
+typedef struct spline_line {
+    double origin[3], along[3], across[3], up[3];
+    spline_frame frame;
+    int64_t n[3];
+    size_t step[3]; /* of the coefficients */
+} spline_line;
+
+/* Places of neighbouring voxels of a row. */
+enum { SPLINE_RUN = 64 };
+typedef struct spline_run {
+    size_t at[SPLINE_RUN]; /* the first of the 4 x 4 x 4 coefficients */
+    float weight[3][SPLINE_RUN][4];
+    /* 1: the voxel lies at a voxel of the map or outside of the box, which its value does not
+       show; else 0 */
+    int32_t apart[SPLINE_RUN];
+} spline_run;
 
 /* What spline_table.cut finds. */
 enum { SPLINE_BETWEEN, SPLINE_ALL_LOW, SPLINE_ALL_HIGH };
@@ -53,6 +75,11 @@ typedef struct spline_table {
     /* The spline at one point. c: the first of its 4 x 4 x 4 coefficients, rows `line` and planes
        `plane` floats apart; weight[3][4] along x, y, z. */
     float (*value)(const float *c, size_t line, size_t plane, const float (*weight)[4]);
+    /* The places of voxels first .. first + n - 1 of a row, n <= SPLINE_RUN: those of
+       sdm_spline_place(). */
+    void (*places)(const spline_line *line, size_t first, size_t n, spline_run *run);
+    /* out[i] = value() at place i < n, with coefficients c. */
+    void (*run)(const float *c, const size_t step[3], size_t n, const spline_run *run, float *out);
     /* gradient[3] = its derivatives by the index; slope[3][4]: derivatives of the weights. */
     void (*gradient)(const float *c, size_t line, size_t plane, const float (*weight)[4],
                      const float (*slope)[4], float gradient[3]);

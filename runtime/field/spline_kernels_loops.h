@@ -223,9 +223,9 @@ static void fit_rows(const float *values, size_t n, size_t from, const float *fa
     transpose_matrix(memory, SPLINE_LINES, n, SPLINE_LINES, c, to);
 }
 
-static float value(const float *c, size_t line, size_t plane, const float (*weight)[4])
+/* The spline at a point with the weights of the four coefficients along x, y and z. */
+static inline float value_at(const float *c, size_t line, size_t plane, four x, four y, four z)
 {
-    const four x = load(weight[0]), y = load(weight[1]), z = load(weight[2]);
     four column[4];
     for (size_t k = 0; k < 4; k++) {
         const float *row = c + k * plane;
@@ -233,6 +233,69 @@ static float value(const float *c, size_t line, size_t plane, const float (*weig
                              x * load(row + 3 * line));
     }
     return sum(z * sums(column[0], column[1], column[2], column[3]));
+}
+
+static float value(const float *c, size_t line, size_t plane, const float (*weight)[4])
+{
+    return value_at(c, line, plane, load(weight[0]), load(weight[1]), load(weight[2]));
+}
+
+static void run(const float *c, const size_t step[3], size_t n, const spline_run *r, float *out)
+{
+    const size_t line = step[1], plane = step[2];
+    for (size_t i = 0; i < n; i++)
+        out[i] = value_at(c + r->at[i], line, plane, load(r->weight[0][i]), load(r->weight[1][i]),
+                          load(r->weight[2][i]));
+}
+
+/* sdm_spline_place() and sdm_spline_weights() of SPLINE_RUN indices along an axis of n voxels.
+   nodes[i] grows by 1 at a voxel of the map, beyond[i] outside of the box. Counted in steps, an
+   index is below 2^53 and its whole part is exact as double. */
+static void axis_places(int64_t n, const double *restrict index, int32_t *restrict cell,
+                        float *restrict weight, double *restrict nodes, double *restrict beyond)
+{
+    const double last = (double)(n - 1);
+    const int32_t most = n > 2 ? (int32_t)(n - 2) : 0;
+    float t[SPLINE_RUN];
+    for (size_t i = 0; i < SPLINE_RUN; i++) {
+        const double low = index[i] > 0 ? index[i] : 0, in = low < last ? low : last,
+                     out = (index[i] - in) * SPLINE_STEPS, steps = in * SPLINE_STEPS + 0.5;
+        const int32_t voxel = (int32_t)(steps * (1 / SPLINE_STEPS)),
+                      rest = (int32_t)(steps - (double)voxel * SPLINE_STEPS),
+                      m = voxel < most ? voxel : most;
+        cell[i] = m;
+        t[i] = (float)rest * (float)(1 / SPLINE_STEPS) + (float)(voxel - m);
+        nodes[i] += rest ? 0.0 : 1.0;
+        beyond[i] += fabs(out) > 0.5 ? 1.0 : 0.0;
+    }
+    float w[4][SPLINE_RUN];
+    for (size_t i = 0; i < SPLINE_RUN; i++) {
+        float at[4];
+        sdm_spline_weights(t[i], at);
+        for (size_t k = 0; k < 4; k++) w[k][i] = at[k];
+    }
+    transpose_matrix(w[0], SPLINE_RUN, 4, SPLINE_RUN, weight, 4);
+}
+
+static void places(const spline_line *l, size_t first, size_t n, spline_run *r)
+{
+    double d[3][SPLINE_RUN], index[SPLINE_RUN], nodes[SPLINE_RUN] = {0}, beyond[SPLINE_RUN] = {0};
+    int32_t cell[3][SPLINE_RUN];
+    for (int a = 0; a < 3; a++)
+        for (int32_t i = 0; i < SPLINE_RUN; i++)
+            d[a][i] = ((l->origin[a] + l->along[a] * ((double)first + (double)i)) + l->across[a]) +
+                      l->up[a] - l->frame.origin[a];
+    for (int a = 0; a < 3; a++) {
+        const double *to = l->frame.to_index + (size_t)3 * (size_t)a;
+        for (size_t i = 0; i < SPLINE_RUN; i++)
+            index[i] = to[0] * d[0][i] + to[1] * d[1][i] + to[2] * d[2][i];
+        axis_places(l->n[a], index, cell[a], r->weight[a][0], nodes, beyond);
+    }
+    for (size_t i = 0; i < n; i++) {
+        r->at[i] =
+            (size_t)cell[0][i] + (size_t)cell[1][i] * l->step[1] + (size_t)cell[2][i] * l->step[2];
+        r->apart[i] = nodes[i] == 3 || beyond[i] > 0;
+    }
 }
 
 static void gradient(const float *c, size_t line, size_t plane, const float (*weight)[4],
@@ -262,4 +325,6 @@ const spline_table TABLE = {.solve = solve,
                             .extremes = extremes,
                             .cut = cut,
                             .value = value,
+                            .places = places,
+                            .run = run,
                             .gradient = gradient};

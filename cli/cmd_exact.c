@@ -246,6 +246,16 @@ static void find_range(const job *j, float *min, float *max, int64_t *inside)
     }
 }
 
+/* Warns of a neck or a wall that is thinner than a voxel, while most of its part is not. */
+static void warn_torn(const job *j)
+{
+    static const char *const mend = "give a smaller --spacing";
+    if (j->values)
+        cli_warn_torn_map("", &j->grid, j->values, mend);
+    else if (j->blocks.tile)
+        cli_warn_torn_blocks("", &j->blocks, mend);
+}
+
 static void notice_mesh(const job *j)
 {
     const sdm_audit *a = &j->report.audit;
@@ -262,16 +272,18 @@ static void notice_mesh(const job *j)
         cli_warn_cut_shape(&j->grid, j->mesh.vert, j->mesh.n_vert,
                            "a larger grid (--size, --spacing, --origin) holds it");
     const double size = sqrt(v3_dist2(a->min, a->max));
+    bool thin = false;
     if (size > 0 && (size < SDM_SURVEY_SIZE_MIN || size > SDM_SURVEY_SIZE_MAX))
         cli_notice("the mesh measures %.3g mm across: is it in %s? lengths are mm", size,
                    sdm_unit_near(size < SDM_SURVEY_SIZE_MIN ? 1e3 : 1e-3, NULL));
     // a closed part that meets no other cannot be inside out after the engine has turned it; the
     // audit of the single part of a file, which may be large, would only tell its thickness
     if (a->components > 1 || !a->closed || j->args->shape)
-        cli_warn_mesh(&j->mesh, j->args->points ? 0 : sdm_grid_coarsest(&j->grid),
-                      j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
+        thin = cli_warn_mesh(&j->mesh, j->args->points ? 0 : sdm_grid_coarsest(&j->grid),
+                             j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
     else
         cli_warn_audit(a);
+    if (!thin && inside) warn_torn(j);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
                    "triangles (error at most %.2g mm)",
@@ -301,18 +313,20 @@ static sdm_status judge_signs(const job *j, sdm_error *err)
         c->below_zero);
 }
 
-/* Volume of the union of the mesh, mm^3, if a surface is written; NaN: none is, or not known. */
-static double shape_volume(const job *j)
+/* If a surface is written, sets what it is compared with: map->volume, and map->pieces where no
+ * parts grow together. */
+static void measure_shape_of(const job *j, cli_map *map)
 {
     sdm_part_audit audit;
     bool surface = false;
-    double volume = NAN;
     for (size_t i = 0; i < j->args->outputs.n; i++)
         surface = surface || cli_ends_with_any(j->args->outputs.items[i], CLI_MESH_ENDINGS);
-    if (!surface || sdm_part_audit_make(&j->mesh, true, &audit, NULL)) return NAN;
-    if (audit.mesh.closed && !audit.inside_out) volume = audit.union_volume;
+    if (!surface || sdm_part_audit_make(&j->mesh, true, &audit, NULL)) return;
+    if (audit.mesh.closed && !audit.inside_out) {
+        map->volume = audit.union_volume;
+        if (!audit.mesh.self_intersections && !audit.mesh.nonmanifold_edges) map->pieces = audit.n;
+    }
     sdm_part_audit_dispose(&audit);
-    return volume;
 }
 
 static sdm_status write_outputs(const job *j, sdm_error *err)
@@ -324,10 +338,10 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
                    .params = j->params.data ? j->params.data : "",
                    .source = SDM_SOURCE_EXACT,
                    .error_mm = j->report.union_error_mm + j->bound_mm,
-                   .volume = shape_volume(j),
                    .origin = j->args->method,
                    .engine = j->args->narrow > 0 ? NULL : j->engine};
     sdm_status s = SDM_OK;
+    measure_shape_of(j, &map);
     for (size_t i = 0; i < j->args->outputs.n && !s; i++) {
         const char *path = j->args->outputs.items[i];
         s = cli_write_map(path, &map, j->args, err);

@@ -309,11 +309,13 @@ static void warn_cut(const job *j, size_t row)
                          j->own ? "train with grid: auto, or give --size or --spacing and "
                                   "--outside exact"
                                 : "a larger grid (--size, --spacing, --origin) holds it");
-    if (j->values && !j->band.tile)
-        cli_warn_torn_map(where, &j->grid, j->values,
-                          j->own ? "train with a smaller grid.spacing"
-                                 : "give a smaller --spacing; where the grid of the training is "
-                                   "as coarse, train with a smaller grid.spacing");
+    const char *mend = j->own ? "train with a smaller grid.spacing"
+                              : "give a smaller --spacing; where the grid of the training is as "
+                                "coarse, train with a smaller grid.spacing";
+    if (j->band.tile)
+        cli_warn_torn_blocks(where, &j->band, mend);
+    else if (j->values)
+        cli_warn_torn_map(where, &j->grid, j->values, mend);
 }
 
 /* Prints notices about a map by the exact engine and, with --check, the errors of the map. */

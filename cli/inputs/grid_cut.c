@@ -66,23 +66,83 @@ static bool is_alone(const float *v, int64_t line, int64_t plane)
     return true;
 }
 
-void cli_warn_torn_map(const char *where, const sdm_grid *g, const float *values, const char *mend)
+/* Voxels on the surface of a map, and those of them at which it is torn. */
+typedef struct tally {
+    size_t n, torn;
+    double first[3]; /* the first place at which it is torn, mm */
+} tally;
+
+static void tally_torn(tally *t, const sdm_grid *g, int64_t i, int64_t j, int64_t k)
+{
+    if (!t->torn++) sdm_grid_world(g, (double[3]){(double)i, (double)j, (double)k}, t->first);
+}
+
+/* Half of the shortest edge of a voxel, mm. */
+static float half_voxel(const sdm_grid *g)
+{
+    return (float)(0.5 * fmin(g->spacing[0], fmin(g->spacing[1], g->spacing[2])));
+}
+
+static bool warn_torn(const char *where, const sdm_grid *g, const tally *t, const char *mend)
+{
+    if (t->torn < TORN_MIN || (double)t->torn < TORN_SHARE * (double)t->n) return false;
+    cli_warn("%sthe surface is torn: at %zu of the %zu voxels on it no voxel is inside (the first "
+             "at %.4g %.4g %.4g mm): the shape is thinner than a voxel there, %.3g mm; %s",
+             where, t->torn, t->n, t->first[0], t->first[1], t->first[2], sdm_grid_coarsest(g),
+             mend);
+    return true;
+}
+
+bool cli_warn_torn_map(const char *where, const sdm_grid *g, const float *values, const char *mend)
 {
     const int64_t line = g->n[0], plane = g->n[0] * g->n[1];
-    const float half = (float)(0.5 * fmin(g->spacing[0], fmin(g->spacing[1], g->spacing[2])));
-    size_t n = 0, torn = 0;
-    double first[3] = {0};
+    const float half = half_voxel(g);
+    tally t = {0};
     for (int64_t k = 1; k + 1 < g->n[2]; k++)
         for (int64_t j = 1; j + 1 < g->n[1]; j++)
             for (int64_t i = 1; i + 1 < g->n[0]; i++) {
                 const float *v = values + k * plane + j * line + i;
                 if (!(fabsf(*v) < half)) continue;
-                n++;
-                if (*v < 0 || !is_alone(v, line, plane)) continue;
-                if (!torn++) sdm_grid_world(g, (double[3]){(double)i, (double)j, (double)k}, first);
+                t.n++;
+                if (*v >= 0 && is_alone(v, line, plane)) tally_torn(&t, g, i, j, k);
             }
-    if (torn < TORN_MIN || (double)torn < TORN_SHARE * (double)n) return;
-    cli_warn("%sthe surface is torn: at %zu of the %zu voxels on it no voxel is inside (the first "
-             "at %.4g %.4g %.4g mm): the shape is thinner than a voxel there, %.3g mm; %s",
-             where, torn, n, first[0], first[1], first[2], sdm_grid_coarsest(g), mend);
+    return warn_torn(where, g, &t, mend);
+}
+
+/* The distance at a voxel of the grid of b, mm. */
+static float block_value(const sdm_blocks *b, int64_t i, int64_t j, int64_t k)
+{
+    const int64_t size = SDM_BLOCK_SIZE;
+    const uint32_t tile = b->tile[((k / size) * b->n[1] + j / size) * b->n[0] + i / size];
+    if (tile == SDM_TILE_OUTSIDE) return (float)b->band_mm;
+    if (tile == SDM_TILE_INSIDE) return (float)-b->band_mm;
+    return b->values[tile][(k % size * size + j % size) * size + i % size];
+}
+
+static bool is_alone_in_blocks(const sdm_blocks *b, int64_t i, int64_t j, int64_t k)
+{
+    for (int64_t z = k - 1; z <= k + 1; z++)
+        for (int64_t y = j - 1; y <= j + 1; y++)
+            for (int64_t x = i - 1; x <= i + 1; x++)
+                if (block_value(b, x, y, z) < 0) return false;
+    return true;
+}
+
+bool cli_warn_torn_blocks(const char *where, const sdm_blocks *b, const char *mend)
+{
+    const int64_t *n = b->grid.n;
+    const float half = half_voxel(&b->grid);
+    tally t = {0};
+    for (size_t block = 0; block < b->n_block; block++)
+        for (int64_t v = 0; v < SDM_BLOCK_VOXELS; v++) {
+            const int32_t *first = b->first[block];
+            const int64_t i = first[0] + v % 8, j = first[1] + v / 8 % 8, k = first[2] + v / 64;
+            const float value = b->values[block][v];
+            if (!(fabsf(value) < half) || i < 1 || j < 1 || k < 1 || i + 1 >= n[0] ||
+                j + 1 >= n[1] || k + 1 >= n[2])
+                continue;
+            t.n++;
+            if (value >= 0 && is_alone_in_blocks(b, i, j, k)) tally_torn(&t, &b->grid, i, j, k);
+        }
+    return warn_torn(where, &b->grid, &t, mend);
 }

@@ -1,7 +1,9 @@
 /* Warns of a grid that cuts a shape or whose voxels do not show it. */
 #pragma once
 
-#include "sdm/grid.h"
+#include <stdbool.h>
+
+#include "sdm/blocks.h"
 
 /* Warns in one line if a vertex[n][3] (mm) lies beyond the outer voxel centres of the grid: names
  * the faces and how far the shape reaches beyond each. mend: what the user can do. */
@@ -13,5 +15,8 @@ void cli_warn_cut_shape(const sdm_grid *g, const double *vertex, size_t n, const
 void cli_warn_cut_map(const char *where, const sdm_grid *g, const float *values, const char *mend);
 
 /* Warns in one line if the surface of the map is torn: if it passes within half a voxel of voxels
- * beside which no voxel is inside. Something is thinner than a voxel there. */
-void cli_warn_torn_map(const char *where, const sdm_grid *g, const float *values, const char *mend);
+ * beside which no voxel is inside. Something is thinner than a voxel there. Returns whether it
+ * warned. */
+bool cli_warn_torn_map(const char *where, const sdm_grid *g, const float *values, const char *mend);
+/* The same of a map in blocks. */
+bool cli_warn_torn_blocks(const char *where, const sdm_blocks *b, const char *mend);

@@ -188,17 +188,23 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
 #endif
 }
 
-/* Warns if the surface encloses another volume than the shape whose map it was made from. */
-static void warn_volume(const char *path, const cli_map *map, const sdm_mesh *surface)
+/* Warns if the surface has more pieces than the shape whose map it was made from, or encloses
+ * another volume. */
+static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *surface)
 {
     sdm_audit audit;
     if (!(map->volume > 0) || sdm_mesh_audit(surface, &audit, NULL) || !audit.closed) return;
     const double more = fabs(audit.volume) / map->volume - 1, voxel = sdm_grid_coarsest(map->grid);
-    if (fabs(more) <= VOLUME_OFF_MAX) return;
-    cli_warn("%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
-             "%.3g mm cut its edges and thin parts; --spacing %.2g shows more of them",
-             path, fabs(audit.volume), 100 * fabs(more), more < 0 ? "less" : "more", map->volume,
-             voxel, 0.5 * voxel);
+    if (map->pieces && audit.components > map->pieces)
+        cli_warn("%s: the surface has %zu pieces, the shape %zu: a neck or a wall is thinner than "
+                 "a voxel of %.3g mm and is torn; a smaller --spacing shows it",
+                 path, audit.components, map->pieces, voxel);
+    else if (fabs(more) > VOLUME_OFF_MAX)
+        cli_warn(
+            "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
+            "%.3g mm cut its edges and thin parts; --spacing %.2g shows more of them",
+            path, fabs(audit.volume), 100 * fabs(more), more < 0 ? "less" : "more", map->volume,
+            voxel, 0.5 * voxel);
 }
 
 static sdm_status write_surface(const char *path, const cli_map *map, sdm_error *err)
@@ -211,7 +217,7 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
                      "cover it?",
                      path, map->values[0] < 0 ? "inside" : "outside");
     if (!s) s = sdm_mesh_write(path, &surface, err);
-    if (!s) warn_volume(path, map, &surface);
+    if (!s) warn_surface(path, map, &surface);
     sdm_mesh_dispose(&surface);
     return s;
 }

@@ -23,6 +23,8 @@ typedef struct cli_map {
     double error_mm;    /* of a network: its RMSE; else the bound on the error */
     double volume; /* of the shape, mm^3: a surface that encloses much less or more is warned of; 0:
                       not known */
+    size_t pieces; /* closed surfaces of the shape: more of them in a file are warned of; 0: not
+                      known */
     const char *origin; /* "model CHECKSUM", or the method without a network: "exact", "edt" ... */
     sdm_reason reason;  /* why the exact engine replaced the network */
     const sdm_check *check; /* errors of the network's map; NULL: not checked */

@@ -206,14 +206,15 @@ static void warn_open(const sdm_part_audit *audit)
     sdm_text_dispose(&text);
 }
 
-static void warn_thin(const sdm_part_audit *audit, double voxel)
+static bool warn_thin(const sdm_part_audit *audit, double voxel)
 {
     const size_t i = sdm_part_audit_thinnest(audit);
-    if (i == audit->n || !sdm_too_thin(audit->part[i].thick, voxel)) return;
+    if (i == audit->n || !sdm_too_thin(audit->part[i].thick, voxel)) return false;
     sdm_text text = {0};
     cli_describe_thin(audit, i, voxel, &text);
     if (!text.failed) cli_warn("%s", text.data);
     sdm_text_dispose(&text);
+    return true;
 }
 
 static void warn_inside_out(const sdm_part_audit *audit, const char *mend)
@@ -231,15 +232,16 @@ static void warn_inside_out(const sdm_part_audit *audit, const char *mend)
         cli_warn("%zu more parts are inside out", audit->inside_out - told);
 }
 
-void cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend)
+bool cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend)
 {
     sdm_part_audit audit;
-    if (sdm_part_audit_make(mesh, false, &audit, NULL)) return;
+    if (sdm_part_audit_make(mesh, false, &audit, NULL)) return false;
     warn_open(&audit);
     cli_warn_audit(&audit.mesh);
     warn_inside_out(&audit, mend);
-    warn_thin(&audit, voxel);
+    const bool thin = warn_thin(&audit, voxel);
     sdm_part_audit_dispose(&audit);
+    return thin;
 }
 
 const char *cli_verdict_name(sdm_status verdict)

@@ -39,8 +39,9 @@ const char *cli_verdict_name(sdm_status verdict);
 /* Audits the mesh and warns as cli_warn_audit() does, and of the part with most open edges, of each
  * of the first parts that are inside out and that the engine does not turn, and of the thinnest
  * part if it is too thin for voxels of this size (mm; 0: there is no grid). mend: what the user can
- * do about an inside-out part. Says nothing if the audit fails: the engine reports that. */
-void cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend);
+ * do about an inside-out part. Says nothing if the audit fails: the engine reports that. Returns
+ * whether it warned of a thin part. */
+bool cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend);
 
 /* Turns the parts of the mesh that are inside out (--turn-parts) and says how many. */
 sdm_status cli_turn_parts(sdm_mesh *mesh, sdm_error *err);

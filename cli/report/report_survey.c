@@ -283,6 +283,36 @@ static void tell_thin(teller *t)
     sdm_mesh_dispose(&mesh);
 }
 
+/* One line about parts without thickness. */
+static void tell_flat(teller *t)
+{
+    const sdm_survey_count *c = &t->s->found.flat;
+    sdm_text text = {0};
+    sdm_mesh mesh = {0};
+    sdm_part_audit audit = {0};
+    size_t i = 0;
+    // tell_unit() and tell_params() explain lengths in m
+    if (!c->shapes || t->s->found.narrow || t->s->found.scale.odd_size) return;
+    if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
+        while (i + 1 < audit.n && !sdm_survey_part_is_flat(&audit, i)) i++;
+        if (audit.part[i].state == SDM_PART_FLAT)
+            sdm_text_add(&text, "walls lie on each other at ");
+        else
+            sdm_text_add(&text,
+                         "part %zu of %zu has walls %.2g mm apart, less than a thousandth of the "
+                         "shape, at ",
+                         i + 1, audit.n, audit.part[i].thick);
+        add_params(t->s, c->worst, SIZE_MAX, &text);
+        sdm_text_add(&text, " (");
+        add_share(t->s, c, &text);
+        sdm_text_add(&text, "): no grid shows it; let the range of its thickness begin higher, or "
+                            "are its vertices in m?");
+        tell(t, SDM_E_QUALITY, &text);
+    }
+    sdm_part_audit_dispose(&audit);
+    sdm_mesh_dispose(&mesh);
+}
+
 /* One line if the vertices are hardly in mm. */
 static void tell_unit(teller *t)
 {
@@ -321,6 +351,13 @@ static void tell_params(teller *t)
                          "1 mm of the parameter '%s' moves no vertex by more than %.2g mm: are the "
                          "vertices of a part in another unit than mm?",
                          params[k].name, f->speed[k]);
+            tell(t, SDM_E_QUALITY, &slow);
+        } else if (sdm_survey_is_narrow(f, t->s->shape, k)) {
+            sdm_text_add(&slow,
+                         "the parameter '%s' ranges from %g to %g mm, which moves no vertex of a "
+                         "shape of %.3g mm by more than %.2g mm: are these m (times 1000)?",
+                         params[k].name, params[k].min, params[k].max, f->scale.size,
+                         f->speed[k] * (params[k].max - params[k].min));
             tell(t, SDM_E_QUALITY, &slow);
         }
         if (sdm_survey_is_odd_angle(&params[k])) {
@@ -410,6 +447,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_inside_out(&t);
     tell_turned(&t);
     tell_folded(&t);
+    tell_flat(&t);
     tell_sizes(&t);
     tell_jumps(&t);
     tell_unit(&t);

@@ -103,8 +103,8 @@ static sdm_status check_jumps(const sdm_band *b, double width, sdm_error *err)
         return sdm_fail(
             err, SDM_E_ARG,
             "no voxel of the map is inside the surface: there is no level set to write; "
-            "use a grid that holds the shape, or write the map itself (--dense; in C "
-            "sdm_vdb_opts.dense)");
+            "use a grid that holds the shape, or write the map itself "
+            "(sdm_vdb_opts.dense)");
     if (jumps)
         return sdm_fail(err, SDM_E_QUALITY,
                         "not a distance map: it jumps across the whole band of %g mm at %zu of its "

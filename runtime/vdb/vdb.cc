@@ -282,7 +282,7 @@ void check_options(const sdm_grid &g, const sdm_vdb_opts &o, sdm_error *err)
         !(std::fabs(g.spacing[1] - h) <= 1e-6 * h && std::fabs(g.spacing[2] - h) <= 1e-6 * h))
         need(sdm_fail(err, SDM_E_ARG,
                       "spacing %g x %g x %g mm: a level set needs voxels of one size; write the "
-                      "map itself instead (--dense; in C sdm_vdb_opts.dense)",
+                      "map itself instead (sdm_vdb_opts.dense)",
                       g.spacing[0], g.spacing[1], g.spacing[2]));
     // keeps a margin below the largest number, because the background is rounded up
     if (!o.dense && !(band_of(o) * h < (o.half ? 65000.0 : 3e38)))
@@ -307,7 +307,7 @@ openvdb::math::Transform::Ptr uniform_transform(const sdm_grid &g, sdm_error *er
     if (!transform->hasUniformScale())
         need(sdm_fail(err, SDM_E_ARG,
                       "to OpenVDB voxels of %g mm on turned axes are not uniform; write the map "
-                      "itself instead (--dense; in C sdm_vdb_opts.dense)",
+                      "itself instead (sdm_vdb_opts.dense)",
                       g.spacing[0]));
     return transform;
 }
@@ -375,8 +375,8 @@ Grid::Ptr make_from_blocks(const sdm_blocks &b, const sdm_vdb_opts &o, sdm_vdb_r
     if (!inside)
         need(sdm_fail(err, SDM_E_ARG,
                       "no voxel of the map is inside the surface: there is no level set to write; "
-                      "use a grid that holds the shape, or write the map itself (--dense; in C "
-                      "sdm_vdb_opts.dense)"));
+                      "use a grid that holds the shape, or write the map itself "
+                      "(sdm_vdb_opts.dense)"));
     grid->tree().prune();
     mend_creases(*grid, o, report, err);
     return grid;

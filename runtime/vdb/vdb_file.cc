@@ -69,7 +69,7 @@ void vdb_parts::check_level_set(const Grid &grid, const char *path, sdm_status s
     if (!said.empty())
         need(sdm_fail(err, status,
                       "%s: not a valid level set: %s(parts thinner than a voxel? use smaller "
-                      "voxels, or write the map itself: --dense; in C sdm_vdb_opts.dense)",
+                      "voxels, or write the map itself: sdm_vdb_opts.dense)",
                       path, said.c_str()));
 }
 

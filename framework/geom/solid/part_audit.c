@@ -172,7 +172,11 @@ static void count_edges_and_contacts(job *j)
     for (size_t i = 0; i < contacts->n; i++) {
         const uint32_t a = j->part_of[contacts->list[i].tri],
                        b = j->part_of[contacts->list[i].other];
-        if (a != b && a != NO_PART && b != NO_PART) j->out->part[a].met++;
+        if (a == NO_PART || b == NO_PART) continue;
+        if (a != b)
+            j->out->part[a].met++;
+        else
+            j->out->part[a].crossed++;
     }
 }
 

@@ -160,6 +160,10 @@ static void tell_units(tests *t)
         if (f->speed[k] == 0)
             sdm_text_add(&text, "%sthe parameter '%s' moves no vertex: does mesh() use it?",
                          text.data ? "; " : "", params[k].name);
+        else if (sdm_survey_is_narrow(f, t->instance, k))
+            sdm_text_add(
+                &text, "%s'%s' ranges from %g to %g mm in a shape of %.3g mm: are these m?",
+                text.data ? "; " : "", params[k].name, params[k].min, params[k].max, c->size);
     result(t, SDM_TEST_UNITS, text.data ? SDM_TEST_DOUBTFUL : SDM_TEST_PASSED, c->size, "%s",
            text.data ? text.data : "the size fits to mm, every parameter moves vertices");
     sdm_text_dispose(&text);

@@ -31,7 +31,7 @@ typedef struct finding {
     bool untested; /* for want of time; the status is then SDM_E_CANCELLED */
     size_t n_vert, n_tri;
     uint64_t crc_vert, crc_tri;
-    size_t open, inside_out, turned, apart, overlaps, degenerate, duplicate;
+    size_t open, inside_out, turned, apart, flat, overlaps, crossed, degenerate, duplicate;
     double volume, area, min[3], max[3];
     double thick;        /* of the thinnest part, mm; NaN: not known */
     double beyond[3][2]; /* mm */
@@ -72,6 +72,14 @@ static void hash(const sdm_mesh *m, finding *f)
     f->crc_tri = sdm_crc64(0, m->tri, 3 * m->n_tri * sizeof *m->tri);
 }
 
+bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i)
+{
+    const sdm_part *p = &a->part[i];
+    double size = 0;
+    for (int d = 0; d < 3; d++) size = fmax(size, a->mesh.max[d] - a->mesh.min[d]);
+    return p->state == SDM_PART_FLAT || p->thick < SDM_SURVEY_FLAT * size;
+}
+
 /* Makes the mesh at p and looks at it. Returns only errors that end the survey. */
 static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts, const double *p,
                           sdm_mesh *m, finding *out, sdm_error *err)
@@ -88,6 +96,8 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
         out->open += audit.part[i].open_edges;
         out->turned += audit.part[i].turned && audit.part[i].volume < 0;
         out->apart += audit.n > 1 && audit.part[i].state == SDM_PART_SOLID && !audit.part[i].met;
+        out->crossed += audit.part[i].crossed;
+        out->flat += sdm_survey_part_is_flat(&audit, i);
     }
     const size_t thinnest = sdm_part_audit_thinnest(&audit);
     out->thick = thinnest < audit.n ? audit.part[thinnest].thick : NAN;
@@ -250,6 +260,7 @@ static void sum_up(survey *v)
         count(&s->inside_out, i, (double)f->inside_out);
         count(&s->turned, i, (double)f->turned);
         count(&s->apart, i, (double)f->apart);
+        count(&s->flat, i, (double)f->flat);
         count(&s->overlaps, i, (double)f->overlaps);
         count(&s->degenerate, i, (double)f->degenerate);
         count(&s->duplicate, i, (double)f->duplicate);
@@ -293,7 +304,8 @@ static sdm_status find_folds(survey *v, int n_threads, sdm_error *err)
     s->fold_tested = n - 1;
     for (size_t i = 0; i < n && !status; i++) {
         const survey_fold *fold = &v->fold[i];
-        if (!(fold->share > SDM_SURVEY_FOLD_MIN)) continue;
+        const bool crossed = !v->found[0].crossed && v->found[i].crossed;
+        if (!(fold->share > (crossed ? SDM_SURVEY_FOLD_CROSSED : SDM_SURVEY_FOLD_MIN))) continue;
         if (fold->share > s->folded.amount) s->folded_at = fold->at;
         count(&s->folded, i, fold->share);
     }
@@ -498,9 +510,9 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
 {
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
     bool bad = s->inside_out.shapes || s->folded.shapes || s->turned.shapes || s->resized.shapes ||
-               s->rewired.shapes || s->cut.shapes || s->thin.shapes || s->unlike ||
-               s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
-               s->scale.odd_speed || s->scale.odd_angle;
+               s->rewired.shapes || s->cut.shapes || s->thin.shapes || s->flat.shapes ||
+               s->narrow || s->unlike || s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT ||
+               s->scale.odd_size || s->scale.odd_speed || s->scale.odd_angle;
     for (size_t k = 0; k < s->n_params && s->jump; k++)
         bad = bad || s->jump[k].kind != SDM_BREAK_NONE;
     bad = bad || s->slow;

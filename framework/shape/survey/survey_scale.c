@@ -27,6 +27,14 @@ bool sdm_survey_is_slow(const sdm_shape_survey *s, const sdm_instance *shape, si
     return s->speed[k] == 0 || (is_length(shape, k) && s->speed[k] < SDM_SURVEY_SPEED_SLOW);
 }
 
+bool sdm_survey_is_narrow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k)
+{
+    const sdm_param *p = &shape->params[k];
+    const double size = s->scale.size, value = fmax(fabs(p->min), fabs(p->max));
+    return is_length(shape, k) && s->speed[k] > 0 && value < SDM_SURVEY_VALUE * size &&
+           s->speed[k] * (p->max - p->min) < SDM_SURVEY_NARROW * size;
+}
+
 /* *speed = how far a vertex moves, at most, from the mesh `here` to the mesh with parameter k at
  * `value` and the others as in p[], divided by `change`, that of the parameter; NaN: not known. */
 static sdm_status measure_speed(const shape_family *f, const double *p, size_t k, double value,
@@ -111,7 +119,10 @@ static sdm_status find_speed(const shape_family *f, sdm_shape_survey *s, sdm_err
     for (size_t k = 0; k < s->n_params; k++)
         if (is_length(f->shape, k) && isfinite(s->speed[k]) && !(s->speed[k] <= s->scale.speed))
             s->scale.speed = s->speed[k], s->scale.param = k;
-    for (size_t k = 0; k < s->n_params; k++) s->slow += sdm_survey_is_slow(s, f->shape, k);
+    for (size_t k = 0; k < s->n_params; k++) {
+        s->slow += sdm_survey_is_slow(s, f->shape, k);
+        s->narrow += sdm_survey_is_narrow(s, f->shape, k);
+    }
     return status;
 }
 

@@ -35,6 +35,7 @@ typedef struct sdm_part {
     double open_at[3]; /* middle of the first of them, mm */
     size_t met; /* pairs of a triangle of this part and a triangle of another that meet or share an
                    edge */
+    size_t crossed;        /* pairs of triangles of this part that meet */
     double volume, area;   /* signed, mm^3, as given; mm^2 */
     double min[3], max[3]; /* bounding box, mm */
     bool turned;           /* the engine reverses its triangles, alone or with the whole mesh */

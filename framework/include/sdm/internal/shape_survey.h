@@ -3,6 +3,7 @@
 #pragma once
 
 #include "sdm/grid.h"
+#include "sdm/internal/part_audit.h"
 #include "sdm/registry.h"
 
 #ifdef __cplusplus
@@ -103,6 +104,10 @@ typedef struct sdm_shape_survey {
     double *speed;
     size_t slow;            /* parameters that are odd by themselves: sdm_survey_is_slow() */
     sdm_survey_count apart; /* solid parts that meet no other part of the mesh */
+    /* parts that enclose nothing, or are thinner than SDM_SURVEY_FLAT times the longest edge of the
+     * box of the shape: two walls of a part lie on each other */
+    sdm_survey_count flat;
+    size_t narrow; /* parameters whose range does nothing: sdm_survey_is_narrow() */
 
     /* the samples whose vertices lie beyond the centres of the outer voxels; amount: mm beyond */
     sdm_survey_count cut;
@@ -115,7 +120,8 @@ typedef struct sdm_shape_survey {
     /* what a brief survey leaves out */
     /* corners and the first samples in which triangles have turned over within a sixteenth of the
      * straight way from shape 0: walls pass through each other; amount: the share of these
-     * triangles of the area, which is above SDM_SURVEY_FOLD_MIN */
+     * triangles of the area, which is above SDM_SURVEY_FOLD_MIN, or, where a part of the shape
+     * meets itself and none of shape 0 does, above SDM_SURVEY_FOLD_CROSSED */
     sdm_survey_count folded;
     size_t fold_tested;    /* number of shapes that were compared with shape 0 */
     double folded_at;      /* where on the way to the worst of them: 0 at shape 0, 1 at the worst */
@@ -141,9 +147,12 @@ void sdm_shape_survey_dispose(sdm_shape_survey *s);
  * ones, at least 8. */
 size_t sdm_survey_samples(const sdm_instance *shape, size_t samples);
 
+/* Does part i of an audited mesh count for sdm_shape_survey.flat? */
+bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i);
+
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
  * are usable, but a training or derivatives would suffer: parts that are inside out (also those
- * that the engine turns), walls that pass through each other, sizes,
+ * that the engine turns), parts without thickness, walls that pass through each other, sizes,
  * triangles or vertices that jump, a grid that cuts or is too coarse for a part, wrong velocities,
  * results that differ from call to call, or an odd size or speed (another unit than mm, or a
  * parameter that does nothing). Else SDM_OK. */
@@ -152,6 +161,11 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 /* A smaller share of the area may turn over: slivers at a tip, rings of a tube that bends sharply
  * (at most 0.018 in the shape `duct`; an inner wall has 0.1 and more). */
 #define SDM_SURVEY_FOLD_MIN 0.04
+/* The same where the surface also meets itself: the inner wall of a thin neck has little area. */
+#define SDM_SURVEY_FOLD_CROSSED 0.002
+
+/* A part that is thinner than this share of the longest edge of the box shows on no grid. */
+#define SDM_SURVEY_FLAT 1e-3
 
 /* velocity_error above this is wrong. */
 #define SDM_SURVEY_VELOCITY_LIMIT 1e-3
@@ -170,6 +184,13 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 /* Is parameter k of the survey odd by itself: it moves no vertex, or its unit is mm and it is slow?
  * false if its speed is not known. */
 bool sdm_survey_is_slow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k);
+
+/* Does parameter k, whose unit is mm, do nothing that a grid shows over the range in the table of
+ * the shape? It moves no vertex by SDM_SURVEY_NARROW times the size of the shapes, and its values
+ * are smaller than SDM_SURVEY_VALUE times that size: they are likely to be in m. */
+bool sdm_survey_is_narrow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k);
+#define SDM_SURVEY_NARROW 1e-3
+#define SDM_SURVEY_VALUE 5e-3
 
 #ifdef __cplusplus
 }

@@ -542,6 +542,60 @@ static void test_labels_of_a_similar_shape_are_refused(void **state)
     sdm_instance_free(capsule);
 }
 
+/* A capsule of length 9, whose range ends at 8, as labels and as points: the fit ends at 8, and
+ * the message states the length of the data. */
+static void test_a_length_beyond_the_range_is_told(void **state)
+{
+    (void)state;
+    enum { POINTS = 3000 };
+    const double radius = 1.5, length = 9;
+    sdm_instance *capsule = shape_of("capsule");
+    const sdm_fit_source source = {
+        .shape = capsule,
+        .grid = sdm_grid_centred((int64_t[3]){24, 24, 44}, 0.3, (double[3]){0, 0, 0})};
+    const sdm_grid g = sdm_grid_centred((int64_t[3]){30, 30, 60}, 0.3, (double[3]){0, 0, 0});
+    float *v = calloc(sdm_grid_count(&g), sizeof *v);
+    double *x = malloc(3 * POINTS * sizeof *x);
+    if (!v || !x) abort();
+    for (int64_t k = 0, n = 0; k < g.n[2]; k++)
+        for (int64_t j = 0; j < g.n[1]; j++)
+            for (int64_t i = 0; i < g.n[0]; i++, n++) {
+                double y[3];
+                sdm_grid_world(&g, (double[3]){(double)i, (double)j, (double)k}, y);
+                const double beyond = fmax(fabs(y[2]) - 0.5 * length, 0);
+                v[n] = y[0] * y[0] + y[1] * y[1] + beyond * beyond < radius * radius;
+            }
+    for (size_t i = 0; i < POINTS; i++) { // evenly over the area: z by the theorem of Archimedes
+        const double turn = 6.283185307179586 * sdm_rng_uniform(5, 0, i),
+                     z = (sdm_rng_uniform(5, 1, i) - 0.5) * (length + 2 * radius),
+                     beyond = fmax(fabs(z) - 0.5 * length, 0),
+                     across = sqrt(radius * radius - beyond * beyond);
+        x[3 * i] = across * cos(turn), x[3 * i + 1] = across * sin(turn), x[3 * i + 2] = z;
+    }
+    for (int points = 0; points < 2; points++) {
+        const sdm_fit_target t = {.kind = points ? SDM_FIT_POINTS : SDM_FIT_LABEL,
+                                  .grid = g,
+                                  .values = v,
+                                  .points = x,
+                                  .n_points = POINTS};
+        sdm_fit_opts o = sdm_fit_defaults();
+        sdm_fit_result r;
+        sdm_error err = {0};
+        o.polish_eps = 1e-4;
+        const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);
+        const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_BOUNDS);
+        const char *at = f ? strstr(f->text, "the data want length = ") : NULL;
+        if (!at) fail_msg("points %d: %s: %s", points, f ? f->text : "no finding", err.text);
+        const double wanted = strtod(at + strlen("the data want length = "), NULL);
+        if (fabs(wanted - length) > 0.3) fail_msg("points %d: %s", points, f->text);
+        assert_non_null(strstr(f->text, "beyond its range 0.5 .. 8"));
+        if (s) assert_true(s == SDM_E_QUALITY && strstr(err.text, "the data want length = "));
+        sdm_fit_dispose(&r);
+    }
+    free(v), free(x);
+    sdm_instance_free(capsule);
+}
+
 // Maps whose voxels are as large as the shape's largest ball: doubt, with the edge that is needed.
 static void test_coarse_maps_are_told(void **state)
 {
@@ -634,6 +688,7 @@ int main(void)
         cmocka_unit_test(test_a_second_pose_is_refused),
         cmocka_unit_test(test_a_joint_in_the_wrong_place_is_refused),
         cmocka_unit_test(test_labels_of_a_similar_shape_are_refused),
+        cmocka_unit_test(test_a_length_beyond_the_range_is_told),
         cmocka_unit_test(test_coarse_maps_are_told),
         cmocka_unit_test(test_a_grid_that_cuts_is_refused),
         cmocka_unit_test(test_mirror_of_an_ellipsoid),

@@ -9,7 +9,10 @@ typedef struct fit_at_bounds {
     size_t n, n_wanted;
     /* "base ends at its bound: the data want more than 60, the largest value of its range", of
        the parameter that the data want farthest beyond; else "" */
-    char text[200];
+    char text[240];
+    /* the data are longer or shorter than the shape by a length that this parameter would explain:
+       `text` says how large it would have to be */
+    bool measured;
 } fit_at_bounds;
 
 /* Looks at the derivative of the log-likelihood at the estimate *r. The data want a parameter
@@ -17,3 +20,11 @@ typedef struct fit_at_bounds {
  * SDM_FIT_PREFERRED in log-likelihood of independent samples; factor: number of correlated samples
  * that count as one. */
 fit_at_bounds sdm_fit_at_bounds(const fit_problem *p, const sdm_fit_result *r, double factor);
+
+/* Labels and points: compares the length of the data along the axes of the shape with that of the
+ * shape, and with the derivative of the latter by a parameter at its bound. Far from the shape the
+ * likelihood says nothing: labels beyond the margin do not count, points pass for outliers. If
+ * another value of the parameter explains the difference, sets b->measured, b->text and, at least
+ * to 1, b->n_wanted. The maps must hold voxels (sdm_fit_maps_voxels()). SDM_E_NOMEM. */
+sdm_status sdm_fit_measure_beyond(const fit_problem *p, const sdm_fit_result *r, fit_at_bounds *b,
+                                  sdm_error *err);

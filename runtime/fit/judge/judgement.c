@@ -36,6 +36,8 @@
 #define STRAY_MAX 0.35
 // the same where the data want a parameter beyond its bound: these points may show the rest
 #define STRAY_AT_BOUND_MAX 0.02
+// voxels longer than this multiple of their limit explain residuals far beyond theirs
+#define MUCH_COARSER 2.0
 // part of a voxel by which the border of the maps may be inside the shape
 #define BORDER_MAX 0.1
 // largest fraction of the shapes of its family that a good network's grid cuts
@@ -119,14 +121,21 @@ static void check_bounds(const fit_problem *p, const fit_at_bounds *b, const sdm
     const bool matched =
                    r->outliers <= STRAY_AT_BOUND_MAX && has_passed(v, SDM_FIT_CHECK_RESIDUALS) &&
                    has_passed(v, SDM_FIT_CHECK_EMPTY) && has_passed(v, SDM_FIT_CHECK_MISSING) &&
-                   has_passed(v, SDM_FIT_CHECK_COVERED),
+                   has_passed(v, SDM_FIT_CHECK_PATCH) && has_passed(v, SDM_FIT_CHECK_COVERED),
                refused = b->n_wanted && !matched && !(p->opts->tolerance > 0);
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, !b->n, refused ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL,
-                      (double)b->n, 0, "%zu of %zu parameters at an end of their range%s%s%s", b->n,
-                      p->n_params, b->n_wanted ? ": " : "", b->text,
-                      refused ? ", and do not match the shape as it is: a wider range, or another "
-                                "shape (sdm_fit_opts.tolerance accepts a difference)"
-                              : "");
+    const sdm_fit_grade grade = refused ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL;
+    if (b->measured)
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, false, grade, (double)b->n, 0,
+                          "%s; widen the range in the table of the shape and in shape.ranges, or "
+                          "this is another shape",
+                          b->text);
+    else
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, !b->n, grade, (double)b->n, 0,
+                          "%zu of %zu parameters at an end of their range%s%s%s", b->n, p->n_params,
+                          b->n_wanted ? ": " : "", b->text,
+                          refused ? ", and do not match the shape as it is: a wider range, or "
+                                    "another shape (sdm_fit_opts.tolerance accepts a difference)"
+                                  : "");
 }
 
 // The residuals on both sides of the surface. The older observation model is biased in blurred
@@ -149,16 +158,19 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, fit_coars
                           "shape: nothing tests this fit");
         return;
     }
-    // the likely causes in their order
+    // the likely causes in their order; voxels that are a little too coarse do not explain
+    // residuals far beyond their limit
+    const bool other = beyond > FAR_BEYOND && voxel < MUCH_COARSER * coarse.limit;
     char cause[400] = "";
     if (bounds->n_wanted)
         snprintf(cause, sizeof cause, "%s", bounds->text);
     else if (isfinite(coarse.advice))
         snprintf(
             cause, sizeof cause,
-            "the voxels of the maps, %.2g mm, are coarse beside %s: try exact maps with voxels "
-            "of %.2g mm (sdm_fit_source.grid), or another shape lies there",
-            voxel, coarse.detail, coarse.advice);
+            "%sthe voxels of the maps, %.2g mm, are coarse beside %s: try exact maps with voxels "
+            "of %.2g mm (sdm_fit_source.grid)%s",
+            other ? "another shape lies there, or " : "", voxel, coarse.detail, coarse.advice,
+            other ? "" : ", or another shape lies there");
     else
         snprintf(cause, sizeof cause,
                  "%s, or the organ differs from the model (then say by how much it may: "
@@ -273,16 +285,19 @@ static void check_maps(const fit_problem *p, sdm_fit_verdict *v)
 }
 
 // The finding that explains a refusal: the first one that failed. Points that show too little come
-// before it, and, where the image shows a shape, a grid that cuts it. NULL: none failed.
-static const sdm_fit_finding *reason(const sdm_fit_verdict *v)
+// before it; where the image shows a shape, a grid that cuts it; and a parameter that the data want
+// beyond its range by a length that was measured. That the iterations did not converge explains
+// nothing where another check failed: they do not converge on another shape. NULL: none failed.
+static const sdm_fit_finding *reason(const sdm_fit_verdict *v, const fit_at_bounds *bounds)
 {
     const sdm_fit_finding *why = NULL;
     for (size_t i = 0; i < v->n_findings; i++) {
         const sdm_fit_finding *x = &v->findings[i];
         if (x->grade != SDM_FIT_FAILED) continue;
         const bool cut = x->kind == SDM_FIT_CHECK_GRID && why && why->kind > SDM_FIT_CHECK_CONTRAST,
-                   little = x->kind == SDM_FIT_CHECK_DATA || x->kind == SDM_FIT_CHECK_SIZE;
-        if (!why || cut || little) why = x;
+                   little = x->kind == SDM_FIT_CHECK_DATA || x->kind == SDM_FIT_CHECK_SIZE,
+                   beyond = x->kind == SDM_FIT_CHECK_BOUNDS && bounds->measured;
+        if (!why || why->kind == SDM_FIT_CHECK_CONVERGED || cut || little || beyond) why = x;
     }
     return why;
 }
@@ -297,7 +312,9 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     *factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
     if (sdm_fit_is_image(p)) r->evidence = evidence_of(p, r, *factor);
     const fit_coarseness coarse = sdm_fit_coarseness(p, sdm_fit_is_image(p) ? r->blur : 0);
-    const fit_at_bounds bounds = sdm_fit_at_bounds(p, r, *factor);
+    fit_at_bounds bounds = sdm_fit_at_bounds(p, r, *factor);
+    const bool points = p->target->kind == SDM_FIT_POINTS;
+    if (!s && !points && !sdm_fit_is_image(p)) s = sdm_fit_measure_beyond(p, r, &bounds, err);
     check_basics(p, r, v);
     check_maps(p, v);
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
@@ -307,16 +324,22 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
         v->n_units = misfit.n_units[0] + misfit.n_units[1];
         v->chi_square = misfit.noise_chi_square;
     }
-    if (!s && p->target->kind == SDM_FIT_POINTS) s = sdm_fit_check_points(p, &residuals, v, err);
-    if (!s && p->target->kind == SDM_FIT_POINTS) s = sdm_fit_check_coverage(p, v, err);
+    if (!s && points) s = sdm_fit_check_points(p, &residuals, v, err);
+    if (!s && points) s = sdm_fit_check_coverage(p, v, err);
+    // strays that form a surface belong to the data: they show how long these are
+    if (!s && points && !has_passed(v, SDM_FIT_CHECK_PATCH))
+        s = sdm_fit_measure_beyond(p, r, &bounds, err);
     if (!s) check_bounds(p, &bounds, r, v);
     if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
     if (!s) sdm_fit_check_voxels(p, coarse, v);
     if (!s) sdm_fit_check_determined(p, r, v);
     sdm_fit_residuals_dispose(&residuals);
     if (!s) s = sdm_fit_check_blob(p, *factor, v, err);
-    const sdm_fit_finding *why = s ? NULL : reason(v);
-    return s || !why ? s : sdm_fail(err, SDM_E_QUALITY, "%s", why->text);
+    const sdm_fit_finding *why = s ? NULL : reason(v, &bounds);
+    if (s || !why) return s;
+    const bool more = bounds.n_wanted && why->kind != SDM_FIT_CHECK_BOUNDS;
+    return sdm_fail(err, SDM_E_QUALITY, "%s%s%s", why->text, more ? "; " : "",
+                    more ? bounds.text : "");
 }
 
 double sdm_fit_compare(const sdm_fit_result *fit, const sdm_fit_result *rival)

@@ -26,6 +26,9 @@
 // largest share of the surface with a shorter gradient
 #define DETAILS_MAX 0.1
 
+// from this share on, thin walls bend the distance, not edges
+#define WALLS_MIN 0.3
+
 // points for each unknown that also test the fit: with fewer, most shapes pass close by all points
 #define POINTS_PER_UNKNOWN 3
 
@@ -130,10 +133,13 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
     if (fit_maps_direct(&p->maps)) return c;
     const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
                  details = detail_share(&p->maps);
-    if (details > 0) // at edges: the share grows with the voxel
-        coarseness_limit(&c, voxel * DETAILS_MAX / details * (1 + LIMIT_ERROR),
-                         "the details of the shape");
-    coarseness_limit(&c, VOXEL_OVER_RADIUS_MAX * radius, "the thickness of the shape");
+    const double thick = VOXEL_OVER_RADIUS_MAX * radius,
+                 // at edges the share grows with the voxel
+        edges = voxel * DETAILS_MAX / details * (1 + LIMIT_ERROR),
+                 // in walls thinner than two voxels all of the surface bends at once
+        walls = details > WALLS_MIN ? fmin(thick, 0.5 * voxel) : 0;
+    if (details > 0) coarseness_limit(&c, fmax(edges, walls), "the details of the shape");
+    coarseness_limit(&c, thick, "the thickness of the shape");
     if (p->given_labels || p->target->kind == SDM_FIT_LABEL)
         coarseness_limit(&c, VOXEL_OVER_LABEL_MAX * fit_longest_edge(&p->target->grid),
                          "the voxels of the labels");

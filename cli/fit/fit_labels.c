@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "fit_command.h"
+#include "report/terminal.h"
 #include "sdm/memory.h"
 
 /* Most labels that a message lists. */
@@ -84,16 +85,36 @@ size_t cli_fit_distinct(const sdm_volume *v, size_t most, float *found)
     return n;
 }
 
+/* list = " 1 2 5", the n values of labels that are not 0; returns their number. */
+static size_t list_labels(const float *found, size_t n, char list[16 * LABELS_TOLD])
+{
+    size_t labels = 0, used = 0;
+    list[0] = 0;
+    for (size_t i = 0; i < n && n <= LABELS_TOLD; i++)
+        if (found[i] < 0 || found[i] > 0)
+            used += (size_t)snprintf(list + used, 16 * LABELS_TOLD - used, " %g", (double)found[i]),
+                labels++;
+    return labels;
+}
+
+/* Tells that several labels are united because none was chosen. */
+static void notice_united(const char *path, const sdm_volume *v)
+{
+    float found[LABELS_TOLD];
+    char list[16 * LABELS_TOLD];
+    const size_t n = cli_fit_distinct(v, LABELS_TOLD, found);
+    if (list_labels(found, n, list) > 1)
+        cli_notice("%s: no label is chosen, so the labels%s count as one", path, list);
+}
+
 /* The message where a label is missing: the labels that are there, or that there are none. */
 static sdm_status missing_label(const char *path, const sdm_volume *v, const char *word,
                                 sdm_error *err)
 {
     float found[LABELS_TOLD];
     const size_t n = cli_fit_distinct(v, LABELS_TOLD, found);
-    char list[16 * LABELS_TOLD] = "";
-    for (size_t i = 0, used = 0; i < n && n <= LABELS_TOLD; i++)
-        if (found[i] < 0 || found[i] > 0)
-            used += (size_t)snprintf(list + used, sizeof list - used, " %g", (double)found[i]);
+    char list[16 * LABELS_TOLD];
+    list_labels(found, n, list);
     if (n <= LABELS_TOLD)
         return sdm_fail(err, SDM_E_FORMAT, "%s: no voxel has the label '%.100s'; its labels are%s",
                         path, word, list);
@@ -108,7 +129,10 @@ sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_l
 {
     const size_t n = sdm_grid_count(&v->grid);
     for (size_t i = 0; i < n; i++) values[i] = 0;
-    if (!words->n) add_all(v, values);
+    if (!words->n) {
+        add_all(v, values);
+        notice_united(path, v);
+    }
     for (size_t w = 0; w < words->n; w++) {
         label l;
         const sdm_status s = find_label(path, v, words->items[w], &l, err);

@@ -133,7 +133,8 @@ voxels=$(($(wc -c <label.nii) - 352))
 for labels in '--label 1 --label 77' '--label 77 --label 1'; do
     expect 3 "two.nii: no voxel has the label '77'; its labels are 1 2$" sdmgen fit $fit two.nii $labels
 done
-expect 0 - sdmgen fit $fit two.nii --label 1 --label 2 --rotation 0,0,0 --spacing 0.5 --json
+expect 0 'two.nii: no label is chosen, so the labels 1 2 count as one' \
+    sdmgen fit $fit two.nii --label 1 --label 2 --reference two.nii --rotation 0,0,0 --spacing 0.5 --json
 near "$(param rx)" "$rx" 0.001
 # A wall of one voxel between two compartments: closing joins them.
 plane=$(sed -n 's/.*"size": \[\([0-9]*\), \([0-9]*\),.*/\1 \2/p' truth.json | awk '{ print $1 * $2 }')

@@ -619,7 +619,7 @@ static void test_bad_maps_are_refused(void **state)
     write_refused(&g, v, &(sdm_vdb_opts){.dense = true}, SDM_E_ARG, "need finite");
     v[777] = kept;
     g.spacing[2] = 0.17;
-    write_refused(&g, v, NULL, SDM_E_ARG, "--dense");
+    write_refused(&g, v, NULL, SDM_E_ARG, "sdm_vdb_opts.dense");
     g.spacing[2] = 0.16;
     write_refused(&g, v, &(sdm_vdb_opts){.band_voxels = 2}, SDM_E_ARG, "need 3 to 100");
     write_refused(&g, v, &(sdm_vdb_opts){.band_voxels = NAN}, SDM_E_ARG, "need 3 to 100");

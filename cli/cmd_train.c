@@ -99,6 +99,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
             sdm_json_text(&j, "kind", other_kind(r));
             sdm_json_real(&j, "rmse_mm", r->other.rmse_mm);
             sdm_json_real(&j, "rmse_near_mm", r->other.rmse_near_mm);
+            sdm_json_real(&j, "rmse_voxel_mm", r->other_voxel_mm);
             sdm_json_close(&j, '}');
         }
         sdm_json_open(&j, "verdict", '{');
@@ -122,8 +123,9 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     cli_print_two("  time        ", times);
     if (use->n > 1) print_ranks(use);
     if (r->compared)
-        printf("  auto        trained %s, too: RMSE %.5f mm, near the surface %.5f mm; not kept\n",
-               other_kind(r), r->other.rmse_mm, r->other.rmse_near_mm);
+        printf("  auto        trained %s, too: RMSE %.5f mm, within a voxel of the surface %.5f mm; "
+               "not kept\n",
+               other_kind(r), r->other.rmse_mm, r->other_voxel_mm);
     cli_print_verdict(&r->verdict);
     return SDM_OK;
 }

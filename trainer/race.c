@@ -35,7 +35,7 @@ typedef struct entrant {
     bool finished;       /* false: the shape does not allow this kind */
     bool ready;          /* it needs no training */
     bool cut;            /* the budget of time ended before all maps of the trial were made */
-    sdm_accuracy accuracy;
+    turn_figures errors; /* of its trial */
     double seconds;
     char left_out[SDM_ERROR_TEXT_MAX]; /* why the shape does not allow it; "": it does */
     trainer run;                       /* its trial; run.kind is NULL without one */
@@ -84,6 +84,16 @@ static bool trial_enough(void *user)
     return trainer_start_fraction(((entrant *)user)->race) > TRIALS_SHARE;
 }
 
+/* *out = the errors of a trial. */
+static sdm_status measure(const trainer *r, turn_figures *out, sdm_error *err)
+{
+    sdm_accuracy accuracy = {0};
+    double rmse_voxel_mm = 0;
+    const sdm_status s = trainer_export_measure(r, &accuracy, &rmse_voxel_mm, err);
+    *out = (turn_figures){r->config->network.kind, accuracy.rmse_mm, rmse_voxel_mm};
+    return s;
+}
+
 /* Trains and measures one entrant. Keeps its design and its maps. */
 static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_error *err)
 {
@@ -118,7 +128,7 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
             trainer_enter(r, SDM_PHASE_MODE_FIT);
             s = r->kind->run(r, false, err);
         }
-        if (!s) s = trainer_export_measure(r, &e->accuracy, err);
+        if (!s) s = measure(r, &e->errors, err);
         e->finished = !s;
     }
     e->seconds = trainer_seconds(r);
@@ -138,9 +148,9 @@ static sdm_status try_kind(trainer *t, sdm_config *config, entrant *e, sdm_error
     const sdm_status s = trial(t, config, e, err);
     if (!s && e->finished)
         trainer_message(t,
-                        "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere (trial on "
-                        "%lld maps, %.0f s)",
-                        trainer_turn_name(e->kind), e->accuracy.rmse_near_mm, e->accuracy.rmse_mm,
+                        "auto: %s leaves %.2g mm within a voxel of the surface, %.2g mm everywhere "
+                        "(trial on %lld maps, %.0f s)",
+                        trainer_turn_name(e->kind), e->errors.rmse_voxel_mm, e->errors.rmse_mm,
                         e->ready ? (long long)config->data.start : (long long)e->run.data.n_start,
                         e->seconds);
     return s;
@@ -155,7 +165,7 @@ static const char *decide(const entrant *carried, const entrant *pod, training_t
         return "the only kind left";
     }
     if (!pod->finished) return "hardly any error is left";
-    const double ratio = trainer_score(&pod->accuracy) / trainer_score(&carried->accuracy);
+    const double ratio = trainer_score(&pod->errors) / trainer_score(&carried->errors);
     // a trial with fewer maps than planned rules nothing out
     if (ratio > HOPELESS && !pod->cut) return "training does not make up for such a difference";
     if (ratio <= 1) {
@@ -185,13 +195,13 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
     size_t n = 0;
     sdm_status s = try_kind(t, scratch, &e[0], err);
     const bool done =
-        e[0].finished && trainer_score(&e[0].accuracy) < ENOUGH * t->config->grid.spacing[0];
+        e[0].finished && trainer_score(&e[0].errors) < ENOUGH * t->config->grid.spacing[0];
     if (!s && e[0].finished && !done) s = try_kind(t, scratch, &e[1], err);
     if (!s) {
         const char *reason = decide(&e[0], &e[1], out);
         trainer_message(t, "auto: network.kind is %s: %s", trainer_turn_name(out->kind[0]), reason);
         for (size_t i = 0; i < 2; i++)
-            if (e[i].finished) figures[n++] = (turn_figures){e[i].kind, &e[i].accuracy};
+            if (e[i].finished) figures[n++] = e[i].errors;
         char why[2 * SDM_ERROR_TEXT_MAX];
         snprintf(why, sizeof why, "%s%s%s", reason,
                  e[0].left_out[0] ? ": template is left out: " : "", e[0].left_out);

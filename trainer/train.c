@@ -84,7 +84,6 @@ static sdm_status train_turn(run *r, const trainer *common, bool *unfit, sdm_tra
  * any of the budget is left. */
 static sdm_status begin_second(run *r, const trainer *t, sdm_error *err)
 {
-    const sdm_accuracy *a = &r->turns.first.accuracy;
     const double left = trainer_turns_left(&r->turns, r->asked);
     const char *first = trainer_turn_name(r->turns.kind[0]),
                *second = trainer_turn_name(r->turns.kind[1]);
@@ -93,14 +92,14 @@ static sdm_status begin_second(run *r, const trainer *t, sdm_error *err)
                         second);
         return SDM_OK;
     }
-    const turn_figures figures = {r->turns.kind[0], a};
+    const turn_figures figures = trainer_turn_figures(r->turns.kind[0], &r->turns.first);
     const sdm_status s =
         trainer_turns_record(&r->metrics, r->turns.kind[1], NULL, NULL, &figures, 1, err);
     if (s) return s;
     trainer_message(t,
-                    "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere; %s is trained "
-                    "with %.0f %% of the budget",
-                    first, a->rmse_near_mm, a->rmse_mm, second, 100 * left);
+                    "auto: %s leaves %.2g mm within a voxel of the surface, %.2g mm everywhere; %s "
+                    "is trained with %.0f %% of the budget",
+                    first, figures.rmse_voxel_mm, figures.rmse_mm, second, 100 * left);
     r->turns.at = 1;
     return SDM_OK;
 }
@@ -109,19 +108,22 @@ static sdm_status begin_second(run *r, const trainer *t, sdm_error *err)
 static sdm_status keep_better(run *r, trainer *t, sdm_train_report *report, sdm_error *err)
 {
     const sdm_train_report both[2] = {r->turns.first, *report};
-    const int best = trainer_second_wins(&r->turns, &both[1].accuracy);
+    const int best = trainer_second_wins(&r->turns, &both[1]);
     turn_figures figures[2];
     for (int i = 0; i < 2; i++) {
-        figures[i] = (turn_figures){r->turns.kind[i], &both[i].accuracy};
-        trainer_message(t, "auto: %s leaves %.2g mm near the surface, %.2g mm everywhere%s",
-                        trainer_turn_name(r->turns.kind[i]), both[i].accuracy.rmse_near_mm,
-                        both[i].accuracy.rmse_mm, i == best ? ": it is kept" : "");
+        figures[i] = trainer_turn_figures(r->turns.kind[i], &both[i]);
+        trainer_message(t,
+                        "auto: %s leaves %.2g mm within a voxel of the surface, %.2g mm "
+                        "everywhere%s",
+                        trainer_turn_name(r->turns.kind[i]), figures[i].rmse_voxel_mm,
+                        figures[i].rmse_mm, i == best ? ": it is kept" : "");
     }
     *report = both[best];
     report->seconds = both[0].seconds + both[1].seconds;
     report->verdict.saved_seconds = both[1].verdict.saved_seconds;
     report->compared = true;
     report->other = both[!best].accuracy;
+    report->other_voxel_mm = both[!best].verdict.rmse_voxel_mm;
     report->other_kind = r->turns.kind[!best];
     const sdm_status s =
         trainer_turns_record(&r->metrics, r->turns.kind[best], NULL, NULL, figures, 2, err);

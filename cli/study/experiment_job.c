@@ -144,32 +144,55 @@ static bool is_same_config(const sdm_config *a, const char *name, const char *te
 
 /* Name of the file in the folder of a row with network.kind: auto that holds the configuration as
  * the row states it: model and checkpoint hold the kind that the trainer chose, and its part of the
- * budget. */
+ * budget. Until the training is finished the file begins with the line UNFINISHED: a model beside it
+ * may be that of the first of two kinds. */
 #define ASKED "asked.yaml"
 #define ASKED_BYTES_MAX (1 << 20)
+#define UNFINISHED "# not finished\n"
 
 /* True unless the row has network.kind: auto and its folder holds a training of another
- * configuration. */
-static bool is_same_asked(const cli_experiment_run *run, const cli_experiment_job *job, size_t row)
+ * configuration. *finished = false if it holds one of this configuration that was stopped. */
+static bool is_same_asked(const cli_experiment_run *run, const cli_experiment_job *job, size_t row,
+                          bool *finished)
 {
     char path[SDM_PATH_TEXT_MAX];
     uint8_t *bytes = NULL;
     size_t size = 0;
+    *finished = true;
     if (job->config->network.kind != SDM_NETWORK_AUTO) return true;
     const bool same = !cli_experiment_path(run, row, ASKED, path, NULL) &&
                       !sdm_file_read(path, ASKED_BYTES_MAX, &bytes, &size, NULL) &&
                       is_same_config(job->config, path, (const char *)bytes, size);
+    *finished = !same || strncmp((const char *)bytes, UNFINISHED, strlen(UNFINISHED));
     sdm_free(bytes);
     return same;
 }
 
-sdm_status cli_experiment_write_asked(const cli_experiment_run *run, const cli_experiment_job *job,
+/* Writes asked.yaml. */
+static sdm_status write_asked(const cli_experiment_run *run, const cli_experiment_job *job,
+                              bool finished, sdm_error *err)
+{
+    char path[SDM_PATH_TEXT_MAX];
+    sdm_config *c = NULL;
+    sdm_text text = {0};
+    sdm_status s = SDM_ALLOC(&c, 1, "configuration", err);
+    if (!s) {
+        *c = *job->config;
+        sdm_text_add(&text, "%s", finished ? "" : UNFINISHED);
+        dump_network_keys(c, &text);
+        s = cli_experiment_path(run, job->index, ASKED, path, err);
+    }
+    if (!s) s = sdm_text_write(&text, path, err);
+    sdm_text_dispose(&text);
+    sdm_free(c);
+    return s;
+}
+
+sdm_status cli_experiment_begin_asked(const cli_experiment_run *run, const cli_experiment_job *job,
                                       sdm_error *err)
 {
     static const char *const REPLACED[] = {"model.sdm", "checkpoint.sdmc"};
     char path[SDM_PATH_TEXT_MAX];
-    sdm_config *c = NULL;
-    sdm_text text = {0};
     if (job->config->network.kind != SDM_NETWORK_AUTO) return SDM_OK;
     sdm_status s = SDM_OK;
     // they would belong to another asked.yaml
@@ -177,17 +200,15 @@ sdm_status cli_experiment_write_asked(const cli_experiment_run *run, const cli_e
         s = cli_experiment_path(run, job->index, REPLACED[i], path, err);
         if (!s) unlink(path);
     }
-    if (!s) s = SDM_ALLOC(&c, 1, "configuration", err);
-    if (!s) {
-        *c = *job->config;
-        dump_network_keys(c, &text);
-        s = cli_experiment_path(run, job->index, ASKED, path, err);
-    }
     if (!s) s = sdm_make_folder(job->config->output.folder, err);
-    if (!s) s = sdm_text_write(&text, path, err);
-    sdm_text_dispose(&text);
-    sdm_free(c);
-    return s;
+    return s ? s : write_asked(run, job, false, err);
+}
+
+sdm_status cli_experiment_end_asked(const cli_experiment_run *run, const cli_experiment_job *job,
+                                    sdm_error *err)
+{
+    return job->config->network.kind == SDM_NETWORK_AUTO ? write_asked(run, job, true, err)
+                                                         : SDM_OK;
 }
 
 static bool is_same_model(const sdm_config *c, const char *path)
@@ -228,9 +249,11 @@ cli_experiment_stored cli_experiment_find_stored(const cli_experiment_run *run,
         cli_experiment_path(run, row, "model.sdm", model, NULL) ||
         cli_experiment_path(run, row, "checkpoint.sdmc", checkpoint, NULL))
         return CLI_STORED_NONE;
-    if (is_same_asked(run, job, row)) {
-        if (is_same_model(job->config, model)) return CLI_STORED_MODEL;
+    bool finished;
+    if (is_same_asked(run, job, row, &finished)) {
+        if (finished && is_same_model(job->config, model)) return CLI_STORED_MODEL;
         if (is_same_checkpoint(job->config, checkpoint)) return CLI_STORED_CHECKPOINT;
+        if (!finished) return CLI_STORED_NONE;
     }
     return access(model, F_OK) && access(checkpoint, F_OK) ? CLI_STORED_NONE : CLI_STORED_OTHER;
 }

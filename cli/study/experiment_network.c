@@ -35,13 +35,14 @@ static sdm_status train_network(const cli_experiment_run *run, const cli_experim
     cli_progress progress;
     sdm_train_report report = {0};
     const sdm_train_hooks hooks = cli_train_hooks(&progress);
-    sdm_status s = resume ? SDM_OK : cli_experiment_write_asked(run, job, err);
+    sdm_status s = resume ? SDM_OK : cli_experiment_begin_asked(run, job, err);
     if (s) return s;
     const long before = cli_bench_peak_start();
     cli_progress_start(&progress);
     s = sdm_train(job->config, job->shape, job->config->output.folder, resume, &hooks, &report,
                   err);
     cli_progress_end(&progress, !s);
+    if (!s) s = cli_experiment_end_asked(run, job, err);
     if (!s)
         cli_experiment_log(run, "%s: trained in %.1f s, peak memory %.0f MB",
                            run->e->rows[job->index].title, report.seconds,

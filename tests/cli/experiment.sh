@@ -114,6 +114,28 @@ expect 0 - sdmgen experiment auto.yaml train.steps=1000000000 --dry-run --out au
 has '^POD .*go on training, measure'
 expect 0 - sdmgen experiment auto.yaml --dry-run --out auto-stopped
 has '^POD .*train anew, measure'
+# Two kinds are trained, one after the other: while the second trains, the model in the folder is that of the first.
+cat >two.yaml <<'END'
+experiment: {title: two kinds, samples: 4, pictures: no}
+shape: {name: linkage, options: {links: 1, length: 1.5, radius: 1, tip: 1, edge: 0.5}}
+grid: {size: [26, 26, 16], spacing: 0.4}
+network: {degree: 2, width: 16, modes: 24}
+data: {static: 0, static_share: 0, start: 40, online: 40, holdout: 4}
+train: {steps: 60, batch: 16}
+methods:
+  - {name: both, network: auto}
+END
+sdmgen experiment two.yaml --out two --peers none >out 2>err || bad "two kinds: $(cat err)"
+grep -q 'auto: pod leaves .*: it is kept' err || bad "two kinds: $(cat err)"
+expect 0 - sdmgen experiment two.yaml --dry-run --out two
+has '^both .*load, measure'
+stopped_at 'fit +[0-9]' experiment two.yaml train.steps=1000000000 --out two-stopped --peers none
+present two-stopped/both/model.sdm two-stopped/both/checkpoint.sdmc
+expect 0 - sdmgen experiment two.yaml train.steps=1000000000 --dry-run --out two-stopped
+has '^both .*go on training, measure'
+rm two-stopped/both/checkpoint.sdmc
+expect 0 - sdmgen experiment two.yaml train.steps=1000000000 --dry-run --out two-stopped
+has '^both .*train, measure'
 
 # An interrupt keeps the tables of the previous run. --force trains again; a run without --force then resumes what the forced run began.
 tables=$(cksum stopped/table.*)

@@ -92,8 +92,6 @@ static void assert_kind(const char *kind)
     assert_int_equal(c.network.kind, strcmp(kind, "pod") ? SDM_NETWORK_TEMPLATE : SDM_NETWORK_POD);
 }
 
-static double score(const sdm_accuracy *a) { return hypot(a->rmse_near_mm, 0.1 * a->rmse_mm); }
-
 // The model that is kept has the bits of a training of its kind alone: a template without a
 // correction leaves all steps to pod. The other kind has the larger error.
 static void better_is_kept(void **state)
@@ -118,7 +116,8 @@ static void better_is_kept(void **state)
             assert_true(hash_of("model.sdm") == expected);
             if (threads > 1) assert_true(hash_of("metrics.jsonl") == metrics);
             metrics = hash_of("metrics.jsonl");
-            assert_true(r.compared && score(&r.other) > score(&r.accuracy));
+            assert_true(r.compared && hypot(r.other_voxel_mm, 0.1 * r.other.rmse_mm) >
+                                          hypot(r.verdict.rmse_voxel_mm, 0.1 * r.accuracy.rmse_mm));
             assert_int_equal(r.other_kind, which ? SDM_NETWORK_POD : SDM_NETWORK_TEMPLATE);
             assert_true(r.accuracy.mse_mm2 == single.accuracy.mse_mm2);
             assert_int_equal(r.steps, single.steps);
@@ -341,13 +340,13 @@ static void turns_share_the_budget(void **state)
                     c.train.minutes == (i == 2 ? 2 : 0));
         assert_true(fabs(trainer_turns_left(&r, &asked) - (i == 2 ? 2 / 3.0 : 0.9)) < 1e-12);
     }
-    const sdm_accuracy near = {.rmse_near_mm = 3, .mse_mm2 = 1600, .rmse_mm = 40},
-                       far = {.rmse_near_mm = 4, .mse_mm2 = 100, .rmse_mm = 10};
-    const training_turns r = {.first = {.accuracy = near}};
-    assert_true(trainer_score(&near) == 5 && trainer_second_wins(&r, &far));
+    const sdm_train_report near = {.verdict.rmse_voxel_mm = 3, .accuracy.rmse_mm = 40},
+                           far = {.verdict.rmse_voxel_mm = 4, .accuracy.rmse_mm = 10};
+    const training_turns r = {.first = near};
+    const turn_figures figures = trainer_turn_figures(SDM_NETWORK_TEMPLATE, &near);
+    assert_true(trainer_score(&figures) == 5 && trainer_second_wins(&r, &far));
     sdm_text metrics = {0};
     const trainer t = {.metrics = &metrics};
-    const turn_figures figures = {SDM_NETWORK_TEMPLATE, &near};
     history h;
     sdm_text_add(&metrics, "{\"phase\": \"refine\", \"step\": 7, \"heldout_mse_mm2\": 1}\n");
     assert_int_equal(

@@ -288,14 +288,16 @@ static sdm_status model_open(const trainer *t, const char *path, const descripti
     return s;
 }
 
-sdm_status trainer_export_measure(const trainer *t, sdm_accuracy *out, sdm_error *err)
+sdm_status trainer_export_measure(const trainer *t, sdm_accuracy *out, double *rmse_voxel_mm,
+                                  sdm_error *err)
 {
-    model_errors more;
+    model_errors more = {0};
     description *d = NULL;
     sdm_model *model = NULL;
     sdm_status s = description_create(t, &d, err);
     if (!s) s = model_open(t, "model", d, &model, err);
     if (!s) s = measure_model(t, model, t->data.n_holdout, out, &more, err);
+    *rmse_voxel_mm = more.rmse_voxel_mm;
     sdm_model_free(model);
     description_free(d);
     return s;

@@ -50,14 +50,18 @@ const char *trainer_turn_name(sdm_network_kind kind)
     return kind == SDM_NETWORK_POD ? "pod" : "template";
 }
 
-double trainer_score(const sdm_accuracy *a)
+turn_figures trainer_turn_figures(sdm_network_kind kind, const sdm_train_report *r)
 {
-    return sqrt(a->rmse_near_mm * a->rmse_near_mm + 0.01 * a->mse_mm2);
+    return (turn_figures){kind, r->accuracy.rmse_mm, r->verdict.rmse_voxel_mm};
 }
 
-bool trainer_second_wins(const training_turns *r, const sdm_accuracy *second)
+double trainer_score(const turn_figures *f) { return hypot(f->rmse_voxel_mm, 0.1 * f->rmse_mm); }
+
+bool trainer_second_wins(const training_turns *r, const sdm_train_report *second)
 {
-    return trainer_score(second) < trainer_score(&r->first.accuracy);
+    const turn_figures a = trainer_turn_figures(r->kind[0], &r->first),
+                       b = trainer_turn_figures(r->kind[1], second);
+    return trainer_score(&b) < trainer_score(&a);
 }
 
 sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
@@ -74,11 +78,11 @@ sdm_status trainer_turns_record(sdm_text *metrics, sdm_network_kind kind,
     for (size_t i = 0; i < n; i++) {
         const char *name = trainer_turn_name(e[i].kind);
         snprintf(key, sizeof key, "%s_rmse_mm", name);
-        sdm_json_real(&j, key, e[i].accuracy->rmse_mm);
-        snprintf(key, sizeof key, "%s_rmse_near_mm", name);
-        sdm_json_real(&j, key, e[i].accuracy->rmse_near_mm);
+        sdm_json_real(&j, key, e[i].rmse_mm);
+        snprintf(key, sizeof key, "%s_rmse_voxel_mm", name);
+        sdm_json_real(&j, key, e[i].rmse_voxel_mm);
         snprintf(key, sizeof key, "%s_score_mm", name);
-        sdm_json_real(&j, key, trainer_score(e[i].accuracy));
+        sdm_json_real(&j, key, trainer_score(&e[i]));
     }
     sdm_json_close(&j, '}');
     if (!j.text.failed) sdm_text_add(metrics, "%s\n", j.text.data);

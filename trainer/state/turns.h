@@ -29,18 +29,20 @@ double trainer_turns_left(const training_turns *r, const sdm_config *asked);
 /* "pod" or "template". */
 const char *trainer_turn_name(sdm_network_kind kind);
 
-/* The figure by which kinds are compared, mm, the smaller the better: the root of the sum of the
-   mean square error near the surface and a hundredth of that of all voxels. */
-double trainer_score(const sdm_accuracy *a);
-
-/* true if the second kind with this accuracy is better than the first. */
-bool trainer_second_wins(const training_turns *r, const sdm_accuracy *second);
-
-/* One of the kinds that a line of the metrics compares. */
+/* The errors of one of the kinds that are compared, root mean squares in mm. */
 typedef struct turn_figures {
     sdm_network_kind kind;
-    const sdm_accuracy *accuracy;
+    double rmse_mm, rmse_voxel_mm; /* of all voxels; of those within a voxel of the surface */
 } turn_figures;
+
+turn_figures trainer_turn_figures(sdm_network_kind kind, const sdm_train_report *r);
+
+/* The figure by which kinds are compared, mm, the smaller the better: the root of the sum of the
+   mean square error within a voxel of the surface and a hundredth of that of all voxels. */
+double trainer_score(const turn_figures *f);
+
+/* true if the second kind with this result is better than the first. */
+bool trainer_second_wins(const training_turns *r, const sdm_train_report *second);
 
 /* Appends a line with phase "auto" to *metrics: `kind` is trained next, or kept; then: the kind to
    be trained after it, NULL: none; reason: why, in words, NULL: as the errors tell; e[n]: the

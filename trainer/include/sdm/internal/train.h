@@ -73,10 +73,12 @@ typedef struct sdm_train_report {
     int64_t steps, samples;
     double seconds;
     sdm_verdict verdict;
-    /* network.kind: auto has trained another kind, too, which was worse; its accuracy. */
+    /* network.kind: auto has trained another kind, too, which was worse; its accuracy, and its root
+       mean square error of the voxels within a voxel of the surface. */
     bool compared;
     sdm_network_kind other_kind;
     sdm_accuracy other;
+    double other_voxel_mm;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled

@@ -123,9 +123,10 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     cli_print_two("  time        ", times);
     if (use->n > 1) print_ranks(use);
     if (r->compared)
-        printf("  auto        trained %s, too: RMSE %.5f mm, within a voxel of the surface %.5f mm; "
-               "not kept\n",
-               other_kind(r), r->other.rmse_mm, r->other_voxel_mm);
+        printf(
+            "  auto        trained %s, too: RMSE %.5f mm, within a voxel of the surface %.5f mm; "
+            "not kept\n",
+            other_kind(r), r->other.rmse_mm, r->other_voxel_mm);
     cli_print_verdict(&r->verdict);
     return SDM_OK;
 }

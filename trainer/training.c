@@ -186,8 +186,7 @@ static sdm_status train_finish(trainer *t, sdm_outfile **config, sdm_train_repor
     t->phase = SDM_PHASE_EVALUATE;
     trainer_report(t, 1, true);
     sdm_status s = trainer_export_judge(t, report, err);
-    if (!s && trainer_writes(t) &&
-        (!is_second(t) || trainer_second_wins(t->turns, report)))
+    if (!s && trainer_writes(t) && (!is_second(t) || trainer_second_wins(t->turns, report)))
         s = write_model(t, config, err);
     report->seconds = trainer_shared_seconds(t);
     s = sdm_comm_agree(t->hooks.comm, s, err);

@@ -73,8 +73,8 @@ cli_experiment_stored cli_experiment_find_stored(const cli_experiment_run *run,
                                                  const cli_experiment_job *job);
 
 /* With network.kind: auto; other kinds: does nothing. Before a training starts: removes model and
- * checkpoint of an earlier one and writes asked.yaml, the configuration as the row states it, to the
- * folder of the row; after the training: marks it as finished. SDM_E_IO, SDM_E_NOMEM. */
+ * checkpoint of an earlier one and writes asked.yaml, the configuration as the row states it, to
+ * the folder of the row; after the training: marks it as finished. SDM_E_IO, SDM_E_NOMEM. */
 sdm_status cli_experiment_begin_asked(const cli_experiment_run *run, const cli_experiment_job *job,
                                       sdm_error *err);
 sdm_status cli_experiment_end_asked(const cli_experiment_run *run, const cli_experiment_job *job,

@@ -144,8 +144,8 @@ static bool is_same_config(const sdm_config *a, const char *name, const char *te
 
 /* Name of the file in the folder of a row with network.kind: auto that holds the configuration as
  * the row states it: model and checkpoint hold the kind that the trainer chose, and its part of the
- * budget. Until the training is finished the file begins with the line UNFINISHED: a model beside it
- * may be that of the first of two kinds. */
+ * budget. Until the training is finished the file begins with the line UNFINISHED: a model beside
+ * it may be that of the first of two kinds. */
 #define ASKED "asked.yaml"
 #define ASKED_BYTES_MAX (1 << 20)
 #define UNFINISHED "# not finished\n"

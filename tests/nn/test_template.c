@@ -1,6 +1,6 @@
 /* Maps of the template network against its definition: frames, warps, the minimum over the parts,
  * culling, grids of all kinds, the same bits for all instruction sets.
- * Tests: template_build.c template_carry.c template_forward.c template_kernels_avx2.c
+ * Tests: template_build.c template_forward.c template_kernels_avx2.c
  * template_kernels_avx512.c template_kernels_generic.c template_native.c template_pose.c
  * template_blocks.c template_corners.c template_far.c template_run.c template_warp.c
  * template_work.c */

@@ -373,6 +373,93 @@ static void block_reproduces_cubic_functions_with_the_same_bits(void **state)
     }
 }
 
+static void block_returns_the_smallest_magnitude(void **state)
+{
+    (void)state;
+    enum { LINE = 8, PLANE = 16, BLOCKS = 200 };
+    bool seen[64] = {false}; // the voxels in which it was
+    size_t n_seen = 0;
+    for (size_t i = 0; i < BLOCKS; i++) {
+        float *corner = numbers(32, 1900 + i, -1, 1), value[64];
+        for (size_t t = 0; t < n_tables; t++) {
+            const float least = tables[t]->block(corner, LINE, PLANE, value);
+            size_t at = 0;
+            for (size_t v = 1; v < 64; v++)
+                if (fabsf(value[v]) < fabsf(value[at])) at = v;
+            assert_true(least == fabsf(value[at]));
+            n_seen += !seen[at], seen[at] = true;
+        }
+        free(corner);
+    }
+    assert_true(n_seen > 48);
+}
+
+static void separate_makes_columns(void **state)
+{
+    (void)state;
+    for (size_t n = 1; n <= LENGTH; n++)
+        for (size_t t = 0; t < n_tables; t++)
+            for (size_t stride = 4; stride <= 8; stride += 4) {
+                float *from = numbers(n * stride, 1600, -2, 2);
+                const size_t room = n + SDM_TEMPLATE_LANES;
+                rows to = rows_new(room, 1700, 0, 1), before = rows_new(room, 1700, 0, 1);
+                tables[t]->separate(n, from, stride, to.row);
+                for (size_t c = 0; c < 4; c++) {
+                    for (size_t i = 0; i < n; i++)
+                        assert_true(to.row[c][i] == from[i * stride + c]);
+                    // nothing beyond the end is written
+                    assert_memory_equal(to.row[c] + n, before.row[c] + n,
+                                        SDM_TEMPLATE_LANES * sizeof *from);
+                }
+                rows_free(&to);
+                rows_free(&before);
+                free(from);
+            }
+}
+
+// The distance d = f s + r at station i, and its gradient along axis a.
+static double corner_plainly(const rows *r, size_t i, size_t stride, double spacing, bool slope)
+{
+    double at[ROWS], change[ROWS];
+    for (size_t k = 0; k < 9; k++) {
+        at[k] = (double)r->row[k][i];
+        change[k] = ((double)r->row[k][i + stride] - (double)r->row[k][i - stride]) / 2;
+    }
+    if (!slope) return at[0] * at[4] + at[5];
+    double by_u = 0;
+    for (size_t c = 0; c < 3; c++) by_u += at[1 + c] * change[6 + c];
+    return at[4] * spacing * by_u + at[0] * change[4] + change[5];
+}
+
+static void corners_are_central_differences_with_the_same_bits(void **state)
+{
+    (void)state;
+    const size_t stride[3] = {1, 5, 13};
+    for (size_t n = 1; n <= LENGTH; n++) {
+        rows r = rows_new(n + 2 * stride[2] + SDM_TEMPLATE_LANES - 1, 1800, -1, 1);
+        const template_samples samples = {.f = r.row[0],
+                                          .g = {r.row[1], r.row[2], r.row[3]},
+                                          .s = r.row[4],
+                                          .r = r.row[5],
+                                          .u = {r.row[6], r.row[7], r.row[8]}};
+        float *first = calloc(4 * n, sizeof *first), *other = calloc(4 * n, sizeof *other);
+        assert_true(first && other);
+        tables[0]->corners(&samples, stride[2], n, stride, 0.3f, first);
+        for (size_t i = 0; i < n; i++)
+            for (size_t k = 0; k < 4; k++)
+                assert_true(fabs((double)first[4 * i + k] - corner_plainly(&r, stride[2] + i,
+                                                                           k ? stride[k - 1] : 1,
+                                                                           0.3, k > 0)) <= 1e-6);
+        for (size_t t = 1; t < n_tables; t++) {
+            tables[t]->corners(&samples, stride[2], n, stride, 0.3f, other);
+            assert_memory_equal(first, other, 4 * n * sizeof *first);
+        }
+        free(first);
+        free(other);
+        rows_free(&r);
+    }
+}
+
 int main(void)
 {
     find_tables();
@@ -383,6 +470,9 @@ int main(void)
         cmocka_unit_test(normalise_is_the_formula_with_the_same_bits),
         cmocka_unit_test(expand_makes_splines_with_the_same_bits),
         cmocka_unit_test(block_reproduces_cubic_functions_with_the_same_bits),
+        cmocka_unit_test(block_returns_the_smallest_magnitude),
+        cmocka_unit_test(separate_makes_columns),
+        cmocka_unit_test(corners_are_central_differences_with_the_same_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

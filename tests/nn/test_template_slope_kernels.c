@@ -229,10 +229,7 @@ static void sums_and_choices_are_the_formulas(void **state)
         }
     }
     const float slope[3] = {0.5f, -0.25f, 0.125f};
-    float least = INFINITY;
-    for (size_t v = 0; v < 64; v++) least = fminf(least, fabsf(b[1][v]));
     for (size_t t = 0; t < n_tables; t++) {
-        assert_true(tables[t]->least(b[1]) == least);
         float lesser[64], plane[64], largest = -INFINITY;
         memcpy(lesser, b[0], sizeof lesser);
         lesser[5] = 0.25f;
@@ -253,11 +250,6 @@ static void sums_and_choices_are_the_formulas(void **state)
             float values[64];
             for (size_t i = 0; i < 64; i++) values[i] = plane[i] - (i == v ? 0.0f : 0.5f);
             assert_false(tables[t]->is_above(0.1f, slope, values));
-        }
-        for (size_t v = 0; v < 64; v++) { // wherever it lies
-            float values[64];
-            for (size_t i = 0; i < 64; i++) values[i] = i == v ? -0.5f : 1;
-            assert_true(tables[t]->least(values) == 0.5f);
         }
     }
 }

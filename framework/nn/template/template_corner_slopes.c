@@ -77,25 +77,24 @@ static void corner_slope(const template_work *w, size_t c, const point_slope *at
                          const station_motion *m, const float *sample, size_t i,
                          const size_t stride[3], float corner[4])
 {
-    const float *all = w->warp[c].sample, *s = all + SAMPLE_SIZE * i,
-                *ds = sample + SAMPLE_SIZE * i;
-    const float half = 0.5f, h = (float)w->k->parts[c].near.spacing;
-    corner[0] = ds[SAMPLE_F] * s[SAMPLE_S] + s[SAMPLE_F] * ds[SAMPLE_S] + ds[SAMPLE_R];
+    const template_samples *all = &w->warp[c].sample;
+    const float *ds = sample + SAMPLE_SIZE * i;
+    const float half = 0.5f, h = (float)w->k->parts[c].near.spacing, f = all->f[i], s = all->s[i];
+    corner[0] = ds[SAMPLE_F] * s + f * ds[SAMPLE_S] + ds[SAMPLE_R];
     for (size_t a = 0; a < 3; a++) {
         const size_t above = i + stride[a], below = i - stride[a];
-        const float *up = all + SAMPLE_SIZE * above, *down = all + SAMPLE_SIZE * below,
-                    *dup = sample + SAMPLE_SIZE * above, *ddown = sample + SAMPLE_SIZE * below;
+        const float *dup = sample + SAMPLE_SIZE * above, *ddown = sample + SAMPLE_SIZE * below;
         float change = 0, dchange = 0;
         for (size_t e = 0; e < 3; e++) {
             const float du = at[above].u[e] - at[below].u[e];
-            change += s[SAMPLE_G + e] * du;
+            change += all->g[e][i] * du;
             dchange += ds[SAMPLE_G + e] * du +
-                       s[SAMPLE_G + e] * (m->points[4 * above + e] - m->points[4 * below + e]);
+                       all->g[e][i] * (m->points[4 * above + e] - m->points[4 * below + e]);
         }
-        corner[1 + a] = half * (h * (ds[SAMPLE_S] * change + s[SAMPLE_S] * dchange) +
-                                ds[SAMPLE_F] * (up[SAMPLE_S] - down[SAMPLE_S]) +
-                                s[SAMPLE_F] * (dup[SAMPLE_S] - ddown[SAMPLE_S]) +
-                                (dup[SAMPLE_R] - ddown[SAMPLE_R]));
+        corner[1 + a] =
+            half * (h * (ds[SAMPLE_S] * change + s * dchange) +
+                    ds[SAMPLE_F] * (all->s[above] - all->s[below]) +
+                    f * (dup[SAMPLE_S] - ddown[SAMPLE_S]) + (dup[SAMPLE_R] - ddown[SAMPLE_R]));
     }
 }
 

@@ -53,64 +53,51 @@ static void rigid_corners(const template_work *w, size_t c, float *corner)
    factor s of the metric and the correction r. The gradients of the carried points, of s and of r
    are central differences between stations. */
 
-// The samples of row (y, z) of stations.
+// The samples of the stations first .. first + n - 1, a row; afterwards those of the next row, of
+// which the kernels overwrite some.
 static void sample_row(template_work *w, size_t c, size_t first, size_t n)
 {
     const float *points = w->warp[c].points + 4 * first, *metric = w->warp[c].metric + 8 * first;
+    const template_samples *s = &w->warp[c].sample;
     const template_table *t = w->kernels;
+    const template_row row = w->row;
+    // the lookup reads and writes the arrays of the samples
+    w->row.f = s->f + first;
+    for (size_t a = 0; a < 3; a++) w->row.u[a] = s->u[a] + first, w->row.g[a] = s->g[a] + first;
     const template_row *r = &w->row;
-    float *out = w->warp[c].sample + SAMPLE_SIZE * first;
-    for (size_t x = 0; x < n; x++) {
-        for (size_t a = 0; a < 3; a++) r->u[a][x] = points[4 * x + a];
-        for (size_t a = 0; a < 6; a++) r->metric[a][x] = metric[8 * x + a];
-        r->value[x] = 1;
-        r->far_f[x] = 0;
-    }
+    t->separate(n, points, 4, (float *const[]){r->u[0], r->u[1], r->u[2], r->far_f});
+    t->separate(n, metric, 8, r->metric);
+    t->separate(n, metric + 4, 8,
+                (float *const[]){r->metric[4], r->metric[5], r->far_f, r->far_g[0]});
     sdm_template_lookup(w, c, n);
+    for (size_t x = 0; x < n; x++) r->value[x] = 1, s->r[first + x] = 0;
     t->normalise(n, r->value, (const float *const *)r->g, (const float *const *)r->metric,
-                 r->value);
-    for (size_t x = 0; x < n; x++) r->far_f[x] = 0; // lookup may have used it
+                 s->s + first);
     if (w->correction_at.map && c == 0)
-        t->correct(&w->correction_at, n, (const float *const *)r->u, r->far_f);
-    for (size_t x = 0; x < n; x++, out += SAMPLE_SIZE) {
-        out[SAMPLE_F] = r->f[x];
-        for (size_t a = 0; a < 3; a++) out[SAMPLE_G + a] = r->g[a][x];
-        out[SAMPLE_S] = r->value[x];
-        out[SAMPLE_R] = r->far_f[x];
-    }
+        t->correct(&w->correction_at, n, (const float *const *)r->u, s->r + first);
+    w->row = row;
 }
 
-// The corner at a station; stride[a]: stations between neighbours along axis a.
-static void warped_corner(const template_work *w, size_t c, size_t at, const size_t stride[3],
-                          float corner[4])
+// Sets the distance at n corners from station `first` on to NAN outside of the lattice `far`.
+static void forget_stations(const template_work *w, size_t c, size_t first, size_t n, float *corner)
 {
-    const float *p = w->warp[c].points, *all = w->warp[c].sample, *s = all + SAMPLE_SIZE * at;
-    const float half = 0.5f, h = (float)w->k->parts[c].near.spacing;
-    corner[0] = s[SAMPLE_F] * s[SAMPLE_S] + s[SAMPLE_R];
-    for (size_t a = 0; a < 3; a++) {
-        const size_t above = at + stride[a], below = at - stride[a];
-        const float *up = all + SAMPLE_SIZE * above, *down = all + SAMPLE_SIZE * below;
-        float change = 0;
-        for (size_t i = 0; i < 3; i++)
-            change += s[SAMPLE_G + i] * (p[4 * above + i] - p[4 * below + i]);
-        corner[1 + a] =
-            half * (h * s[SAMPLE_S] * change + (s[SAMPLE_F] * (up[SAMPLE_S] - down[SAMPLE_S]) +
-                                                (up[SAMPLE_R] - down[SAMPLE_R])));
-    }
+    float *const *u = w->warp[c].sample.u;
+    for (size_t x = 0, at = first; x < n; x++, at++)
+        if (!is_in(&w->k->far[c], (const float[]){u[0][at], u[1][at], u[2][at]}))
+            corner[4 * x] = NAN;
 }
 
 static void warped_corners(template_work *w, size_t c, float *corner)
 {
-    const size_t *n = w->k->stations, stride[3] = {1, n[0], n[0] * n[1]};
+    const size_t *n = w->k->stations, stride[3] = {1, n[0], n[0] * n[1]}, line = w->blocks[0] + 1;
+    const float spacing = (float)w->k->parts[c].near.spacing;
     for (size_t row = 0; row < n[1] * n[2]; row++) sample_row(w, c, row * n[0], n[0]);
     for (size_t z = 0; z <= w->blocks[2]; z++)
-        for (size_t y = 0; y <= w->blocks[1]; y++)
-            for (size_t x = 0; x <= w->blocks[0]; x++, corner += 4) {
-                const size_t at = 1 + x + stride[1] * (1 + y) + stride[2] * (1 + z);
-                const float *u = w->warp[c].points + 4 * at;
-                warped_corner(w, c, at, stride, corner);
-                if (!is_in(&w->k->far[c], u)) corner[0] = NAN;
-            }
+        for (size_t y = 0; y <= w->blocks[1]; y++, corner += 4 * line) {
+            const size_t first = 1 + stride[1] * (1 + y) + stride[2] * (1 + z);
+            w->kernels->corners(&w->warp[c].sample, first, line, stride, spacing, corner);
+            forget_stations(w, c, first, line, corner);
+        }
 }
 
 void sdm_template_corners(template_work *w, size_t c)

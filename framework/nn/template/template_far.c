@@ -17,10 +17,10 @@ size_t sdm_template_corner_step(const template_work *w, size_t i)
     return (i & 1) + (i >> 1 & 1) * line + (i >> 2) * line * (w->blocks[1] + 1);
 }
 
-void sdm_template_interpolate(const template_work *w, const float *corner, float *value)
+float sdm_template_interpolate(const template_work *w, const float *corner, float *value)
 {
     const size_t line = 4 * (w->blocks[0] + 1), plane = line * (w->blocks[1] + 1);
-    w->kernels->block(corner, line, plane, value);
+    return w->kernels->block(corner, line, plane, value);
 }
 
 // 1 / (longest edge of a voxel, mm)
@@ -43,10 +43,13 @@ float sdm_template_far(const template_work *w, size_t c, const template_block *b
 {
     const part_state *part = &w->part[c];
     if (!part->warped && !(part->rigid && !sdm_template_is_within(w, c, b))) return 0;
-    sdm_template_interpolate(w, w->corner + 4 * sdm_template_corner_at(w, c, b), value);
+    const float *corner = w->corner + 4 * sdm_template_corner_at(w, c, b);
+    // the first voxel of the block is its first corner
+    if (part->warped && fabsf(*corner) * voxels_per_mm(w) <= SDM_TEMPLATE_FAR_VOXELS) return 0;
+    const float smallest = sdm_template_interpolate(w, corner, value);
     if (isnan(value[0])) return 0; // every value is a sum with terms of all corners
     if (part->rigid) return 1;
-    const float from = SDM_TEMPLATE_FAR_VOXELS, least = w->kernels->least(value) * voxels_per_mm(w);
+    const float from = SDM_TEMPLATE_FAR_VOXELS, least = smallest * voxels_per_mm(w);
     return least <= from ? 0 : least >= from + 1 ? 1 : least - from;
 }
 

@@ -80,8 +80,8 @@ typedef struct warp_scratch {
     /* [stations][4] carried points as indices; after sdm_template_prefilter() coefficients of the
        B-splines through them */
     float *points;
-    float *metric;             /* [stations][8] */
-    float *sample;             /* [stations][8] samples, see template_work.h */
+    float *metric; /* [stations][8] */
+    template_samples sample;
     template_station *station; /* [stations]; NULL unless derivatives are wanted */
 } warp_scratch;
 

@@ -43,6 +43,12 @@ typedef struct template_slope_rows {
     float *dr[3];
 } template_slope_rows;
 
+/* A part with a warp at its stations: template f, its gradient g, factor s of the metric,
+   correction r, index u. */
+typedef struct template_samples {
+    float *f, *g[3], *s, *r, *u[3];
+} template_samples;
+
 /* The warp of a part. */
 typedef struct template_warp {
     const float
@@ -121,12 +127,19 @@ typedef struct template_table {
     /* out[i stride .. i stride + 3] = f[i] and the three sums by[a] . g[i], i = 0 .. n - 1. */
     void (*tangents)(size_t n, const float *f, const float *const *g, const float (*by)[3],
                      size_t stride, float *out);
-    /* The smallest of |value[64]|, none of which is NAN. */
-    float (*least)(const float *value);
     /* value[4][4][4] = a function in a block of 4 x 4 x 4 voxels, cubic interpolation (Hermite)
        from its value and slopes by blocks at the eight corners, the voxels (0, 0, 0) .. (4, 4, 4):
-       corner[x][4], and the same `line` floats further along y and `plane` floats along z. */
-    void (*block)(const float *corner, size_t line, size_t plane, float *value);
+       corner[x][4], and the same `line` floats further along y and `plane` floats along z. Returns
+       the smallest of |value[64]| if none of them is NAN. */
+    float (*block)(const float *corner, size_t line, size_t plane, float *value);
+    /* to[c][i] = from[i stride + c] for c = 0 .. 3 and i = 0 .. n - 1. */
+    void (*separate)(size_t n, const float *from, size_t stride, float *const *to);
+    /* out[n][4] = the distance f s + r at the stations first .. first + n - 1, and its gradient by
+       blocks, with central differences of u, s and r between stations; stride[3]: stations between
+       neighbours along x, y, z; spacing: of u, mm. Reads up to SDM_TEMPLATE_LANES - 1 stations
+       beyond. */
+    void (*corners)(const template_samples *p, size_t first, size_t n, const size_t stride[3],
+                    float spacing, float *out);
     /* *place = where the point y[3] lies in a warp. Beyond the lattice the displacement is that of
        the nearest point of the lattice. */
     void (*find_place)(const template_warp *w, const double y[3], template_place *place);

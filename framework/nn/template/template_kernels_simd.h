@@ -272,17 +272,6 @@ static void lookup(const template_level *l, size_t n, const float *const *u, flo
     }
 }
 
-static float least(const float *value)
-{
-    const veci magnitude = splat_int(INT32_MAX);
-    vec all = (vec)((veci)load(value) & magnitude);
-    for (size_t v = VW; v < 64; v += VW)
-        all = MIN_VEC((vec)((veci)load(value + v) & magnitude), all);
-    all = MIN_VEC(all, high_pairs(all, all));
-    all = MIN_VEC(all, spread(all, 1));
-    return VW == 8 && all[VW - 4] < all[0] ? all[VW - 4] : all[0];
-}
-
 static bool is_above(float base, const float slope[3], const float *value)
 {
     static const float x[8] = {0, 1, 2, 3, 0, 1, 2, 3}, y[8] = {0, 0, 0, 0, 1, 1, 1, 1};
@@ -339,26 +328,29 @@ static void line(size_t n, double first, double step, float *out)
         for (int32_t i = 0; i < SDM_TEMPLATE_LANES; i++) out[i] = (float)(first + step * (at + i));
 }
 
+// out[i stride .. i stride + 3] = the elements i of four rows, for i = 0 .. n - 1, n <= VW.
+static inline void store_points(const vec row[4], size_t n, size_t stride, float *out)
+{
+    const vec low[2] = {interleave_low(row[0], row[1]), interleave_low(row[2], row[3])},
+              high[2] = {interleave_high(row[0], row[1]), interleave_high(row[2], row[3])};
+    float point[4][VW]; // points k, and with VW = 8 also k + 4
+    store(point[0], low_pairs(low[0], low[1]));
+    store(point[1], high_pairs(low[0], low[1]));
+    store(point[2], low_pairs(high[0], high[1]));
+    store(point[3], high_pairs(high[0], high[1]));
+    for (size_t i = 0; i < n; i++, out += stride)
+        memcpy(out, point[i % 4] + i / 4 * 4, 4 * sizeof *out);
+}
+
 static void tangents(size_t n, const float *f, const float *const *g, const float (*by)[3],
                      size_t stride, float *out)
 {
-    for (size_t v = 0; v < n; v += VW) {
-        vec slope[3];
+    for (size_t v = 0; v < n; v += VW, out += VW * stride) {
+        vec row[4] = {load(f + v)};
         EACH(a, 3)
-        slope[a] = splat(by[a][0]) * load(g[0] + v) + splat(by[a][1]) * load(g[1] + v) +
-                   splat(by[a][2]) * load(g[2] + v);
-        const vec low[2] = {interleave_low(load(f + v), slope[0]),
-                            interleave_low(slope[1], slope[2])},
-                  high[2] = {interleave_high(load(f + v), slope[0]),
-                             interleave_high(slope[1], slope[2])};
-        float point[4][VW]; // points k, and with VW = 8 also k + 4
-        store(point[0], low_pairs(low[0], low[1]));
-        store(point[1], high_pairs(low[0], low[1]));
-        store(point[2], low_pairs(high[0], high[1]));
-        store(point[3], high_pairs(high[0], high[1]));
-        const size_t count = n - v < VW ? n - v : VW;
-        for (size_t i = 0; i < count; i++, out += stride)
-            memcpy(out, point[i % 4] + i / 4 * 4, 4 * sizeof *out);
+        row[1 + a] = splat(by[a][0]) * load(g[0] + v) + splat(by[a][1]) * load(g[1] + v) +
+                     splat(by[a][2]) * load(g[2] + v);
+        store_points(row, n - v < VW ? n - v : VW, stride, out);
     }
 }
 
@@ -407,64 +399,7 @@ static void correct(const template_correction *c, size_t n, const float *const *
     }
 }
 
-/* Cubic interpolation in a block: linear interpolation along the three axes, plus for each axis the
-   cubic correction along the four edges parallel to it, interpolated linearly between them. The
-   four floats of a quad are edges along z, then voxels along y, then voxels along x; a vector of
-   eight floats holds two planes of voxels. Letters: l linear, c correction, s slope; p and q are
-   the slopes at both ends less the slope of the straight line. */
-
-// Weights of the voxels of a block along an axis: t, t (1 - t)^2, t^2 (1 - t).
-static const float WEIGHTS[3][4] = {
-    {0, 0.25f, 0.5f, 0.75f}, {0, 0.140625f, 0.125f, 0.046875f}, {0, 0.046875f, 0.125f, 0.140625f}};
-
-// The four edges along z of a block at one end: distance, and slopes by x, y, z.
-static inline void load_corners(const float *corner, size_t line, vec out[4])
-{
-    const vec a = repeat_four(corner), b = repeat_four(corner + 4), c = repeat_four(corner + line),
-              d = repeat_four(corner + line + 4);
-    const vec ab[2] = {interleave_low(a, b), interleave_high(a, b)},
-              cd[2] = {interleave_low(c, d), interleave_high(c, d)};
-    EACH(i, 2) out[2 * i] = low_pairs(ab[i], cd[i]), out[2 * i + 1] = high_pairs(ab[i], cd[i]);
-}
-
-static void block(const float *corner, size_t line, size_t plane, float *value)
-{
-    vec low[4], high[4], change[3], w[3];
-    load_corners(corner, line, low);
-    load_corners(corner + plane, line, high);
-    EACH(i, 3) change[i] = high[i] - low[i], w[i] = repeat_four(WEIGHTS[i]);
-    const vec p = low[3] - change[0], q = high[3] - change[0];
-    for (int z = 0; z < 4; z += VW / 4) {
-        vec t[3]; // weights of the planes
-#if VW == 8
-        EACH(i, 3)
-        t[i] = z ? SHUFFLE_PLANES(w[i], 2) : SHUFFLE_PLANES(w[i], 0);
-#else
-        EACH(i, 3) t[i] = splat(WEIGHTS[i][z]);
-#endif
-        const vec lz = low[0] + t[0] * change[0], cz = t[1] * p - t[2] * q,
-                  sx = low[1] + t[0] * change[1], sy = low[2] + t[0] * change[2];
-        vec l[2], c[2], s[2]; // at both ends along x, for the four voxels along y
-        EACH(i, 2)
-        {
-            const vec l0 = spread(lz, i), dl = spread(lz, i + 2) - l0, c0 = spread(cz, i),
-                      s0 = spread(sx, i);
-            l[i] = l0 + w[0] * dl;
-            c[i] = c0 + w[0] * (spread(cz, i + 2) - c0) + w[1] * (spread(sy, i) - dl) -
-                   w[2] * (spread(sy, i + 2) - dl);
-            s[i] = s0 + w[0] * (spread(sx, i + 2) - s0);
-        }
-        const vec dl = l[1] - l[0], first = l[0] + c[0], slope = dl + (c[1] - c[0]), px = s[0] - dl,
-                  qx = s[1] - dl;
-        EACH(y, 4)
-        {
-            const vec v = spread(first, y) + w[0] * spread(slope, y) + w[1] * spread(px, y) -
-                          w[2] * spread(qx, y);
-            store_planes(value + 16 * z + 4 * y, v);
-        }
-    }
-}
-
+#include "template_kernels_block.h"
 #include "template_kernels_slopes.h"
 #include "template_kernels_warp.h"
 
@@ -475,7 +410,6 @@ const template_table TABLE = {.expand = expand,
                               .take_lesser = take_lesser,
                               .line = line,
                               .tangents = tangents,
-                              .least = least,
                               .normalise = normalise,
                               .correct = correct,
                               .lookup_slopes = lookup_slopes,
@@ -483,6 +417,8 @@ const template_table TABLE = {.expand = expand,
                               .correct_slopes = correct_slopes,
                               .sum_products = sum_products,
                               .block = block,
+                              .separate = separate,
+                              .corners = corners,
                               .find_place = find_place,
                               .displace = displace,
                               .invert_line = invert_line,

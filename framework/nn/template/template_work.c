@@ -59,7 +59,13 @@ static void take_warp(template_work *w, size_t c, bool slopes, void *memory, siz
                                    4 * sdm_lattice_count(&k->parts[c].warp) * sizeof *s->control);
     s->points = sdm_template_take(memory, at, 4 * n * sizeof *s->points);
     s->metric = sdm_template_take(memory, at, 8 * n * sizeof *s->metric);
-    s->sample = sdm_template_take(memory, at, 8 * n * sizeof *s->sample);
+    // the kernels use room for whole vectors
+    const size_t bytes = (n + 2 * SDM_TEMPLATE_LANES) * sizeof(float);
+    float **const samples[] = {&s->sample.f,    &s->sample.g[0], &s->sample.g[1],
+                               &s->sample.g[2], &s->sample.s,    &s->sample.r,
+                               &s->sample.u[0], &s->sample.u[1], &s->sample.u[2]};
+    for (size_t i = 0; i < sizeof samples / sizeof *samples; i++)
+        *samples[i] = sdm_template_take(memory, at, bytes);
     if (slopes) s->station = sdm_template_take(memory, at, n * sizeof *s->station);
     sdm_template_take_lines(k, memory, at, &w->lines[c]);
     w->lines[c].points = s->points;

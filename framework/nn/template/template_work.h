@@ -35,8 +35,7 @@ typedef struct warp_lines {
     size_t plane_of, line_of;     /* the layer and the row of blocks to which they belong */
 } warp_lines;
 
-/* A sample of a part with a warp at a station: template f, its gradient g, factor s of the metric,
-   correction r. */
+/* Derivatives of a part with a warp at a station: elements of template_samples. */
 enum { SAMPLE_F = 0, SAMPLE_G = 1, SAMPLE_S = 4, SAMPLE_R = 5, SAMPLE_SIZE = 8 };
 
 /* A part in the current map. */
@@ -168,8 +167,8 @@ size_t sdm_template_corner_at(const template_work *w, size_t c, const template_b
 size_t sdm_template_corner_step(const template_work *w, size_t i);
 
 /* value[64] = a function in a block, from its values and slopes at the corners of all blocks;
-   corner: the first corner of the block. */
-void sdm_template_interpolate(const template_work *w, const float *corner, float *value);
+   corner: the first corner of the block. Returns the smallest of |value[64]|. */
+float sdm_template_interpolate(const template_work *w, const float *corner, float *value);
 
 /* The share of the interpolated distances to part c in a block: 0 exact, 1 interpolated, between
    them blended. Unless it is 0, value[64] = the interpolated distances. */

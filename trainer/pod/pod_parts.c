@@ -163,6 +163,8 @@ sdm_status trainer_pod_parts(const trainer *t, error_measures *out, sdm_error *e
     if (!s) s = measure(pod, &training, &out->network.training, &out->bases.training, err);
     if (!s) s = measure(pod, &heldout, &out->network.heldout, &out->bases.heldout, err);
     out->modes = pod->modes_mse;
+    out->degree = (double)pod->arch.degree;
+    out->ridge = pod->ridge;
     sdm_free(slots);
     return s;
 }

@@ -273,8 +273,13 @@ static void set_parts(const error_measures *m, const model_errors *errors, doubl
 sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verdict *out,
                                 sdm_error *err)
 {
-    error_measures m = {
-        .network = {NAN, NAN}, .bases = {NAN, NAN}, .modes = NAN, .motion_mm = NAN, .warp_mm = NAN};
+    error_measures m = {.network = {NAN, NAN},
+                        .bases = {NAN, NAN},
+                        .modes = NAN,
+                        .motion_mm = NAN,
+                        .warp_mm = NAN,
+                        .degree = NAN,
+                        .ridge = NAN};
     surface_check surface = {NAN, NAN, NAN, 0, 0};
     history h = {0};
     const dataset *d = &t->data;
@@ -297,6 +302,8 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                          .modes_mm2 = m.modes,
                          .motion_mm = m.motion_mm,
                          .warp_mm = m.warp_mm,
+                         .degree = m.degree,
+                         .ridge = m.ridge,
                          .thin = surface.thin,
                          .thickness_mm = surface.thickness_mm,
                          .coarse_mm = sdm_grid_coarsest(d->grid),

@@ -19,6 +19,7 @@ typedef struct error_measures {
     bool other_voxels; /* the voxels are only a sample of those of the maps */
     bool corrects;     /* the maps are those of a correction, not exact maps */
     double motion_mm, warp_mm; /* of a template (template_design) */
+    double degree, ridge;      /* of the polynomials of the network or correction, as chosen */
 } error_measures;
 
 struct train_kind {

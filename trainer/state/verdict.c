@@ -65,6 +65,8 @@ void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
     sdm_json_real(j, "modes_mm2", v->modes_mm2);
     sdm_json_real(j, "motion_mm", v->motion_mm);
     sdm_json_real(j, "warp_mm", v->warp_mm);
+    sdm_json_real(j, "degree", v->degree);
+    sdm_json_real(j, "ridge", v->ridge);
     sdm_json_real(j, "thin", v->thin);
     sdm_json_real(j, "thickness_mm", v->thickness_mm);
     sdm_json_real(j, "cut", v->cut);

@@ -58,6 +58,9 @@ typedef struct sdm_verdict {
     double fall;
     double modes_mm2; /* `pod`: what the bases can represent and network.modes leaves out */
     double motion_mm, warp_mm; /* `template`: frames and amplitudes, and warp, at the vertices */
+    /* `pod` and the correction of `template`: total degree of the polynomials, and their ridge
+       relative to the number of maps, as the trainer chose them; NaN: no polynomials */
+    double degree, ridge;
     double thin; /* fraction of the surface where the shape is thinner than two voxels or has an
                     edge */
     double thickness_mm; /* of the thinnest part of a few held-out shapes; NaN: not known */

@@ -52,9 +52,9 @@ void cli_warn_cut_map(const char *where, const sdm_grid *g, const float *values,
 }
 
 /* a torn place is told from this share of the voxels on the surface on, and from this number; fewer
- * are the tips of shapes */
+ * are the tips of shapes (an octahedron has six) */
 #define TORN_SHARE 0.005
-enum { TORN_MIN = 4 };
+enum { TORN_MIN = 7 };
 
 /* Is none of the 26 neighbours of an inner voxel inside? */
 static bool is_alone(const float *v, int64_t line, int64_t plane)

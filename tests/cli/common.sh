@@ -17,11 +17,9 @@ if [ "${program##*/emulated/}" != "$program" ]; then
     emulated=yes binary=$(sed -n "s/.*'\(.*\)'.*/\1/p" "$program")
 fi
 # sdmgen ARGUMENT...: runs the program. One that does not end is killed before the time of the whole test is over: so the test tells which.
-if [ $emulated = no ]; then
-    sdmgen() { timeout --foreground --signal=KILL 600 "$program" "$@"; }
-else
-    sdmgen() { "$program" "$@"; } # emulators are slow
-fi
+limit_of_command=600 limit_of_await=120
+[ $emulated = no ] || limit_of_command=14400 limit_of_await=3600 # emulators are slow
+sdmgen() { timeout --foreground --signal=KILL $limit_of_command "$program" "$@"; }
 # sdmgen_without PATTERN ARGUMENT...: runs sdmgen without the lines of its stderr that match PATTERN.
 sdmgen_without() {
     local pattern=$1 code
@@ -57,9 +55,10 @@ expect() {
     fi
 }
 
-# await PID COMMAND...: waits until COMMAND succeeds. Fails if the process PID ends before, or after two minutes; then the process is killed.
+# await PID COMMAND...: waits until COMMAND succeeds. Fails if the process PID ends before, or after two minutes (an hour in an emulator); then
+# the process is killed.
 await() {
-    local pid=$1 end=$((SECONDS + 120))
+    local pid=$1 end=$((SECONDS + limit_of_await))
     shift
     until "$@" 2>/dev/null; do
         if ! kill -0 "$pid" 2>/dev/null || [ $SECONDS -gt $end ]; then

@@ -7,53 +7,78 @@
 #include "objective.h"
 #include "open_motions.h"
 
-// rms motion of the surface over the half width, in voxels of the map: large enough to cross many
-// kinks, but small compared to the details that an image resolves
+// motion of the surface over the half width, in voxels of the map: large enough to cross many kinks,
+// but small compared to the details that an image resolves
 #define MOTION 0.03
+// largest motion of points, in standard deviations of their distances: the likelihood of a point
+// farther off is not symmetric, which would move the zero of the averaged gradient
+#define MOTION_OF_POINTS 0.3
 // largest half width, as a share of the parameter's range
 #define WIDTH_MAX 0.05
 
-// mean square motion of the surface per unit of parameter k, over voxels within one voxel of it
-static double motion_on_map(const fit_maps *m, size_t k)
+// Motions of places on the surface per unit of a parameter or of the pose.
+typedef struct motions {
+    double squares, fourths; // sums of powers
+} motions;
+
+static void add_motion(motions *m, double x)
 {
-    double sum = 0, n = 0;
-    for (size_t v = 0; v < m->n_voxels; v++) {
-        if (fabs(m->distance[v]) > fit_longest_edge(&m->grid)) continue;
-        sum += (double)m->jacobian[k * m->n_voxels + v] * (double)m->jacobian[k * m->n_voxels + v];
-        n++;
-    }
-    return n > 0 ? sum / n : 0;
+    m->squares += x * x;
+    m->fourths += x * x * x * x;
 }
 
-// the same per unit of column k, over the points
+// rms of the motions, each weighted by its square: the motion of the part of the surface that moves.
+// The rms over the whole surface would be small where that part is, and the step too wide
+static double typical_motion(const motions *m)
+{
+    return m->squares > 0 ? sqrt(m->fourths / m->squares) : 0;
+}
+
+// per unit of parameter k, over voxels within one voxel of the surface
+static double motion_on_map(const fit_maps *map, size_t k)
+{
+    motions m = {0};
+    for (size_t v = 0; v < map->n_voxels; v++)
+        if (fabs(map->distance[v]) <= fit_longest_edge(&map->grid))
+            add_motion(&m, (double)map->jacobian[k * map->n_voxels + v]);
+    return typical_motion(&m);
+}
+
+// per unit of column k, over the points
 static double motion_at_points(const fit_samples *s, size_t k)
 {
-    double sum = 0;
+    motions m = {0};
     for (size_t i = 0; i < s->n_band; i++)
-        sum +=
-            (double)s->jacobian[i * s->n_columns + k] * (double)s->jacobian[i * s->n_columns + k];
-    return s->n_band ? sum / (double)s->n_band : 0;
+        add_motion(&m, (double)s->jacobian[i * s->n_columns + k]);
+    return typical_motion(&m);
+}
+
+// motion of the surface over the half width, mm
+static double motion_wanted(const fit_problem *p)
+{
+    const double step = MOTION * fit_longest_edge(&p->maps.grid);
+    return fit_maps_direct(&p->maps) ? fmin(step, MOTION_OF_POINTS * p->state.point_sd) : step;
 }
 
 void sdm_fit_averaging_widths(const fit_problem *p, double *half_width)
 {
-    const double step = fit_longest_edge(&p->maps.grid);
+    const double wanted = motion_wanted(p);
     for (size_t k = 0; k < p->n_params; k++) {
-        const double square = fit_maps_direct(&p->maps) ? motion_at_points(&p->samples, k)
-                                                        : motion_on_map(&p->maps, k),
+        const double typical = fit_maps_direct(&p->maps) ? motion_at_points(&p->samples, k)
+                                                         : motion_on_map(&p->maps, k),
                      range = p->high[k] - p->low[k];
-        half_width[k] = fmin(square > 0 ? MOTION * step / sqrt(square) : range, WIDTH_MAX * range);
+        half_width[k] = fmin(typical > 0 ? wanted / typical : range, WIDTH_MAX * range);
     }
 }
 
 // the same difference quotients by rotation and translation. The surface of the state is at hand
 static void average_pose_gradient(fit_problem *p)
 {
-    const double step = fit_longest_edge(&p->maps.grid);
+    const double wanted = motion_wanted(p);
     for (size_t k = p->n_params; k < p->n_params + 6; k++) {
-        const double square = motion_at_points(&p->samples, k);
-        if (!(square > 0)) continue;
-        const double width = MOTION * step / sqrt(square);
+        const double typical = motion_at_points(&p->samples, k);
+        if (!(typical > 0)) continue;
+        const double width = wanted / typical;
         double change = 0;
         for (int side = -1; side <= 1; side += 2) {
             double motion[FIT_MOTIONS_MAX] = {0};

@@ -12,6 +12,8 @@
 #include "fit/judge/noise.h"
 #include "oracle/fit_tools.h"
 
+#define PI 3.14159265358979324
+
 static sdm_instance *shape_of(const char *name)
 {
     sdm_instance *s = NULL;
@@ -313,8 +315,11 @@ static void test_strays_are_refused_if_many(void **state)
 }
 
 /* Points of the ellipsoid TRUTH with noise, without those beyond `cut` mm along x from its centre,
-   and `n_more` points: in a box around it, or on a plane beside it. */
-static double *points_with_others(double cut, size_t n_more, bool plane, size_t *n)
+   and `n_more` points: in a box around it, on a plane beside it, or on a ring beside it, a tube as
+   thick as the points lie from each other. */
+typedef enum others { BOX, PLANE, RING } others;
+
+static double *points_with_others(double cut, size_t n_more, others where, size_t *n)
 {
     sdm_instance *round = shape_of("ellipsoid");
     sdm_mesh m = {0};
@@ -331,7 +336,12 @@ static double *points_with_others(double cut, size_t n_more, bool plane, size_t 
     for (size_t i = 0; i < n_more; i++, ++*n) {
         double y[3];
         for (size_t a = 0; a < 3; a++) y[a] = 8 * sdm_rng_uniform(5, i, a) - 4;
-        if (plane) y[2] = 4 + 0.02 * sdm_rng_normal(6, i, 0);
+        if (where == PLANE) y[2] = 4 + 0.02 * sdm_rng_normal(6, i, 0);
+        if (where == RING) {
+            const double around = 0.25 * PI * y[0], along = 0.25 * PI * y[1],
+                         r = fmax((double)n_more / 250, 0.35) + 0.3 * cos(around);
+            y[0] = r * cos(along), y[1] = r * sin(along), y[2] = 5 + 0.3 * sin(around);
+        }
         sdm_pose_apply(&POSE, y, x + 3 * *n);
     }
     sdm_mesh_dispose(&m);
@@ -339,24 +349,26 @@ static double *points_with_others(double cut, size_t n_more, bool plane, size_t 
     return x;
 }
 
-// Strays in a box pass, a plane beside the shape does not; a shape without points at one end is
-// told, and refused if there are many strays besides.
+// Strays in a box pass, a plane or a thin ring beside the shape does not, a small one is told; a
+// shape without points at one end is told, and refused if there are many strays besides.
 static void test_surfaces_without_each_other_are_told(void **state)
 {
     (void)state;
     static const struct {
         double cut;
         size_t n_more;
-        bool plane;
+        others where;
         sdm_fit_grade patch, covered;
-    } cases[] = {{INFINITY, 300, false, SDM_FIT_PASSED, SDM_FIT_PASSED},
-                 {INFINITY, 300, true, SDM_FIT_FAILED, SDM_FIT_PASSED},
-                 {0.5, 0, false, SDM_FIT_PASSED, SDM_FIT_DOUBTFUL},
-                 {0.5, 200, false, SDM_FIT_PASSED, SDM_FIT_FAILED}};
+    } cases[] = {{INFINITY, 300, BOX, SDM_FIT_PASSED, SDM_FIT_PASSED},
+                 {INFINITY, 300, PLANE, SDM_FIT_FAILED, SDM_FIT_PASSED},
+                 {INFINITY, 300, RING, SDM_FIT_FAILED, SDM_FIT_PASSED},
+                 {INFINITY, 40, RING, SDM_FIT_DOUBTFUL, SDM_FIT_PASSED},
+                 {0.5, 0, BOX, SDM_FIT_PASSED, SDM_FIT_DOUBTFUL},
+                 {0.5, 200, BOX, SDM_FIT_PASSED, SDM_FIT_FAILED}};
     sdm_instance *round = shape_of("ellipsoid");
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         size_t n;
-        double *x = points_with_others(cases[k].cut, cases[k].n_more, cases[k].plane, &n);
+        double *x = points_with_others(cases[k].cut, cases[k].n_more, cases[k].where, &n);
         const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = x, .n_points = n};
         sdm_fit_result r;
         sdm_error err = {0};

@@ -19,9 +19,12 @@
 // neighbours that define the spacing of points, and that show whether points form a layer
 #define FEW 4
 #define MANY 10
-// a stray belongs to a patch if its neighbours are nearer than this multiple of the spacing (and
-// not the same point) and the product of the variances along the axes of their ellipsoid is this
-// small beside that of a ball: points in a box stay below in a few per cent of the cases
+// a stray belongs to a patch if its neighbours are as near as those on the shape, up to this multiple
+// of the spacing: a thin tube is no layer at this spacing; or if they are nearer than DENSE times
+// the spacing (and not the same point) and the product of the variances along the axes of their
+// ellipsoid is this small beside that of a ball: points in a box stay below in a few per cent of
+// the cases
+#define ALIKE 1.5
 #define DENSE 3.0
 #define SAME 0.05
 #define FLAT 0.15
@@ -30,9 +33,12 @@
 #define REACH 1.25
 // shares that pass. A surface that is not covered shows a part of the shape, or the shape has grown
 // past its data: so it is with a small patch, or with many strays
+#define PATCH_DOUBTFUL 0.003
+// share of the strays that patches hold by chance
+#define BY_CHANCE 0.05
 #define PATCH_MAX 0.05
 #define PATCH_MAX_UNCOVERED 0.01
-#define UNCOVERED_MAX 0.05
+#define UNCOVERED_MAX 0.02
 #define STRAYS_MAX_UNCOVERED 0.1
 
 typedef struct cloud {
@@ -96,8 +102,9 @@ static size_t count_patch(const cloud *strays, double spacing)
         find_nearest(strays, strays->x[i], i, MANY, d2, number);
         number[MANY] = i;
         const double few = sqrt(d2[FEW - 1]);
-        n += few < DENSE * spacing && few > SAME * spacing &&
-             roundness(strays, number, MANY + 1) < FLAT;
+        n += few > SAME * spacing &&
+             (few < ALIKE * spacing ||
+              (few < DENSE * spacing && roundness(strays, number, MANY + 1) < FLAT));
     }
     return n;
 }
@@ -172,9 +179,13 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, sdm_fit_verdict *v, sdm_
                      stray = (double)strays.n / (double)(on.n + strays.n);
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
         const bool both = bare > UNCOVERED_MAX && patch > fmin(PATCH_MAX_UNCOVERED, most);
-        sdm_fit_judge_add(v, SDM_FIT_CHECK_PATCH, patch <= most && !both, SDM_FIT_FAILED, patch,
-                          both ? PATCH_MAX_UNCOVERED : most,
-                          "%.0f %% of the points form a surface that the fitted shape does not "
+        const bool failed = patch > most || both;
+        const double limit = both     ? PATCH_MAX_UNCOVERED
+                             : failed ? most
+                                      : fmax(fmax(p->opts->tolerance, PATCH_DOUBTFUL), BY_CHANCE * stray);
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_PATCH, patch <= limit,
+                          failed ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, patch, limit,
+                          "%.2g %% of the points form a surface that the fitted shape does not "
                           "have: another shape, or a fit that stopped at a wrong one; give a "
                           "better start, or take other things out of the data "
                           "(sdm_fit_opts.tolerance allows more)",

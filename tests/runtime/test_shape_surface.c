@@ -175,8 +175,8 @@ static void test_area_on_a_map(void **state)
 
 enum { POINTS = 1500 };
 
-// points on the surface of a shape at p with errors of 0.03 mm, from random numbers of `seed`; every
-// stray-th lies anywhere near
+// points on the surface of a shape at p with errors of 0.03 mm, from random numbers of `seed`;
+// every stray-th lies anywhere near
 static double *points_on(const sdm_instance *shape, const double *p, uint64_t seed, size_t stray)
 {
     sdm_mesh m = {0};
@@ -233,7 +233,8 @@ static void test_ends_have_the_stated_deviations(void **state)
     enum { CASES = 8 };
     sdm_instance *shape = instance_of(&cup);
     const sdm_fit_source source = {
-        .shape = shape, .grid = sdm_grid_centred((int64_t[3]){18, 18, 40}, 0.9, (double[3]){0, 0, 14})};
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){18, 18, 40}, 0.9, (double[3]){0, 0, 14})};
     double squares[CUP_PARAMS] = {0};
     for (uint64_t c = 0; c < CASES; c++) {
         double truth[CUP_PARAMS];

@@ -40,8 +40,7 @@ static sdm_status create(dataset *d, sdm_comm *comm, const dataset *known, sdm_e
                    .known = known};
     sdm_instance_params(capsule, &d->n_params);
     sdm_status s = sdm_train_ranges(&config, capsule, d->min, d->max, err);
-    if (!s)
-        s = sdm_train_distributions(&config, capsule, d->min, d->max, d->distribution, err);
+    if (!s) s = sdm_train_distributions(&config, capsule, d->min, d->max, d->distribution, err);
     if (!s) s = trainer_dataset_size(d, &config, err);
     if (!s && comm) s = SDM_ALLOC(&d->share, RANKS + 1, "test", err);
     if (!s && comm) memcpy(d->share, SHARE, sizeof SHARE);
@@ -61,12 +60,11 @@ static sdm_status make_more(dataset *d, sdm_error *err)
 
 static int make_maps(void **state)
 {
-    static const char text[] =
-        "shape: {name: capsule}\n"
-        "grid: {size: [6, 5, 4], spacing: 3}\n"
-        "network: {kind: pod}\n"
-        "data: {static: 3, start: 40, online: 7, holdout: 4}\n"
-        "train: {steps: 1}\n";
+    static const char text[] = "shape: {name: capsule}\n"
+                               "grid: {size: [6, 5, 4], spacing: 3}\n"
+                               "network: {kind: pod}\n"
+                               "data: {static: 3, start: 40, online: 7, holdout: 4}\n"
+                               "train: {steps: 1}\n";
     sdm_error e = {0};
     const int failed = set_up(state);
     config = parse_config(text, NULL, 0);
@@ -82,20 +80,20 @@ static int free_maps(void **state)
     return tear_down(state);
 }
 
-/* true if the first n slots hold this rank's parts of the maps of one process, and whole maps can be
- * put together. */
+/* true if the first n slots hold this rank's parts of the maps of one process, and whole maps can
+ * be put together. */
 static bool same_maps(const dataset *d, size_t n)
 {
     int16_t map[VOXELS];
     const int rank = sdm_comm_rank(d->comm);
     bool good = d->n_kept == SHARE[rank + 1] - SHARE[rank];
     for (size_t slot = 0; slot < n; slot++) {
-        good = good && d->scale[slot] == one.scale[slot] &&
-               !memcmp(d->params + slot * d->n_params, one.params + slot * d->n_params,
-                       d->n_params * sizeof *d->params) &&
-               !memcmp(trainer_dataset_values(d, slot, d->first_kept),
-                       trainer_dataset_values(&one, slot, d->first_kept),
-                       d->n_kept * sizeof *d->maps);
+        good =
+            good && d->scale[slot] == one.scale[slot] &&
+            !memcmp(d->params + slot * d->n_params, one.params + slot * d->n_params,
+                    d->n_params * sizeof *d->params) &&
+            !memcmp(trainer_dataset_values(d, slot, d->first_kept),
+                    trainer_dataset_values(&one, slot, d->first_kept), d->n_kept * sizeof *d->maps);
         good = !trainer_dataset_whole(d, slot, map, NULL) && good &&
                !memcmp(map, trainer_dataset_values(&one, slot, 0), sizeof map);
     }

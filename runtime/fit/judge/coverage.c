@@ -19,11 +19,11 @@
 // neighbours that define the spacing of points, and that show whether points form a layer
 #define FEW 4
 #define MANY 10
-// a stray belongs to a patch if its neighbours are as near as those on the shape, up to this multiple
-// of the spacing: a thin tube is no layer at this spacing; or if they are nearer than DENSE times
-// the spacing (and not the same point) and the product of the variances along the axes of their
-// ellipsoid is this small beside that of a ball: points in a box stay below in a few per cent of
-// the cases
+// a stray belongs to a patch if its neighbours are as near as those on the shape, up to this
+// multiple of the spacing: a thin tube is no layer at this spacing; or if they are nearer than
+// DENSE times the spacing (and not the same point) and the product of the variances along the axes
+// of their ellipsoid is this small beside that of a ball: points in a box stay below in a few per
+// cent of the cases
 #define ALIKE 1.5
 #define DENSE 3.0
 #define SAME 0.05
@@ -180,9 +180,10 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, sdm_fit_verdict *v, sdm_
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
         const bool both = bare > UNCOVERED_MAX && patch > fmin(PATCH_MAX_UNCOVERED, most);
         const bool failed = patch > most || both;
-        const double limit = both     ? PATCH_MAX_UNCOVERED
-                             : failed ? most
-                                      : fmax(fmax(p->opts->tolerance, PATCH_DOUBTFUL), BY_CHANCE * stray);
+        const double limit =
+            both     ? PATCH_MAX_UNCOVERED
+            : failed ? most
+                     : fmax(fmax(p->opts->tolerance, PATCH_DOUBTFUL), BY_CHANCE * stray);
         sdm_fit_judge_add(v, SDM_FIT_CHECK_PATCH, patch <= limit,
                           failed ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, patch, limit,
                           "%.2g %% of the points form a surface that the fitted shape does not "

@@ -7,8 +7,8 @@
 #include "objective.h"
 #include "open_motions.h"
 
-// motion of the surface over the half width, in voxels of the map: large enough to cross many kinks,
-// but small compared to the details that an image resolves
+// motion of the surface over the half width, in voxels of the map: large enough to cross many
+// kinks, but small compared to the details that an image resolves
 #define MOTION 0.03
 // largest motion of points, in standard deviations of their distances: the likelihood of a point
 // farther off is not symmetric, which would move the zero of the averaged gradient
@@ -27,8 +27,8 @@ static void add_motion(motions *m, double x)
     m->fourths += x * x * x * x;
 }
 
-// rms of the motions, each weighted by its square: the motion of the part of the surface that moves.
-// The rms over the whole surface would be small where that part is, and the step too wide
+// rms of the motions, each weighted by its square: the motion of the part of the surface that
+// moves. The rms over the whole surface would be small where that part is, and the step too wide
 static double typical_motion(const motions *m)
 {
     return m->squares > 0 ? sqrt(m->fourths / m->squares) : 0;

@@ -11,8 +11,8 @@
 #include "problem.h"
 
 /* half_width[n_params], in the units of the parameters: half width of the interval over which the
-   derivative by each parameter is averaged. Changing a parameter by its half width moves the part of
-   the surface that it moves (sqrt(sum of motion^4 / sum of motion^2)) by 0.03 voxels of the map;
+   derivative by each parameter is averaged. Changing a parameter by its half width moves the part
+   of the surface that it moves (sqrt(sum of motion^4 / sum of motion^2)) by 0.03 voxels of the map;
    for points measured on the surface itself, by at most 0.3 standard deviations of their distances.
    The half width is at most 0.05 of the parameter's range. The problem must be evaluated, with
    derivatives. */

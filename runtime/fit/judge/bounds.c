@@ -14,6 +14,8 @@
 // labels or deviations of the points, explains nothing
 #define DIFFERENCE_MIN 0.02
 #define STEPS_MIN 1.5
+// a difference of lengths above this share of the length refutes a parameter at its bound
+#define DIFFERENCE_FAR 0.05
 // a parameter that changes a length by less than this, mm per unit, does not explain it
 #define SLOPE_MIN 0.3
 // the value that the data want, beyond the bound: at most this part of the width of the range;
@@ -189,6 +191,7 @@ sdm_status sdm_fit_measure_beyond(const fit_problem *p, const sdm_fit_result *r,
                      "long along %c of the shape, the shape at its bound %.4g mm",
                      name, bound + beyond, p->low[k], p->high[k], l->data, "xyz"[axis], l -> shape);
             b->measured = true;
+            b->far = b->n_wanted && fabs(more) > DIFFERENCE_FAR * l->shape;
         }
     }
     if (b->measured && !b->n_wanted) b->n_wanted = 1;

@@ -13,6 +13,9 @@ typedef struct fit_at_bounds {
     /* the data are longer or shorter than the shape by a length that this parameter would explain:
        `text` says how large it would have to be */
     bool measured;
+    /* this length is more than 5 % of the shape's, and the likelihood wants the parameter beyond
+       its bound as well: the estimate is wrong, however well the rest matches */
+    bool far;
 } fit_at_bounds;
 
 /* Looks at the derivative of the log-likelihood at the estimate *r. The data want a parameter

@@ -114,15 +114,18 @@ static bool has_passed(const sdm_fit_verdict *v, sdm_fit_check_kind kind)
 }
 
 // Parameters at an end of their range. Where the data want more and do not match the shape as it
-// is, the fit has not found the shape of the data.
+// is, or are longer by a length that was measured, the fit has not found the shape of the data. In
+// an image, residuals beside the shape and a second material outside show together that the shape
+// goes on there.
 static void check_bounds(const fit_problem *p, const fit_at_bounds *b, const sdm_fit_result *r,
                          sdm_fit_verdict *v)
 {
     const bool matched =
                    r->outliers <= STRAY_AT_BOUND_MAX && has_passed(v, SDM_FIT_CHECK_RESIDUALS) &&
                    has_passed(v, SDM_FIT_CHECK_EMPTY) && has_passed(v, SDM_FIT_CHECK_MISSING) &&
-                   has_passed(v, SDM_FIT_CHECK_PATCH) && has_passed(v, SDM_FIT_CHECK_COVERED),
-               refused = b->n_wanted && !matched && !(p->opts->tolerance > 0);
+                   has_passed(v, SDM_FIT_CHECK_PATCH) && has_passed(v, SDM_FIT_CHECK_COVERED) &&
+                   (has_passed(v, SDM_FIT_CHECK_BESIDE) || has_passed(v, SDM_FIT_CHECK_OUTSIDE)),
+               refused = b->n_wanted && (!matched || b->far) && !(p->opts->tolerance > 0);
     const sdm_fit_grade grade = refused ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL;
     if (b->measured)
         sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, false, grade, (double)b->n, 0,
@@ -329,15 +332,15 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     // strays that form a surface belong to the data: they show how long these are
     if (!s && points && !has_passed(v, SDM_FIT_CHECK_PATCH))
         s = sdm_fit_measure_beyond(p, r, &bounds, err);
-    if (!s) check_bounds(p, &bounds, r, v);
     if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
+    if (!s) check_bounds(p, &bounds, r, v);
     if (!s) sdm_fit_check_voxels(p, coarse, v);
     if (!s) sdm_fit_check_determined(p, r, v);
     sdm_fit_residuals_dispose(&residuals);
     if (!s) s = sdm_fit_check_blob(p, *factor, v, err);
     const sdm_fit_finding *why = s ? NULL : reason(v, &bounds);
     if (s || !why) return s;
-    const bool more = bounds.n_wanted && why->kind != SDM_FIT_CHECK_BOUNDS;
+    const bool more = bounds.n_wanted && !strstr(why->text, bounds.text);
     return sdm_fail(err, SDM_E_QUALITY, "%s%s%s", why->text, more ? "; " : "",
                     more ? bounds.text : "");
 }

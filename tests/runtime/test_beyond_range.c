@@ -1,0 +1,162 @@
+/* Data that want a parameter beyond its range: a ball with a rod that is longer than the range
+ * allows, as labels and in an image. The rod is so thin that no share of the volume tells. A rod
+ * within the range passes.
+ * Tests: bounds.c judgement.c */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "oracle/fit_tools.h"
+
+#define PI 3.14159265358979324
+
+enum { RADIUS, LENGTH, KNOB_PARAMS };
+static const sdm_param knob_params[KNOB_PARAMS] = {{"radius", "mm", 4, 6, 5, "of the ball"},
+                                                   {"length", "mm", 2, 6, 4, "of the rod"}};
+
+enum { BALL_RINGS = 12, ROD_RINGS = 8, RINGS = BALL_RINGS + ROD_RINGS, AROUND = 24 };
+static const double ROD_RADIUS = 0.9;
+
+// ring i, from below: of the ball as far as the rod, then of the rod, whose end is half a ball
+static void knob_ring(const double *p, int i, double *r, double *z)
+{
+    const double first = asin(ROD_RADIUS / p[RADIUS]), end = sqrt(p[RADIUS] * p[RADIUS] - 0.81);
+    if (i < BALL_RINGS) {
+        const double turn = PI - (PI - first) * (i + 1) / BALL_RINGS;
+        *r = p[RADIUS] * sin(turn), *z = p[RADIUS] * cos(turn);
+    } else {
+        const double turn = 0.5 * PI * (i - BALL_RINGS) / ROD_RINGS;
+        *r = ROD_RADIUS * cos(turn), *z = end + p[LENGTH] + ROD_RADIUS * sin(turn);
+    }
+}
+
+static int knob_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                     const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    const uint32_t top = RINGS * AROUND + 1;
+    if (host->reserve(host, out, top + 1, 2 * RINGS * AROUND)) return 1;
+    double *v = out->vert + 3;
+    uint32_t *t = out->tri;
+    for (int i = 0; i < RINGS; i++)
+        for (int j = 0; j < AROUND; j++, v += 3) {
+            double r;
+            knob_ring(p, i, &r, &v[2]);
+            v[0] = r * cos(2 * PI * j / AROUND), v[1] = r * sin(2 * PI * j / AROUND);
+        }
+    out->vert[0] = out->vert[1] = v[0] = v[1] = 0;
+    out->vert[2] = -p[RADIUS], v[2] = v[-1] + 0.01;
+    for (uint32_t j = 0; j < AROUND; j++) {
+        const uint32_t a = 1 + j, b = 1 + (j + 1) % AROUND, last = (RINGS - 1) * AROUND;
+        const uint32_t ends[] = {0, b, a, last + a, last + b, top};
+        memcpy(t, ends, sizeof ends), t += 6;
+        for (uint32_t ring = 0; ring < last; ring += AROUND, t += 6) {
+            const uint32_t quad[] = {ring + a, ring + b,          ring + b + AROUND,
+                                     ring + a, ring + b + AROUND, ring + a + AROUND};
+            memcpy(t, quad, sizeof quad);
+        }
+    }
+    return 0;
+}
+
+static const sdm_shape knob = {.abi = SDM_SHAPE_ABI,
+                               .size = sizeof(sdm_shape),
+                               .name = "knob",
+                               .summary = "a ball with a rod",
+                               .params = knob_params,
+                               .n_params = KNOB_PARAMS,
+                               .mesh = knob_mesh};
+
+// distance of a point from a knob, mm, negative inside; exact near the surface
+static double distance_to(const double x[3], double radius, double length)
+{
+    const double end = sqrt(radius * radius - ROD_RADIUS * ROD_RADIUS) + length,
+                 ball = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) - radius,
+                 beyond = x[2] < 0 ? x[2] : fmax(x[2] - end, 0),
+                 rod = sqrt(x[0] * x[0] + x[1] * x[1] + beyond * beyond) - ROD_RADIUS;
+    return fmin(ball, rod);
+}
+
+static sdm_status fit_knob(double length, bool image, sdm_fit_result *r, sdm_error *err)
+{
+    const sdm_grid g = sdm_grid_centred((int64_t[3]){44, 44, 64}, 0.35, (double[3]){0, 0, 3});
+    sdm_instance *shape = NULL;
+    float *v = calloc(sdm_grid_count(&g), sizeof *v);
+    if (!v || sdm_instance_create(&knob, NULL, 0, NULL, &shape, NULL)) abort();
+    for (int64_t k = 0, n = 0; k < g.n[2]; k++)
+        for (int64_t j = 0; j < g.n[1]; j++)
+            for (int64_t i = 0; i < g.n[0]; i++, n++) {
+                double x[3];
+                sdm_grid_world(&g, (double[3]){(double)i, (double)j, (double)k}, x);
+                const double d = distance_to(x, 5, length), share = 0.5 - 0.5 * erf(d / 0.42);
+                v[n] =
+                    (float)(image ? -1000 + 2500 * share + 100 * sdm_rng_normal(7, 0, (uint64_t)n)
+                                  : d < 0);
+            }
+    const sdm_fit_source source = {
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){44, 44, 60}, 0.35, (double[3]){0, 0, 3})};
+    const sdm_fit_target t = {
+        .kind = image ? SDM_FIT_IMAGE : SDM_FIT_LABEL, .grid = g, .values = v};
+    sdm_fit_opts o = sdm_fit_defaults();
+    o.appearance.inside[0] = (sdm_fit_law){.weight = 1, .mean = 1500, .sd = 150};
+    o.appearance.outside[0] = (sdm_fit_law){.weight = 1, .mean = -1000, .sd = 150};
+    o.appearance.n_inside = o.appearance.n_outside = 1;
+    o.polish_eps = 1e-4;
+    *err = (sdm_error){0};
+    const sdm_status s = sdm_fit(&source, &t, &o, r, err);
+    sdm_instance_free(shape);
+    free(v);
+    return s;
+}
+
+static const sdm_fit_finding *bounds_of(const sdm_fit_result *r)
+{
+    for (size_t i = 0; i < r->verdict.n_findings; i++)
+        if (r->verdict.findings[i].kind == SDM_FIT_CHECK_BOUNDS) return &r->verdict.findings[i];
+    return NULL;
+}
+
+static void test_beyond_the_range_is_refused(void **state)
+{
+    (void)state;
+    for (int image = 0; image < 2; image++) {
+        sdm_fit_result r;
+        sdm_error err;
+        const sdm_status s = fit_knob(8, image, &r, &err);
+        const sdm_fit_finding *f = bounds_of(&r);
+        if (s != SDM_E_QUALITY)
+            fail_msg("image %d: status %d, %s", image, (int)s, f ? f->text : "");
+        assert_int_equal(f->grade, SDM_FIT_FAILED);
+        assert_non_null(strstr(err.text, image
+                                             ? "length ends at its bound: the data want more than 6"
+                                             : "the data want length = "));
+        sdm_fit_dispose(&r);
+    }
+}
+
+static void test_within_the_range_passes(void **state)
+{
+    (void)state;
+    for (int image = 0; image < 2; image++) {
+        sdm_fit_result r;
+        sdm_error err;
+        if (fit_knob(4.5, image, &r, &err)) fail_msg("image %d: %s", image, err.text);
+        // the mesh has few triangles: its ball is smaller by up to a fiftieth
+        if (!(fabs(r.params[LENGTH] - 4.5) < 0.3 && fabs(r.params[RADIUS] - 5) < 0.1))
+            fail_msg("image %d: length %g, radius %g", image, r.params[LENGTH], r.params[RADIUS]);
+        sdm_fit_dispose(&r);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_beyond_the_range_is_refused),
+        cmocka_unit_test(test_within_the_range_passes),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

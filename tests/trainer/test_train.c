@@ -329,7 +329,7 @@ static void polynomials_without_hidden_layers(void **state)
                                       "train.near_weight=2"},
                 7);
     if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
-    assert_true(r.accuracy.rmse_mm < 0.1);
+    if (!(r.accuracy.rmse_mm < 0.3)) fail_msg("RMSE %g mm", r.accuracy.rmse_mm);
 }
 
 // More samples than fit into memory: new ones replace the oldest.
@@ -346,7 +346,7 @@ static void small_pool_replaces_old_samples(void **state)
                 5);
     if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
     assert_int_equal(r.samples, 4 + 560);
-    assert_true(r.accuracy.rmse_mm < 0.1);
+    if (!(r.accuracy.rmse_mm < 0.3)) fail_msg("RMSE %g mm", r.accuracy.rmse_mm);
 }
 
 // n maps span at most n basis functions, so a larger configured rank has no effect.
@@ -517,6 +517,21 @@ static void mistakes_are_refused(void **state)
     assert_false(exists("model.sdm"));
 }
 
+/* Maps at three values of a parameter determine no cubic in it, however many they are: the training
+ * takes polynomials that they do determine. */
+static void maps_at_few_values_train(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    sdm_train_report r;
+    const char *const overrides[] = {"data={static: [3, 40], start: 0, online: 0, holdout: 20}",
+                                     "network.degree=6", "train={steps: 5, refine: 0}"};
+    read_config(&c, overrides, sizeof overrides / sizeof *overrides);
+    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
+    if (!(r.accuracy.rmse_mm < 0.3)) fail_msg("RMSE %g mm", r.accuracy.rmse_mm);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(training_reaches_its_accuracy),
@@ -530,6 +545,7 @@ int main(void)
                                        cmocka_unit_test(polynomials_without_hidden_layers),
                                        cmocka_unit_test(small_pool_replaces_old_samples),
                                        cmocka_unit_test(rank_is_limited_by_maps),
+                                       cmocka_unit_test(maps_at_few_values_train),
                                        cmocka_unit_test(distributions_are_resolved),
                                        cmocka_unit_test(maps_follow_the_distribution),
                                        cmocka_unit_test(model_tells_its_distributions),

@@ -176,6 +176,25 @@ static sdm_status choose_fit(const pod_state *pod, polynomial_fit *best, sdm_err
     return s;
 }
 
+/* Solves the fit for all maps. Maps at few values of a parameter do not determine a high degree,
+ * however many they are: the degree is then lowered until they do. */
+static sdm_status fit_determined(polynomial_fit *p, double *x, sdm_error *err)
+{
+    const size_t n_params = p->pod->arch.n_params;
+    size_t degree = p->pod->arch.degree;
+    while (sdm_poly_count(n_params, degree) > p->terms) degree--;
+    const size_t chosen = degree;
+    sdm_status s = fit_solve(p, true, x, err);
+    for (; s == SDM_E_CONFIG && degree > 0; s = fit_solve(p, true, x, err))
+        p->terms = sdm_poly_count(n_params, --degree), p->ridge = POD_RIDGE;
+    if (!s && degree < chosen)
+        trainer_message(p->pod->t,
+                        "network.degree lowered from %zu to %zu: the maps are at too few values of "
+                        "a parameter to determine more (data.static)",
+                        chosen, degree);
+    return s;
+}
+
 /* poly[R][F] = least squares fit of c[n][R] by the polynomials. Sets degree, n_terms and n_latent
  * of the architecture, and ridge. */
 static sdm_status fit_polynomials(pod_state *pod, size_t n, const float *c, sdm_error *err)
@@ -186,7 +205,7 @@ static sdm_status fit_polynomials(pod_state *pod, size_t n, const float *c, sdm_
     double *x = NULL;
     sdm_status s = choose_fit(pod, &p, err);
     if (!s) s = SDM_ALLOC(&x, p.terms * r, "polynomial fit", err);
-    if (!s) s = fit_solve(&p, true, x, err);
+    if (!s) s = fit_determined(&p, x, err);
     if (!s) {
         while (sdm_poly_count(a->n_params, a->degree) > p.terms) a->degree--;
         a->n_latent -= a->n_terms - p.terms;

@@ -58,7 +58,24 @@ static void print_stages(const sdm_train_work *w, const sdm_train_plan *p)
            format_bytes(p->all_received, bytes));
 }
 
-static void print_text(const sdm_train_work *w, const sdm_train_plan *p, int nodes, int cores)
+/* A budget of time: says when it ends before the maps are made that the configuration asks for. */
+static void print_budget(const sdm_config *c, const sdm_train_work *w, const sdm_train_plan *p)
+{
+    char a[32], made[64], all[64];
+    const double before = w->n_holdout + w->n_maps - (double)c->data.online,
+                 seconds = p->seconds[SDM_PLAN_DESIGN] +
+                           p->seconds[SDM_PLAN_MAPS] * before / (w->n_holdout + w->n_maps),
+                 half = 30 * c->train.minutes;
+    if (!(c->train.minutes > 0) || seconds <= half) return;
+    printf("  budget   half of train.minutes (%s) is enough for %s of the %s maps before training, "
+           "which then starts with these: lower data.static or data.start, or raise train.minutes "
+           "to %.2g\n",
+           format_seconds(half, a), cli_format_count((int64_t)(before * half / seconds), made),
+           cli_format_count((int64_t)before, all), ceil(10 * seconds / 30) / 10);
+}
+
+static void print_text(const sdm_config *config, const sdm_train_work *w, const sdm_train_plan *p,
+                       int nodes, int cores)
 {
     char a[32], b[32], c[32];
     const int pays = sdm_train_plan_pays(w, cores);
@@ -69,6 +86,7 @@ static void print_text(const sdm_train_work *w, const sdm_train_plan *p, int nod
     if (w->fit_step > 0) printf(", %.3g steps a second on a core", 1 / w->fit_step);
     printf("\n");
     print_stages(w, p);
+    print_budget(config, w, p);
     printf("  memory   %s on each node, with one rank on it\n", format_bytes(p->memory, a));
     printf("  files    model %s, checkpoint up to %s; all maps would take %s if they were kept "
            "(sdmgen dataset)\n",
@@ -136,6 +154,6 @@ sdm_status cli_plan_training(const cli_args *args, const sdm_config *config,
               cores = args->cores ? (int)args->cores : work.threads;
     sdm_train_plan_make(&work, nodes, cores, &plan);
     if (args->json) return print_json(&work, &plan, nodes, cores, err);
-    print_text(&work, &plan, nodes, cores);
+    print_text(config, &work, &plan, nodes, cores);
     return SDM_OK;
 }

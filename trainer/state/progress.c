@@ -69,17 +69,19 @@ void trainer_pace_start(trainer *t, double unit_maps)
     t->pace = (trainer_pace){.unit_maps = unit_maps, .seconds = {now, now}};
 }
 
-/* Returns the units of work finished per second, over the last two to four seconds; NaN: none yet.
- * A step may take longer than that: until it ends, the rate is that of a longer time, never 0. */
+/* Returns the units of work finished per second, over the last two to four seconds; NaN: none yet,
+ * or the work has only begun. A step may take longer than that: until it ends, the rate is that of
+ * a longer time, never 0. */
 static double pace_rate(trainer_pace *p, double now)
 {
-    static const double LENGTH = 2;
+    static const double LENGTH = 2, SHORTEST = 0.25;
     if (now - p->seconds[1] > LENGTH && p->done > p->before[1]) {
         p->before[0] = p->before[1], p->seconds[0] = p->seconds[1];
         p->before[1] = p->done, p->seconds[1] = now;
     }
     const double length = now - p->seconds[0];
-    return p->done > p->before[0] && length > 0 ? (double)(p->done - p->before[0]) / length : NAN;
+    return p->done > p->before[0] && length > SHORTEST ? (double)(p->done - p->before[0]) / length
+                                                       : NAN;
 }
 
 /* Time that the rest of the budget takes, s: with a budget of steps at the pace of the last

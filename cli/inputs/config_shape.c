@@ -40,7 +40,7 @@ static sdm_status read_config(const cli_args *args, sdm_config **out, sdm_error 
 static sdm_status fit_grid(sdm_config *c, const sdm_instance *shape, sdm_error *err)
 {
     sdm_text line = {0};
-    const sdm_status s = sdm_train_grid(c, shape, &line, err);
+    const sdm_status s = sdm_train_complete(c, shape, &line, err);
     if (!s && line.data) cli_notice("%s", line.data);
     sdm_text_dispose(&line);
     return s;

@@ -139,8 +139,7 @@ void cli_warn_audit(const sdm_audit *a)
         cli_notice("%zu duplicate triangle%s", a->duplicate, a->duplicate == 1 ? "" : "s");
 }
 
-/* "part 2 of 3 (12 triangles, vertices 8 .. 15, box ...) " */
-static void name_part(const sdm_part_audit *a, size_t index, sdm_text *text)
+void cli_name_part(const sdm_part_audit *a, size_t index, sdm_text *text)
 {
     const sdm_part *p = &a->part[index];
     sdm_text_add(text,
@@ -150,6 +149,23 @@ static void name_part(const sdm_part_audit *a, size_t index, sdm_text *text)
                  p->min[2], p->max[0], p->max[1], p->max[2]);
 }
 
+void cli_describe_apart(const sdm_mesh *mesh, const sdm_part_audit *audit, sdm_text *text)
+{
+    size_t at = audit->n;
+    for (size_t i = 0; i < audit->n; i++) {
+        const sdm_part *p = &audit->part[i];
+        if (p->state != SDM_PART_SOLID || p->met) continue;
+        if (at == audit->n || fabs(p->volume) < fabs(audit->part[at].volume)) at = i;
+    }
+    if (at == audit->n || audit->n < 2) return;
+    const double gap = sdm_part_gap(mesh, audit, at);
+    cli_name_part(audit, at, text);
+    if (isfinite(gap))
+        sdm_text_add(text, "lies %.2g mm from the others", gap);
+    else
+        sdm_text_add(text, "meets no other");
+}
+
 void cli_describe_open(const sdm_part_audit *a, sdm_text *text)
 {
     size_t most = 0;
@@ -157,7 +173,7 @@ void cli_describe_open(const sdm_part_audit *a, sdm_text *text)
         if (a->part[i].open_edges > a->part[most].open_edges) most = i;
     if (!a->n || !a->part[most].open_edges) return;
     const double *x = a->part[most].open_at;
-    name_part(a, most, text);
+    cli_name_part(a, most, text);
     sdm_text_add(text,
                  "has %zu edges on which not as many triangles run in one direction as in the "
                  "other, the first at %.4g %.4g %.4g mm: add the triangles that are missing there, "
@@ -173,14 +189,14 @@ void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
         size_t largest = 0;
         for (size_t i = 1; i < a->n; i++)
             if (a->part[i].volume < a->part[largest].volume) largest = i;
-        name_part(a, largest, text);
+        cli_name_part(a, largest, text);
         sdm_text_add(text,
                      "is inside out and larger than the rest: maps turn the whole mesh, and ");
-        name_part(a, index, text);
+        cli_name_part(a, index, text);
         sdm_text_add(text, "is subtracted from what it overlaps");
         return;
     }
-    name_part(a, index, text);
+    cli_name_part(a, index, text);
     sdm_text_add(text,
                  "is inside out%s: it is subtracted from what it overlaps and is not solid itself",
                  p->met ? " and overlaps another" : "");

@@ -16,6 +16,13 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a);
  * nothing: non-manifold edges, degenerate or duplicate triangles. */
 void cli_warn_audit(const sdm_audit *a);
 
+/* Appends "part 2 of 3 (12 triangles, vertices 8 .. 15, box ...) ". */
+void cli_name_part(const sdm_part_audit *a, size_t index, sdm_text *text);
+
+/* Appends "part 2 of 2 (...) lies 2.2 mm from the others" about the smallest part that meets no
+ * other; appends nothing if there is none. */
+void cli_describe_apart(const sdm_mesh *mesh, const sdm_part_audit *audit, sdm_text *text);
+
 /* Writes one line about part `index`, which is inside out, to `text`: its number, box and vertices,
  * and what becomes of it. */
 void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text);

@@ -401,6 +401,24 @@ static void tell_callbacks(teller *t)
     }
 }
 
+/* Parts that meet no other part, the smallest of one shape, and how far it lies from the others. */
+static void tell_apart(teller *t)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    sdm_mesh mesh = {0};
+    sdm_part_audit audit = {0};
+    sdm_text text = {0};
+    if (!f->apart.shapes || (t->s->brief && f->apart.shapes == f->n)) return;
+    add_count(t->s, &f->apart, "parts that meet no other part", &text);
+    sdm_text_add(&text, ": ");
+    if (make(t->s, f->apart.worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL))
+        cli_describe_apart(&mesh, &audit, &text);
+    sdm_text_add(&text, "; where they belong together, let them overlap");
+    tell(t, SDM_OK, &text);
+    sdm_part_audit_dispose(&audit);
+    sdm_mesh_dispose(&mesh);
+}
+
 static void tell_notes(teller *t)
 {
     const sdm_shape_survey *f = &t->s->found;
@@ -409,13 +427,12 @@ static void tell_notes(teller *t)
         const char *what, *after;
     } notes[] = {{&f->overlaps, "overlaps (pairs of triangles that meet)", ": the union counts"},
                  {&f->degenerate, "triangles without area", ""},
-                 {&f->duplicate, "triangles given twice", ": they count once"},
-                 {&f->apart, "parts that meet no other part", ": is this wanted?"}};
+                 {&f->duplicate, "triangles given twice", ": they count once"}};
     for (size_t i = 0; i < sizeof notes / sizeof *notes; i++) {
         sdm_text text = {0};
         const size_t n = notes[i].count->shapes;
-        const bool on_purpose = notes[i].count == &f->overlaps || notes[i].count == &f->apart;
-        if (!n || (on_purpose && t->s->brief && n == f->n)) continue;
+        // on purpose, it is likely, where all shapes do
+        if (!n || (notes[i].count == &f->overlaps && t->s->brief && n == f->n)) continue;
         add_count(t->s, notes[i].count, notes[i].what, &text);
         sdm_text_add(&text, "%s", notes[i].after);
         // the first shape with overlaps is not the default shape
@@ -456,6 +473,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_thin(&t);
     tell_callbacks(&t);
     tell_notes(&t);
+    tell_apart(&t);
     tell_untested(&t);
     return t.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the findings") : SDM_OK;
 }

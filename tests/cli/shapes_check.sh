@@ -18,6 +18,9 @@ for shape in duct ellipsoid torus capsule linkage; do
     has '^fine'
 done
 
+expect 0 - sdmgen shapes check faulty -O fault=apart --plugin "$plugin" --samples 16
+has '^note +parts that meet no other part in all 21 shapes, up to 2 at .*: part 2 of 2 \(12 triangles, .*\) lies 0\.5 mm from the others; where they belong together, let them overlap$'
+
 # faulty FAULT CODE PATTERN: the finding is a line of the output.
 faulty() {
     local word=warning

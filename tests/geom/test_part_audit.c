@@ -1,5 +1,5 @@
 /* Audits of the parts of a mesh: boxes whose volumes, unions and orientations are known.
- * Tests: part_audit.c part_thickness.c */
+ * Tests: part_audit.c part_gap.c part_thickness.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -163,6 +163,8 @@ static void test_cavity_and_parts_apart(void **state)
     assert_true(!a.part[1].turned && a.part[2].turned && !a.inside_out);
     near(a.union_volume, 64 - 8 + 1);
     near(a.union_volume, engine_volume(&m, &turned));
+    near(sdm_part_gap(&m, &a, 2), 3);
+    near(sdm_part_gap(&m, &a, 1), 1);
     assert_int_equal(turned, 1);
     sdm_part_audit_dispose(&a);
     assert_int_equal(sdm_mesh_turn_parts(&m, &n, &err), SDM_OK);

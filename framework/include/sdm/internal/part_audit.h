@@ -66,6 +66,11 @@ sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audi
                                sdm_error *err);
 void sdm_part_audit_dispose(sdm_part_audit *a);
 
+/* The smallest distance, mm, of a vertex of part `index` from the surface of the other parts. NaN:
+ * it is the only part, numbers of its vertices lie among those of another part, or the engine
+ * refuses the other parts. [any thread] */
+double sdm_part_gap(const sdm_mesh *m, const sdm_part_audit *a, size_t index);
+
 /* Index of the part with the smallest thickness; a->n: none is known. */
 size_t sdm_part_audit_thinnest(const sdm_part_audit *a);
 

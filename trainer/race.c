@@ -61,9 +61,9 @@ static void trial_config(const sdm_config *from, size_t n_params, sdm_network_ki
     size_t maps = 4 * sdm_poly_count(n_params, 2) + 4;
     maps = maps < MAPS ? MAPS : maps > MAPS_MAX ? MAPS_MAX : maps;
     size_t all = (size_t)from->data.start;
-    size_t grid = from->data.n_static_counts ? 1 : 0;
+    size_t grid = sdm_config_static_count(from, n_params, 0) > 0;
     for (size_t i = 0; i < n_params && grid && grid < MAPS_MAX; i++)
-        grid *= (size_t)from->data.static_counts[from->data.n_static_counts == 1 ? 0 : i];
+        grid *= (size_t)sdm_config_static_count(from, n_params, i);
     all += grid < MAPS_MAX ? grid : MAPS_MAX;
     c->data.start = (int64_t)(all < maps ? (all ? all : 1) : maps);
     c->data.n_static_counts = 0;

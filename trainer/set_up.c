@@ -20,8 +20,9 @@ sdm_status trainer_set_up(trainer *t, sdm_error *err)
     const sdm_config *c = t->config;
     dataset *d = &t->data;
     if (c->grid.n[0] == 0)
-        return sdm_fail(err, SDM_E_ARG,
-                        "the grid of the configuration is not complete: sdm_train_grid() fits it");
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "the grid of the configuration is not complete: sdm_train_complete() fits it");
     sdm_instance_params(t->shape, &d->n_params);
     if (d->n_params > SDM_POD_MAX_PARAMS)
         return sdm_fail(err, SDM_E_UNSUPPORTED, "%zu parameters, at most %d can be trained",

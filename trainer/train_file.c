@@ -75,7 +75,7 @@ static sdm_status make_shape(training *t, const sdm_registry *registry, sdm_erro
 static sdm_status fit_grid(const training *t, sdm_error *err)
 {
     sdm_text line = {0};
-    const sdm_status s = sdm_train_grid(t->config, t->shape, &line, err);
+    const sdm_status s = sdm_train_complete(t->config, t->shape, &line, err);
     if (!s && line.data && t->opts->message) t->opts->message(t->opts->user, line.data);
     sdm_text_dispose(&line);
     return s;

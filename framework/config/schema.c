@@ -206,12 +206,13 @@ static const sdm_field DATA[] = {
      .type = SDM_FIELD_SPECIAL,
      .read = sdm_read_key_static,
      .dump = sdm_dump_key_static,
-     .def = "5",
+     .def = "auto",
      .shown_type = "integer or list",
-     .shown_range = "0 .. 1000",
+     .shown_range = "auto, 0 .. 1000",
      .unit = "points",
      .help = "points of the static grid, a regular grid of parameters, along each parameter: one "
-             "number for all or a list with one per parameter; 0: no static grid"},
+             "number for all or a list with one per parameter; 0: no static grid; auto: at most 5, "
+             "and at most 3,125 in the grid"},
     ROW("online", INT64, data.online, 0, 1e7, "4096", "shapes",
         "random shapes generated during training"),
     ROW("start", INT64, data.start, 0, 1e6, "3456", "shapes",

@@ -10,6 +10,9 @@
 #define SPACING_MAX 1e6
 #define PLACE_MAX 1e9
 #define STATIC_MAX 1000
+// data.static: auto: points along a parameter, and points of the grid, at most
+#define STATIC_AUTO_MOST 5
+#define STATIC_AUTO_ALL 3125
 
 /* Reads [x, y, z] within min .. max and reports the mistakes in all three numbers. */
 static bool read_three(sdm_reader *r, const sdm_tree_node *node, const char *path, double min,
@@ -175,7 +178,8 @@ bool sdm_read_key_ranges(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
     return fits;
 }
 
-/* One number for all parameters, a list with one number per parameter, or 0 for no static grid. */
+/* `auto`, one number for all parameters, a list with one number per parameter, or 0 for no static
+ * grid. */
 bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node *node,
                          const char *path)
 {
@@ -183,13 +187,17 @@ bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
     size_t n = 0;
     bool fits = true;
     (void)f;
-    if (node->kind == SDM_TREE_SCALAR) {
+    if (node->kind == SDM_TREE_SCALAR && !strcmp(node->text, "auto")) {
+        counts[0] = SDM_STATIC_AUTO, n = 1;
+    } else if (node->kind == SDM_TREE_SCALAR) {
+        if (node->text[strspn(node->text, "+-0123456789")])
+            return sdm_refuse_type(r, node, path, "auto, an integer or a list of 1 to 64");
         if (!sdm_read_int(r, node, path, 0, STATIC_MAX, &counts[0])) return false;
         n = counts[0] > 0;
     } else {
         if (node->kind != SDM_TREE_LIST || node->n_children < 1 ||
             node->n_children > SDM_MAX_PARAMS)
-            return sdm_refuse_type(r, node, path, "an integer or a list of 1 to 64");
+            return sdm_refuse_type(r, node, path, "auto, an integer or a list of 1 to 64");
         for (const sdm_tree_node *child = node->first; child; child = child->next)
             fits &= sdm_read_int(r, child, path, 1, STATIC_MAX, &counts[n++]);
     }
@@ -197,6 +205,26 @@ bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
     memcpy(r->config->data.static_counts, counts, sizeof counts);
     r->config->data.n_static_counts = n;
     return true;
+}
+
+int64_t sdm_config_static_count(const sdm_config *c, size_t n_params, size_t i)
+{
+    if (!c->data.n_static_counts) return 0;
+    const int64_t count = c->data.static_counts[c->data.n_static_counts == 1 ? 0 : i];
+    if (count != SDM_STATIC_AUTO) return count;
+    for (int64_t most = STATIC_AUTO_MOST; most > 1; most--) {
+        int64_t all = 1;
+        for (size_t k = 0; k < n_params && all <= STATIC_AUTO_ALL; k++) all *= most;
+        if (all <= STATIC_AUTO_ALL) return most;
+    }
+    return 0;
+}
+
+void sdm_config_set_static(sdm_config *c, size_t n_params)
+{
+    if (c->data.n_static_counts != 1 || c->data.static_counts[0] != SDM_STATIC_AUTO) return;
+    c->data.static_counts[0] = sdm_config_static_count(c, n_params, 0);
+    if (!c->data.static_counts[0]) c->data.n_static_counts = 0;
 }
 
 static void dump_three(const double v[3], sdm_text *out)
@@ -241,6 +269,10 @@ void sdm_dump_key_ranges(const sdm_config *c, sdm_text *out)
 void sdm_dump_key_static(const sdm_config *c, sdm_text *out)
 {
     const size_t n = c->data.n_static_counts;
+    if (n == 1 && c->data.static_counts[0] == SDM_STATIC_AUTO) {
+        sdm_text_add(out, "auto");
+        return;
+    }
     if (n < 2) {
         sdm_text_add(out, "%lld", n ? (long long)c->data.static_counts[0] : 0LL);
         return;

@@ -61,7 +61,11 @@ static void test_defaults(void **state)
     assert_int_equal(config.network.activation, SDM_ACTIVATION_SILU);
     assert_int_equal(config.network.weights, SDM_WEIGHT_I8);
     assert_int_equal(config.data.n_static_counts, 1);
-    assert_int_equal(config.data.static_counts[0], 5);
+    assert_int_equal(config.data.static_counts[0], SDM_STATIC_AUTO);
+    static const int64_t by_params[] = {0, 5, 5, 5, 5, 5, 3, 3, 2, 2, 2, 2, 0, 0};
+    for (size_t n = 1; n < sizeof by_params / sizeof *by_params; n++)
+        assert_int_equal(sdm_config_static_count(&config, n, n - 1), by_params[n]);
+    assert_int_equal(sdm_config_static_count(&config, SDM_MAX_PARAMS, 0), 0);
     assert_int_equal(config.data.online, 4096);
     assert_int_equal(config.data.start, 3456);
     assert_int_equal(config.data.holdout, 100);
@@ -297,7 +301,7 @@ static void test_mistakes(void **state)
         {"data: {static: 5000}", "x.yaml:4:16: data.static: 5000 is out of range (0 .. 1000)"},
         {"data: {static: [3, 0]}", "x.yaml:4:20: data.static: 0 is out of range (1 .. 1000)"},
         {"data: {static: []}",
-         "x.yaml:4:16: data.static: needs an integer or a list of 1 to 64, got a list of 0"},
+         "x.yaml:4:16: data.static: needs auto, an integer or a list of 1 to 64, got a list of 0"},
         {"data: {static_share: nan}",
          "x.yaml:4:22: data.static_share: needs a finite number, got 'nan'"},
         {"data: {static_share: .inf}",

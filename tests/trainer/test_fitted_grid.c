@@ -74,7 +74,7 @@ static void test_capsule(void **state)
     const sdm_param *p = sdm_instance_params(capsule, NULL);
     const double reach[3] = {2, 2, 2 + 0.5 * p[1].max};
     read_config(&c, GRIDS[0]);
-    if (sdm_train_grid(&c, capsule, &line, &e)) fail_msg("%s", e.text);
+    if (sdm_train_complete(&c, capsule, &line, &e)) fail_msg("%s", e.text);
     for (int i = 0; i < 3; i++) {
         const double from = c.grid.origin[i], h = c.grid.spacing[i],
                      to = from + (double)(c.grid.n[i] - 1) * h;
@@ -87,18 +87,18 @@ static void test_capsule(void **state)
     sdm_text_dispose(&line);
     for (int k = 1; k < 3; k++) {
         read_config(&other, GRIDS[k]);
-        assert_int_equal(sdm_train_grid(&other, capsule, NULL, &e), SDM_OK);
+        assert_int_equal(sdm_train_complete(&other, capsule, NULL, &e), SDM_OK);
         assert_memory_equal(&other.grid, &c.grid, sizeof c.grid);
     }
     // a complete grid stays as it is
     read_config(&c, "grid: {size: [4, 5, 6], spacing: 1}");
     other = c;
-    assert_int_equal(sdm_train_grid(&c, capsule, NULL, &e), SDM_OK);
+    assert_int_equal(sdm_train_complete(&c, capsule, NULL, &e), SDM_OK);
     assert_memory_equal(&other.grid, &c.grid, sizeof c.grid);
     // a training needs a complete grid
     read_config(&c, "grid: auto");
     assert_int_equal(sdm_train(&c, capsule, folder, false, NULL, NULL, &e), SDM_E_ARG);
-    assert_non_null(strstr(e.text, "sdm_train_grid"));
+    assert_non_null(strstr(e.text, "sdm_train_complete"));
     run_files_remove();
 }
 
@@ -130,7 +130,7 @@ static void test_proposal(void **state)
         sdm_config as_keys, as_word;
         read_config(&as_keys, proposed);
         read_config(&as_word, cases[k].as);
-        assert_int_equal(sdm_train_grid(&as_word, capsule, NULL, &e), SDM_OK);
+        assert_int_equal(sdm_train_complete(&as_word, capsule, NULL, &e), SDM_OK);
         assert_memory_equal(&as_keys.grid, &as_word.grid, sizeof as_keys.grid);
         sdm_text_dispose(&text);
     }

@@ -11,15 +11,15 @@
 
 sdm_status trainer_dataset_static(dataset *d, const sdm_config *config, sdm_error *err)
 {
-    d->n_static = config->data.n_static_counts ? 1 : 0;
-    for (size_t i = 0; i < d->n_params && config->data.n_static_counts; i++) {
-        const bool one_for_all = config->data.n_static_counts == 1;
-        if (!one_for_all && config->data.n_static_counts != d->n_params)
-            return sdm_fail(err, SDM_E_CONFIG,
-                            "%s: data.static has %zu counts, the shape has %zu parameters: give "
-                            "one number or %zu",
-                            config->file, config->data.n_static_counts, d->n_params, d->n_params);
-        d->counts[i] = (size_t)config->data.static_counts[one_for_all ? 0 : i];
+    const size_t given = config->data.n_static_counts;
+    if (given > 1 && given != d->n_params)
+        return sdm_fail(err, SDM_E_CONFIG,
+                        "%s: data.static has %zu counts, the shape has %zu parameters: give one "
+                        "number or %zu",
+                        config->file, given, d->n_params, d->n_params);
+    d->n_static = sdm_config_static_count(config, d->n_params, 0) > 0;
+    for (size_t i = 0; i < d->n_params && d->n_static; i++) {
+        d->counts[i] = (size_t)sdm_config_static_count(config, d->n_params, i);
         if (d->n_static > SIZE_MAX / 64 / d->counts[i])
             d->n_static = SIZE_MAX / 64;
         else

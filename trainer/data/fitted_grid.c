@@ -47,9 +47,12 @@ static void add_keys(sdm_text *out, const sdm_grid *g)
     add_three(out, g->origin);
 }
 
-sdm_status sdm_train_grid(sdm_config *config, const sdm_instance *shape, sdm_text *line,
-                          sdm_error *err)
+sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm_text *line,
+                              sdm_error *err)
 {
+    size_t n_params = 0;
+    sdm_instance_params(shape, &n_params);
+    sdm_config_set_static(config, n_params);
     if (config->grid.n[0] > 0) return SDM_OK;
     const double *spacing = config->grid.spacing[0] > 0 ? config->grid.spacing : NULL;
     double low[3], high[3];

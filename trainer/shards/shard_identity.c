@@ -80,9 +80,8 @@ sdm_status trainer_shard_identity(const sdm_config *c, const sdm_instance *shape
     add_reals(out, "grid.origin", g->origin, 3);
     add_reals(out, "grid.direction", g->dir, 9);
     sdm_text_add(out, "data.static=");
-    for (size_t i = 0; i < n && c->data.n_static_counts; i++)
-        sdm_text_add(out, "%s%lld", i ? " " : "",
-                     (long long)c->data.static_counts[c->data.n_static_counts == 1 ? 0 : i]);
+    for (size_t i = 0; i < n && sdm_config_static_count(c, n, 0); i++)
+        sdm_text_add(out, "%s%lld", i ? " " : "", (long long)sdm_config_static_count(c, n, i));
     sdm_text_add(out, "\nseed=%llu\n", (unsigned long long)c->seed);
     return out->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for the description of the maps")
                        : SDM_OK;

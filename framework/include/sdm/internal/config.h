@@ -87,6 +87,8 @@ typedef enum sdm_weight_type {
     SDM_WEIGHT_I8 = 2
 } sdm_weight_type;
 
+#define SDM_STATIC_AUTO (-1) /* data.static: auto */
+
 /* All keys of a training configuration. `sdmgen config --keys` lists their ranges and defaults for
  * every kind of network; unless another kind is named, the comments below give those of pod. */
 typedef struct sdm_config {
@@ -137,7 +139,8 @@ typedef struct sdm_config {
     } network;
     struct {
         /* data.static: number of points of the static grid (a regular grid in the space of the
-         * parameters) along each parameter, one number for all or a list; default 5 */
+         * parameters) along each parameter: one number for all, a list, or SDM_STATIC_AUTO (the
+         * default); sdm_config_static_count() says which number that is */
         int64_t static_counts[SDM_MAX_PARAMS];
         size_t n_static_counts; /* 0: no static grid; 1: one number for all parameters */
         int64_t online;         /* random shapes generated during training, 0..10^7, default 4096 */
@@ -214,6 +217,14 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out);
 /* Completes a configuration whose grid was to be fitted: stores the grid, and the defaults that
  * follow from its spacing, of the keys that were not given. */
 void sdm_config_set_grid(sdm_config *c, const sdm_grid *grid);
+
+/* Number of points of the static grid along parameter i of n_params, 0: no static grid.
+ * data.static: auto is the largest number up to 5 with which the grid has at most 3,125 points;
+ * with more than 11 parameters, 2 make too many, and there is no static grid. */
+int64_t sdm_config_static_count(const sdm_config *c, size_t n_params, size_t i);
+
+/* Puts this number in place of `auto`. */
+void sdm_config_set_static(sdm_config *c, size_t n_params);
 
 /* Clears the members that do not affect the trained network: the numbers of threads, the file name
  * and the output folder. Two configurations of the same network are then equal. */

@@ -15,7 +15,7 @@ typedef struct sdm_map_store sdm_map_store;
 
 /* Opens the shards in `folder`, which must be those of this configuration: shape with options,
    ranges and distributions, grid, static grid, seed. Their maps are not read yet. The grid of the
-   configuration is complete (sdm_train_grid()). damaged: NULL, or a function that is told the
+   configuration is complete (sdm_train_complete()). damaged: NULL, or a function that is told the
    message about each file that is damaged, which is then left out; a folder may then be empty or
    missing. Free with sdm_map_store_free(). SDM_E_IO; SDM_E_CONFIG: there is no shard, or a shard is
    of another configuration, and the message names what differs; SDM_E_FORMAT: a file is damaged;

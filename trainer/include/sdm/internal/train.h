@@ -110,18 +110,18 @@ sdm_status sdm_train_shape(sdm_config *c, const sdm_shape *shape, sdm_instance *
 sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape, double *min,
                             double *max, sdm_error *err);
 
-/* Completes a configuration whose grid is to be fitted to the shapes (grid: auto, grid.voxels, or
-   grid.spacing alone): the box of sdm_shape_box() over the ranges of sdm_train_ranges(), and
-   sdm_grid_around() it. Appends one line about the grid to *line (which may be NULL). Does nothing
-   if the grid is complete. The same configuration and shape give the same grid. SDM_E_CONFIG with
-   file:line:column, and the errors of sdm_instance_mesh(). */
-sdm_status sdm_train_grid(sdm_config *config, const sdm_instance *shape, sdm_text *line,
-                          sdm_error *err);
+/* Completes a configuration by the shape. data.static: auto becomes the number for its parameters.
+   A grid that is to be fitted to the shapes (grid: auto, grid.voxels, or grid.spacing alone)
+   becomes sdm_grid_around() the box of sdm_shape_box() over the ranges of sdm_train_ranges(), and
+   one line about it is appended to *line (which may be NULL). The same configuration and shape give
+   the same result. SDM_E_CONFIG with file:line:column, and the errors of sdm_instance_mesh(). */
+sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm_text *line,
+                              sdm_error *err);
 
 /* Appends a grid that holds the shapes of the configuration, for a message about one that cuts
    them: "grid: {spacing: 0.2} (size: [66, 58, 41], spacing: 0.2, origin: [-6.1, -5.5, -2.1])" with
    the spacing of the present grid, or where that makes over 2.5 million voxels "grid: auto (...)"
-   and why. Errors as sdm_train_grid(). */
+   and why. Errors as sdm_train_complete(). */
 sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance *shape,
                                    sdm_text *out, sdm_error *err);
 

@@ -12,6 +12,13 @@ program sdmgen, for any number of threads.
 
 from __future__ import annotations
 
+try:
+    import numpy as _numpy  # noqa: F401
+except ModuleNotFoundError:
+    raise ModuleNotFoundError(
+        "sdmgen needs NumPy: install python3-numpy (Debian), or numpy with pip", name="numpy"
+    ) from None
+
 from ._errors import (
     ArgumentError,
     CancelledError,
@@ -28,7 +35,7 @@ from ._errors import (
     UnsupportedError,
 )
 from ._files import read, write
-from ._fit import FitProgress, FitResult, Tissue, close_labels, fit
+from ._fit import Finding, FitProgress, FitResult, Tissue, close_labels, fit
 from ._grid import Grid, Pose
 from ._map import Band, Batch, Check, Image, Map, MapInfo, Segment, surface
 from ._mesh import Audit, ExactMap, Mesh, Points, Report, Surface, exact, exact_band, exact_points
@@ -52,6 +59,7 @@ __all__ = [
     "ExactMap",
     "Field",
     "FileError",
+    "Finding",
     "FitProgress",
     "FitResult",
     "FormatError",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from . import _abi
@@ -96,10 +97,16 @@ _CLASSES: dict[int, tuple[str, type[Error]]] = {
 }
 
 
+def with_arguments(text: str) -> str:
+    """A text of the C library, which names options of C, with the names of arguments in their place."""
+    text = text.replace("sdm_fit_source.grid", "exact=True, spacing=...")
+    return re.sub(r"\bsdm_\w+_opts\.(\w+)", r"\1", text)
+
+
 def error_of(code: int, text: str) -> Error:
     """The exception of a status of the C library."""
     status, kind = _CLASSES.get(code, ("internal", InternalError))
-    return kind(status, text)
+    return kind(status, with_arguments(text))
 
 
 def argument_error(text: str) -> ArgumentError:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from . import _abi
 from ._arrays import Float32, Float64, Triple, address, choice, copied, finite, flag, float32, float64, instance, number, triple, whole, words
-from ._errors import FormatError, QualityError, argument_error
+from ._errors import FormatError, QualityError, argument_error, with_arguments
 from ._files import IMAGES, MESHES, _ends, read_array, read_image
 from ._grid import Grid, Pose, grid_around
 from ._library import Callbacks, call, function, make
@@ -24,6 +24,7 @@ from ._shape import Measure, Shape, measures_by
 Label = Union[int, str]
 Target = Union[Image, Mesh, ArrayLike, Any]
 _KEEP = ("parameters", "pose", "blur", "appearance")
+_GRADES = ("passed", "doubtful", "failed")
 _POSE = ("rotation_x", "rotation_y", "rotation_z", "translation_x", "translation_y", "translation_z")
 _TURNS_ABOUT_AXIS, _TURNS_ALL, _SURFACE_POINTS = 12, 60, 20000
 
@@ -54,6 +55,19 @@ class Tissue:
 
 
 @dataclass(frozen=True)
+class Finding:
+    """One check of a fit. `check`: its name ("residuals"), as in docs/fitting-reference.md; `grade`:
+    "passed", "doubtful" or "failed"; `figure` and the `limit` that separates passed from the rest (NaN:
+    none); `text`: why it did not pass, else empty."""
+
+    check: str
+    grade: str
+    figure: float
+    limit: float
+    text: str
+
+
+@dataclass(frozen=True)
 class FitResult:
     """Result of a fit. The unknowns are the parameters, the rotation (rad: a small turn about the axes
     of the world, after the pose) and the translation (mm), in the order of `unknowns`."""
@@ -77,6 +91,10 @@ class FitResult:
     prior_sd: Float64
     #: overlap with the labels or the reference (Dice coefficient); NaN: none were given
     dice: float
+    #: the worst grade of the findings: "passed", "doubtful" or "failed"
+    verdict: str
+    #: all checks, in a fixed order
+    findings: tuple[Finding, ...]
     converged: bool
     #: why the fit stopped
     reason: str
@@ -418,6 +436,8 @@ def fit(
     eps: Optional[float] = None,
     max_iterations: Optional[int] = None,
     least_inside: Optional[float] = None,
+    tolerance: Optional[float] = None,
+    beside: Optional[float] = None,
     threads: int = 0,
     progress: Optional[Callable[[FitProgress], Any]] = None,
 ) -> FitResult:
@@ -430,7 +450,12 @@ def fit(
     directions are LPS, mm. start_points: pairs of points (in the frame of the shape [n, 3], in the
     image [n, 3]). region: two corners of a box. reference: labels to compare with (FitResult.dice).
 
-    QualityError: the fit failed or is not to be trusted; its `result` is the FitResult. An exception
+    A fit is judged: FitResult.verdict and FitResult.findings. tolerance: share of its volume by which
+    the organ may differ from the shape (default 0: residuals must be noise; labels and points 0.05).
+    beside: volume of the inside's material beside the shape that an image may hold, over the volume of
+    the shape.
+
+    QualityError: the fit failed or is not to be trusted (verdict "failed"); its `result` is the FitResult. An exception
     in `progress`, or Ctrl-C, stops the fit."""
     from_where, start_params, clamped = _open_source(source, params, exact, polish, policy, spacing)
     start = _Start(rotation, translation, start_centre, start_axis, start_points, turns, turns_sphere)
@@ -467,6 +492,8 @@ def fit(
     for name, given, member in (
         ("cavity", cavity, "cavity"),
         ("least_inside", least_inside, "least_inside"),
+        ("tolerance", tolerance, "tolerance"),
+        ("beside", beside, "beside"),
         ("prior_sd", prior_sd, "prior_sd"),
         ("prior_rotation", prior_rotation, "prior_rotation_sd"),
         ("prior_translation", prior_translation, "prior_translation_sd"),
@@ -546,6 +573,11 @@ def _run(
         function("sdm_fit_dispose")(byref(result))
 
 
+def _finding(c: Any) -> Finding:
+    check = function("sdm_fit_check_name")(c.kind).decode()
+    return Finding(check, _GRADES[c.grade], c.figure, c.limit, with_arguments(c.text.decode()))
+
+
 def _result_of(
     c: Any,
     names: list[str],
@@ -574,6 +606,8 @@ def _result_of(
         not_determined=tuple(name for name, flag in zip(names, by_prior) if flag),
         prior_sd=copied(c.prior_sd, (n,), np.float64),
         dice=_dice(source, params, pose, opened, reference),
+        verdict=_GRADES[c.verdict.grade],
+        findings=tuple(_finding(f) for f in c.verdict.findings[: c.verdict.n_findings]),
         converged=c.converged,
         reason=c.reason.decode(),
         iterations=c.n_iterations,

@@ -30,6 +30,12 @@ def compare(result, text):
     assert told["unknowns"] == list(result.unknowns)
     assert told["iterations"] == result.iterations and told["used"] == result.used
     assert told["log_likelihood"] == result.log_likelihood
+    assert told["verdict"]["grade"] == result.verdict
+    # the program also fits the mirror image
+    told_checks = [c for c in told["verdict"]["checks"] if c["name"] != "mirror image"]
+    checks = [(c["name"], c["grade"], pytest.approx(c["figure"], nan_ok=True)) for c in told_checks]
+    assert [(f.check, f.grade, f.figure) for f in result.findings] == checks
+    assert not any("sdm_" in f.text for f in result.findings)
     if "overlap" in told:
         assert told["overlap"]["dice"] == pytest.approx(result.dice, abs=1e-12)
 

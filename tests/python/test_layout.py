@@ -98,3 +98,9 @@ def test_a_wrong_layout_is_found(tmp_path):
             test_layouts_and_constants(tmp_path)
     finally:
         _abi.structs["sdm_grid"] = kept
+
+
+def test_numpy_is_asked_for():
+    code = "import sys; sys.modules['numpy'] = None; import sdmgen"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "sdmgen needs NumPy: install python3-numpy" in done.stderr and "During handling" not in done.stderr

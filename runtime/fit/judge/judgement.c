@@ -9,6 +9,7 @@
 #include "blob.h"
 #include "bounds.h"
 #include "coverage.h"
+#include "far_labels.h"
 #include "finding.h"
 #include "rival.h"
 #include "sdm/internal/shared.h"
@@ -224,6 +225,28 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
             sdm_fit_is_image(p) ? "sdm_fit_opts.beside" : "sdm_fit_opts.tolerance");
 }
 
+// Labels that contradict the shape away from its surface, by a volume that is within its limit.
+static void check_far_labels(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
+{
+    const fit_far_labels far = sdm_fit_far_labels(p, m->beyond);
+    if (p->opts->tolerance > 0) return;
+    for (int inside = 0; inside < 2; inside++) {
+        const sdm_fit_check_kind kind = inside ? SDM_FIT_CHECK_EMPTY : SDM_FIT_CHECK_MISSING;
+        char depth[60] = "";
+        if (!has_passed(v, kind) || !sdm_fit_far_labels_count(p, far.voxels[inside])) continue;
+        if (far.depth[inside] > 0)
+            snprintf(depth, sizeof depth, ", up to %.2g mm from its surface", far.depth[inside]);
+        sdm_fit_judge_add(v, kind, false, SDM_FIT_DOUBTFUL, inside ? m->empty : m->missing,
+                          VOLUME_MIN,
+                          "%.0f voxels %s%s: the data may have a part that the shape has not, or "
+                          "lack one (sdm_fit_opts.tolerance accepts a difference)",
+                          far.voxels[inside],
+                          inside ? "inside the shape do not have the label"
+                                 : "with the label lie outside of the shape",
+                          depth);
+    }
+}
+
 // the tissues against the robust statistics, and against the values at the start
 static void check_tissues(const fit_problem *p, const fit_residuals *s, const sdm_fit_result *r,
                           sdm_fit_verdict *v)
@@ -324,6 +347,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     if (!s) {
         check_residuals(p, &misfit, coarse, &bounds, v);
         check_volumes(p, &misfit, r, v);
+        if (!points && !sdm_fit_is_image(p)) check_far_labels(p, &misfit, v);
         v->n_units = misfit.n_units[0] + misfit.n_units[1];
         v->chi_square = misfit.noise_chi_square;
     }

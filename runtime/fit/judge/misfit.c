@@ -202,13 +202,14 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
     *out = (fit_misfit){0};
     sdm_status s = members_create(r, &m, &n, err);
     if (!s && points) s = points_scatter(r, m, n, err);
+    if (points) out->n_points = n;
     double volume = 0;
     for (size_t i = 0; i < r->n; i++) volume += r->expected[i];
     // labels show the place of the surface to 0.12 of their voxels
     const bool labels = p->given_labels || p->target->kind == SDM_FIT_LABEL;
     const double least = labels ? fmax(LABEL_ERROR / r->edge[0], MEAN_SD_MIN) : MEAN_SD_MIN;
     const double factor = points ? points_volume_factor(p) : 1;
-    if (labels) out->missing = label_beyond(p) / volume;
+    if (labels) out->beyond = label_beyond(p), out->missing = out->beyond / volume;
     for (size_t from = 0, to; from < n && !s; from = to) {
         for (to = from; to < n && m[to].unit == m[from].unit; to++) {
         }

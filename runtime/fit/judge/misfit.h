@@ -12,8 +12,8 @@
 
 typedef struct fit_misfit {
     /* outside of the surface [0] and inside [1]; points count as inside */
-    /* number of units */
-    size_t n_units[2];
+    /* number of units; of points that are no strays (points alone) */
+    size_t n_units[2], n_points;
     /* mean over the units of (mean residual)^2 / variance, where errors of the maps add to the
        variance. 1: the residuals are noise and these errors */
     double chi_square[2];
@@ -28,6 +28,8 @@ typedef struct fit_misfit {
        samples. Points: the volumes between the surface
        of the shape and that of the points, inside and outside of the shape */
     double empty, missing;
+    /* labels: number of voxels inside that are too far from the shape to be samples */
+    double beyond;
 } fit_misfit;
 
 /* Measures the misfit from the residuals; points: sets their sd first. */

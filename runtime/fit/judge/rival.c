@@ -8,6 +8,8 @@
 
 // a chi-square is at least this: residuals without any noise
 #define CHI_SQUARE_MIN 1e-3
+// of points that a rival takes for strays
+#define CHI_SQUARE_STRAY 9.0
 
 bool sdm_fit_is_image(const fit_problem *p)
 {
@@ -17,7 +19,7 @@ bool sdm_fit_is_image(const fit_problem *p)
 sdm_status sdm_fit_stand(const fit_problem *p, double factor, fit_standing *out, sdm_error *err)
 {
     if (sdm_fit_is_image(p)) {
-        *out = (fit_standing){p->information.log_likelihood, factor, 0, 0};
+        *out = (fit_standing){.log_likelihood = p->information.log_likelihood, .factor = factor};
         return SDM_OK;
     }
     fit_residuals residuals;
@@ -26,7 +28,9 @@ sdm_status sdm_fit_stand(const fit_problem *p, double factor, fit_standing *out,
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     sdm_fit_residuals_dispose(&residuals);
     if (!s)
-        *out = (fit_standing){0, 0, misfit.n_units[0] + misfit.n_units[1], misfit.noise_chi_square};
+        *out = (fit_standing){.n_units = misfit.n_units[0] + misfit.n_units[1],
+                              .chi_square = misfit.noise_chi_square,
+                              .n_points = misfit.n_points};
     return s;
 }
 
@@ -39,6 +43,8 @@ double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival)
 {
     if (fit->factor > 0) return (fit->log_likelihood - rival->log_likelihood) / fit->factor;
     if (!fit->n_units || !rival->n_units) return NAN;
+    const double kept =
+        rival->n_points < fit->n_points ? (double)rival->n_points / (double)fit->n_points : 1;
     return sdm_fit_units_gain(0.5 * (double)(fit->n_units + rival->n_units), fit->chi_square,
-                              rival->chi_square);
+                              kept * rival->chi_square + (1 - kept) * CHI_SQUARE_STRAY);
 }

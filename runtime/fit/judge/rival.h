@@ -13,6 +13,7 @@ typedef struct fit_standing {
      * the noise; images: 0 */
     size_t n_units;
     double chi_square;
+    size_t n_points; /* points: number of them that are no strays; else 0 */
 } fit_standing;
 
 /* Whether the target is an image: its voxels have tissues. */
@@ -21,8 +22,9 @@ bool sdm_fit_is_image(const fit_problem *p);
 /* Fills *out from p->samples and p->information. factor: as fit_standing. SDM_E_NOMEM. */
 sdm_status sdm_fit_stand(const fit_problem *p, double factor, fit_standing *out, sdm_error *err);
 
-/* Gain of the fit over a rival that was measured on the same samples. NaN: points lie too far apart
- * to tell. */
+/* Gain of the fit over a rival that was measured on the same samples. The share of points that the
+ * rival alone takes for strays counts with mean residuals of 3 deviations. NaN: points lie too far
+ * apart to tell. */
 double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival);
 
 /* Log-likelihood ratio of mean residuals of n neighbourhoods whose common variance is estimated. */

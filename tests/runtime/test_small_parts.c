@@ -1,7 +1,7 @@
-/* Data that want a parameter beyond its range: a ball with a rod that is longer than the range
- * allows, as labels and in an image. The rod is so thin that no share of the volume tells. A rod
- * within the range passes.
- * Tests: bounds.c judgement.c */
+/* Data that no shape of the family explains in a small part: a ball with a rod that is longer than
+ * the range allows, as labels and in an image; labels with a pea on the ball, or with a hole in it.
+ * These parts are so small that no share of the volume tells. A rod within the range passes.
+ * Tests: bounds.c far_labels.c judgement.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -80,7 +80,10 @@ static double distance_to(const double x[3], double radius, double length)
     return fmin(ball, rod);
 }
 
-static sdm_status fit_knob(double length, bool image, sdm_fit_result *r, sdm_error *err)
+// pea: radius of a ball beside the large one that belongs to the labels too, mm; hole: of one
+// within
+static sdm_status fit_knob(double length, bool image, double pea, double hole, sdm_fit_result *r,
+                           sdm_error *err)
 {
     const sdm_grid g = sdm_grid_centred((int64_t[3]){44, 44, 64}, 0.35, (double[3]){0, 0, 3});
     sdm_instance *shape = NULL;
@@ -91,7 +94,11 @@ static sdm_status fit_knob(double length, bool image, sdm_fit_result *r, sdm_err
             for (int64_t i = 0; i < g.n[0]; i++, n++) {
                 double x[3];
                 sdm_grid_world(&g, (double[3]){(double)i, (double)j, (double)k}, x);
-                const double d = distance_to(x, 5, length), share = 0.5 - 0.5 * erf(d / 0.42);
+                const double from_pea =
+                                 sqrt((x[0] - 5.8) * (x[0] - 5.8) + x[1] * x[1] + x[2] * x[2]),
+                             from_hole = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]),
+                             solid = fmin(distance_to(x, 5, length), from_pea - pea),
+                             d = fmax(solid, hole - from_hole), share = 0.5 - 0.5 * erf(d / 0.42);
                 v[n] =
                     (float)(image ? -1000 + 2500 * share + 100 * sdm_rng_normal(7, 0, (uint64_t)n)
                                   : d < 0);
@@ -113,10 +120,11 @@ static sdm_status fit_knob(double length, bool image, sdm_fit_result *r, sdm_err
     return s;
 }
 
-static const sdm_fit_finding *bounds_of(const sdm_fit_result *r)
+static const sdm_fit_finding *finding(const sdm_fit_result *r, sdm_fit_check_kind kind)
 {
     for (size_t i = 0; i < r->verdict.n_findings; i++)
-        if (r->verdict.findings[i].kind == SDM_FIT_CHECK_BOUNDS) return &r->verdict.findings[i];
+        if (r->verdict.findings[i].kind == kind) return &r->verdict.findings[i];
+    fail_msg("no finding of kind %d", (int)kind);
     return NULL;
 }
 
@@ -126,8 +134,8 @@ static void test_beyond_the_range_is_refused(void **state)
     for (int image = 0; image < 2; image++) {
         sdm_fit_result r;
         sdm_error err;
-        const sdm_status s = fit_knob(8, image, &r, &err);
-        const sdm_fit_finding *f = bounds_of(&r);
+        const sdm_status s = fit_knob(8, image, 0, 0, &r, &err);
+        const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_BOUNDS);
         if (s != SDM_E_QUALITY)
             fail_msg("image %d: status %d, %s", image, (int)s, f ? f->text : "");
         assert_int_equal(f->grade, SDM_FIT_FAILED);
@@ -144,10 +152,30 @@ static void test_within_the_range_passes(void **state)
     for (int image = 0; image < 2; image++) {
         sdm_fit_result r;
         sdm_error err;
-        if (fit_knob(4.5, image, &r, &err)) fail_msg("image %d: %s", image, err.text);
+        if (fit_knob(4.5, image, 0, 0, &r, &err)) fail_msg("image %d: %s", image, err.text);
+        assert_int_equal(finding(&r, SDM_FIT_CHECK_MISSING)->grade, SDM_FIT_PASSED);
+        assert_int_equal(finding(&r, SDM_FIT_CHECK_EMPTY)->grade, SDM_FIT_PASSED);
         // the mesh has few triangles: its ball is smaller by up to a fiftieth
         if (!(fabs(r.params[LENGTH] - 4.5) < 0.3 && fabs(r.params[RADIUS] - 5) < 0.1))
             fail_msg("image %d: length %g, radius %g", image, r.params[LENGTH], r.params[RADIUS]);
+        sdm_fit_dispose(&r);
+    }
+}
+
+// A pea of 1.2 mm on a ball of 5 mm, or a hole of 1.2 mm in it, about a hundredth of the volume.
+static void test_small_parts_leave_doubt(void **state)
+{
+    (void)state;
+    for (int hole = 0; hole < 2; hole++) {
+        sdm_fit_result r;
+        sdm_error err;
+        if (fit_knob(4.5, false, hole ? 0 : 1.2, hole ? 1.2 : 0, &r, &err))
+            fail_msg("hole %d: %s", hole, err.text);
+        const sdm_fit_finding *f = finding(&r, hole ? SDM_FIT_CHECK_EMPTY : SDM_FIT_CHECK_MISSING);
+        assert_int_equal(f->grade, SDM_FIT_DOUBTFUL);
+        assert_true(f->figure < 0.05);
+        assert_non_null(strstr(f->text, hole ? "inside the shape do not have the label"
+                                             : "with the label lie outside of the shape"));
         sdm_fit_dispose(&r);
     }
 }
@@ -157,6 +185,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_beyond_the_range_is_refused),
         cmocka_unit_test(test_within_the_range_passes),
+        cmocka_unit_test(test_small_parts_leave_doubt),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -153,7 +153,7 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
 static void write_sentence(const verdict_input *in, const char *what, sdm_verdict *v)
 {
     const sdm_config *c = in->config;
-    char change[160] = "", also[96] = "", result[96] = "", share[96] = "";
+    char change[160] = "", also[96] = "", time[64] = "", result[96] = "", share[96] = "";
     if (v->key[0])
         snprintf(change, sizeof change, ": %s %s from %.6g to %.6g",
                  v->to < v->from ? "lower" : "raise", v->key, v->from, v->to);
@@ -176,6 +176,8 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
     const double gb = 2e-9 * (double)sdm_grid_count(&c->grid) * (in->maps + v->to);
     if (v->limit == SDM_CAUSE_MAPS && !in->cut && gb > c->data.memory_gb)
         snprintf(also, sizeof also, " and data.memory_gb to %.0f", ceil(gb));
+    if (v->limit == SDM_CAUSE_MAPS && !in->cut && c->train.minutes > 0)
+        snprintf(time, sizeof time, ", and train.minutes by the time that they take");
     if (v->limit == SDM_CAUSE_GRID)
         snprintf(result, sizeof result,
                  "; between its voxels exact maps miss the surface by %.2g mm",
@@ -189,7 +191,8 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
         snprintf(share, sizeof share, " (%.0f %% of the mean square error)",
                  100 * part / (part + rest));
     }
-    snprintf(v->sentence, sizeof v->sentence, "%s%s%s%s%s.", what, share, change, also, result);
+    snprintf(v->sentence, sizeof v->sentence, "%s%s%s%s%s%s.", what, share, change, also, time,
+             result);
 }
 
 /* Sets the limit, the key and the sentence about them. */

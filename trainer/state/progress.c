@@ -69,19 +69,20 @@ void trainer_pace_start(trainer *t, double unit_maps)
     t->pace = (trainer_pace){.unit_maps = unit_maps, .seconds = {now, now}};
 }
 
-/* Returns the units of work finished per second, over the last two to four seconds; NaN: none yet,
- * or the work has only begun. A step may take longer than that: until it ends, the rate is that of
- * a longer time, never 0. */
-static double pace_rate(trainer_pace *p, double now)
+/* Returns the units of work finished per second, over the last two to four seconds; NaN: none yet.
+ * A step may take longer than that: until it ends, the rate is that of a longer time, never 0. Maps
+ * that are taken from the trials of `auto` come first: the first quarter of a second of maps tells
+ * nothing. */
+static double pace_rate(trainer_pace *p, sdm_phase phase, double now)
 {
-    static const double LENGTH = 2, SHORTEST = 0.25;
+    static const double LENGTH = 2, MAPS = 0.25;
     if (now - p->seconds[1] > LENGTH && p->done > p->before[1]) {
         p->before[0] = p->before[1], p->seconds[0] = p->seconds[1];
         p->before[1] = p->done, p->seconds[1] = now;
     }
     const double length = now - p->seconds[0];
-    return p->done > p->before[0] && length > SHORTEST ? (double)(p->done - p->before[0]) / length
-                                                       : NAN;
+    if (!(length > (phase == SDM_PHASE_DATA ? MAPS : 0)) || p->done <= p->before[0]) return NAN;
+    return (double)(p->done - p->before[0]) / length;
 }
 
 /* Time that the rest of the budget takes, s: with a budget of steps at the pace of the last
@@ -99,7 +100,7 @@ void trainer_report(trainer *t, double fraction, bool now)
     const double seconds = trainer_seconds(t);
     if (!t->hooks.progress || (!now && seconds - t->last_report < 0.1)) return;
     t->last_report = seconds;
-    const double rate = pace_rate(&t->pace, seconds);
+    const double rate = pace_rate(&t->pace, t->phase, seconds);
     const dataset *d = &t->data;
     // while maps are computed the held-out ones come first
     const int64_t computed = t->pace.done - (int64_t)d->n_holdout;

@@ -137,7 +137,8 @@ static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *s
     out->seconds = cli_thread_clock() - begin;
     // store the estimate
     out->converged = !s;
-    if (s) snprintf(out->reason, sizeof out->reason, "%.199s", why->text);
+    if (s) cli_name_options(why->text);
+    if (s) snprintf(out->reason, sizeof out->reason, "%.299s", why->text);
     out->maps_network = r.n_network;
     out->maps_exact = r.n_exact;
     for (size_t i = 0; i < job->maker.n_params; i++) {
@@ -249,7 +250,7 @@ static void set_note(const cli_experiment_run *run, const sdm_model *model, cons
         snprintf(maps, sizeof maps, "maps by the network %s%s", sdm_model_get_info(model)->kind,
                  out->row->method->fit == SDM_EXPERIMENT_FIT_POLISH ? ", then exact ones" : "");
     snprintf(out->note, sizeof out->note,
-             "%s, %s; %lld phantoms with voxels of %g mm, started %g mm and %g degrees off%s%.200s",
+             "%s, %s; %lld phantoms with voxels of %g mm, started %g mm and %g degrees off%s%.280s",
              maps, out->grid, (long long)run->e->fit.phantoms, run->e->fit.voxel,
              run->e->fit.off_mm, run->e->fit.off_deg, why->status ? "; the first failure: " : "",
              why->text);

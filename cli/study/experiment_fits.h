@@ -11,7 +11,7 @@ typedef struct cli_experiment_fit {
     double truth[SDM_MAX_PARAMS], found[SDM_MAX_PARAMS], sd[SDM_MAX_PARAMS];
     double seconds, dice;
     size_t maps_network, maps_exact; /* number of maps that each source made */
-    char reason[200];                /* why it is not to be trusted; "" if it is */
+    char reason[300];                /* why it is not to be trusted; "" if it is */
 } cli_experiment_fit;
 
 struct cli_experiment_fits {

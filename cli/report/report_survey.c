@@ -431,7 +431,7 @@ static void tell_notes(teller *t)
     for (size_t i = 0; i < sizeof notes / sizeof *notes; i++) {
         sdm_text text = {0};
         const size_t n = notes[i].count->shapes;
-        // on purpose, it is likely, where all shapes do
+        // where all shapes overlap themselves, it is likely to be wanted
         if (!n || (notes[i].count == &f->overlaps && t->s->brief && n == f->n)) continue;
         add_count(t->s, notes[i].count, notes[i].what, &text);
         sdm_text_add(&text, "%s", notes[i].after);

@@ -323,7 +323,7 @@ typedef enum sdm_fit_check_kind {
     SDM_FIT_CHECK_NEXT_POSE,
     /* points: share of those that lie on no surface of the shape but form one: neighbours as near
        as those on the shape, or in a thin layer; at most 0.05 or sdm_fit_opts.tolerance, and 0.01
-       where SDM_FIT_CHECK_COVERED does not pass; doubtful from 0.003 on, and from 0.05 of the
+       where SDM_FIT_CHECK_COVERED does not pass; doubtful above 0.003 and above a twentieth of the
        points that lie on no surface */
     SDM_FIT_CHECK_PATCH,
     /* points: share of the fitted surface without points near it, at most 0.02. Doubtful, because

@@ -17,6 +17,7 @@
 #include "correlation.h"
 #include "fit/solver/prior.h"
 #include "fit/solver/solve.h"
+#include "label_steps.h"
 #include "point_covariance.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/threads.h"
@@ -166,6 +167,7 @@ static sdm_status voxels_covariance(const fit_problem *p, double model_mm, const
         if (!s) s = noise_add(p, &v, c, width, n_threads, influence, out, err);
     }
     if (!s && model_mm > 0) s = model_error_add(p, &v, model_mm, out->model, err);
+    if (!s && influence && p->given_labels) s = sdm_fit_label_steps(p, &v, out->noise, err);
     sdm_fit_neighbours_dispose(&v);
     return s;
 }

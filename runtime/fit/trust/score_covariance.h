@@ -6,7 +6,7 @@
 
 /* Matrices [n_unknowns][n_unknowns]. */
 typedef struct fit_score_covariance {
-    /* caused by the noise of the samples */
+    /* caused by the noise of the samples; label maps: and by their steps (label_steps.h) */
     double *noise;
     /* caused by a map error of 1 mm (rms); multiply by the squared error in mm */
     double *model;

@@ -541,6 +541,23 @@ static void notice_between(const job *j, const char *measure)
                    rmse, between, measure);
 }
 
+/* Where two parts of the surface are equally far, as in the middle of a handle, the distance has a
+ * ridge. A network rounds it off: its gradient is short there, and its distance too small. */
+static void notice_ridges(const point_answers *a)
+{
+    enum { PERCENT = 70 };
+    size_t n = 0;
+    for (size_t i = 0; i < a->n; i++) {
+        const float *g = a->gradient + 3 * i;
+        n += 1e4f * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) < PERCENT * PERCENT;
+    }
+    if (n)
+        cli_notice("at %zu of %zu points the gradient is shorter than 0.%d: they lie about in the "
+                   "middle between two parts of the surface, where distances of a network are too "
+                   "small; its stated error is that near the surface",
+                   n, a->n, PERCENT / 10);
+}
+
 /* Does the work of --points. */
 static sdm_status run_points(job *j, sdm_error *err)
 {
@@ -558,6 +575,7 @@ static sdm_status run_points(job *j, sdm_error *err)
     if (!s && result.clamped) notice_clamped(j, 0);
     if (!s) notice_row(j, 0, &result);
     if (!s) s = write_points(j, &a, &table, err);
+    if (!s && result.source != SDM_SOURCE_EXACT) notice_ridges(&a);
     if (!s && result.source != SDM_SOURCE_EXACT)
         notice_between(j, "sdmgen exact --points computes exact distances");
     cli_points_dispose(&table);

@@ -42,8 +42,16 @@ void cli_print_verdict(const sdm_verdict *v)
     const double voxel = v->voxel_mm;
     printf("  in voxels   all %.4f, within a voxel of the surface %.4f; Dice %.4f, smallest %.4f\n",
            v->rmse_mm / voxel, v->rmse_voxel_mm / voxel, v->dice, v->dice_min);
-    printf("  %-11s %s", sdm_grade_name(v->grade), sdm_grade_text(v->grade));
-    if (v->cut > 0 && v->grade != SDM_GRADE_POOR)
+    // a network may be poor for this alone
+    const bool cuts = v->grade == SDM_GRADE_POOR && v->cut > SDM_CUT_POOR;
+    printf("  %-11s ", sdm_grade_name(v->grade));
+    if (cuts)
+        printf("its grid cuts %.2g %% of the shapes, whose surfaces end open there",
+               fmin(v->cut < 1 ? 99 : 100, 100 * v->cut));
+    else
+        printf("%s", sdm_grade_text(v->grade));
+    if (v->inside_out > 0) printf("; not for the parts that are inside out, which are missing");
+    if (v->cut > 0 && !cuts)
         printf("; not for the %.2g %% of the shapes that the grid cuts", fmin(99, 100 * v->cut));
     if (sdm_verdict_errs_far(v))
         printf("; not for distances far from the surface: wrong by up to %.2g mm", v->largest_mm);

@@ -53,6 +53,14 @@ expect 2 'an output is needed' sdmgen generate $model --points points.csv
 expect 2 'belongs to --points' sdmgen generate $model --columns distance -o x.npy
 absent x.csv
 
+# In the middle of the tube the distance has a ridge; far outside it has none.
+printf 'x,y,z\n1.35031,0.225817,1.42688\n-5.5,-4.5,-4\n' >middle.csv
+expect 0 'at 1 of 2 points the gradient is shorter than 0\.7: they lie about in the middle between two parts of the surface' \
+    sdmgen generate $model --points middle.csv -o middle.npy
+printf 'x,y,z\n-5.5,-4.5,-4\n' >outside.csv
+sdmgen generate $model --points outside.csv -o outside.npy 2>err
+grep -q 'shorter than' err && bad 'a point far outside is said to lie on a ridge'
+
 # Grids that leave the box of the model.
 expect 5 'the grid leaves the box.*bound or exact' sdmgen generate $model --size 30,30,30 -o x.npy
 expect 0 - sdmgen generate $model --size 30,30,30 --outside bound -o bound.npy --quiet

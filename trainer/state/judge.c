@@ -127,7 +127,8 @@ static sdm_grade grade_of(const sdm_verdict *v)
 {
     const double voxels = v->rmse_voxel_mm / v->voxel_mm;
     if (voxels <= 0.05 && v->dice >= 0.98 && v->cut <= 0.05) return SDM_GRADE_GOOD;
-    return voxels <= 0.2 && v->dice >= 0.9 && v->cut <= 0.5 ? SDM_GRADE_USABLE : SDM_GRADE_POOR;
+    return voxels <= 0.2 && v->dice >= 0.9 && v->cut <= SDM_CUT_POOR ? SDM_GRADE_USABLE
+                                                                     : SDM_GRADE_POOR;
 }
 
 /* *limit = the largest part, or the grid. Returns false if nothing was measured. */
@@ -239,7 +240,9 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
 {
     v->grade = grade_of(v);
     decide_limit(in, v);
-    if (v->inside_out > 0 && v->grade != SDM_GRADE_GOOD)
+    // the maps lack these parts: however exact the network is, it has learned another shape
+    if (v->inside_out > 0 && v->grade == SDM_GRADE_GOOD) v->grade = SDM_GRADE_USABLE;
+    if (v->inside_out > 0)
         tell_inside_out(v);
     else if (v->cut > 0)
         tell_cut(v);

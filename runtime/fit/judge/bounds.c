@@ -46,14 +46,17 @@ fit_at_bounds sdm_fit_at_bounds(const fit_problem *p, const sdm_fit_result *r, d
         const bool upper = p->state.params[k] >= p->high[k];
         if (!r->at_bound[k]) continue;
         b.n++;
+        const char *name = "";
+        double low, high;
+        sdm_fit_bounds(p->source, k, &low, &high, &name);
+        const size_t length = strlen(b.names);
+        if (length + strlen(name) + 3 < sizeof b.names)
+            snprintf(b.names + length, sizeof b.names - length, "%s%s", length ? ", " : "", name);
         const double gain = gain_beyond(p, k, upper) / factor;
         if (!(gain > SDM_FIT_PREFERRED)) continue;
         b.n_wanted++;
         if (!(gain > most)) continue;
-        const char *name = "";
-        double low, high;
         most = gain;
-        sdm_fit_bounds(p->source, k, &low, &high, &name);
         snprintf(b.text, sizeof b.text,
                  "%.60s ends at its bound: the data want %s than %.6g, the %s value of its range",
                  name, upper ? "more" : "less", upper ? p->high[k] : p->low[k],

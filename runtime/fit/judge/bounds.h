@@ -7,6 +7,8 @@
 typedef struct fit_at_bounds {
     /* number of them, and of those of which the data want more (or less) */
     size_t n, n_wanted;
+    /* their names, "base, height"; those without room left out */
+    char names[100];
     /* "base ends at its bound: the data want more than 60, the largest value of its range", of
        the parameter that the data want farthest beyond; else "" */
     char text[240];

@@ -135,8 +135,8 @@ static void check_bounds(const fit_problem *p, const fit_at_bounds *b, const sdm
                           b->text);
     else
         sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, !b->n, grade, (double)b->n, 0,
-                          "%zu of %zu parameters at an end of their range%s%s%s", b->n, p->n_params,
-                          b->n_wanted ? ": " : "", b->text,
+                          "%zu of %zu parameters at an end of their range (%s)%s%s%s", b->n,
+                          p->n_params, b->names, b->n_wanted ? ": " : "", b->text,
                           refused ? ", and do not match the shape as it is: a wider range, or "
                                     "another shape (sdm_fit_opts.tolerance accepts a difference)"
                                   : "");

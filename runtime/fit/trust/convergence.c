@@ -57,9 +57,8 @@ static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_err
                  "; %.100s still moves by %.2g of its standard deviation, need %.2g", name, most,
                  UNREST_MAX);
     sdm_fail(err, SDM_E_QUALITY,
-             "not converged after %zu iterations (%s%s): allow more iterations "
-             "(sdm_fit_opts.max_iterations), "
-             "give a nearer start or a prior",
+             "not converged after %zu iterations (%s%s): more of them "
+             "(sdm_fit_opts.max_iterations), or a nearer start",
              r->n_iterations, r->reason, moves);
 }
 

@@ -85,6 +85,9 @@ const char *sdm_cause_name(sdm_cause cause);
 /* How the part was measured, a few words. [any thread] */
 const char *sdm_cause_text(sdm_cause cause);
 
+/* A model is poor if its grid cuts a larger fraction of the held-out shapes. */
+#define SDM_CUT_POOR 0.5
+
 /* "good", "usable" or "poor"; what such a model is good for. [any thread] */
 const char *sdm_grade_name(sdm_grade grade);
 const char *sdm_grade_text(sdm_grade grade);

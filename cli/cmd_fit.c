@@ -54,9 +54,10 @@ static void show_progress(void *user, const sdm_fit_progress *p)
     if (w->f->candidate)
         snprintf(text, sizeof text, "candidate %zu of %zu, ", w->f->candidate, w->f->n_candidates);
     const size_t used = strlen(text), n = p->iteration - w->before,
-                 most = p->phase == SDM_FIT_POLISH ? o->max_polish_iterations : o->max_iterations;
+                 most = 2 *
+                        (p->phase == SDM_FIT_POLISH ? o->max_polish_iterations : o->max_iterations);
     snprintf(text + used, sizeof text - used, "iteration %zu of at most %zu, last step %.1e", n,
-             2 * most, p->step);
+             most, p->step);
     cli_progress_show(&w->bar,
                       p->phase == SDM_FIT_POLISH ? "polish"
                       : p->phase == SDM_FIT_MAIN ? "fit"

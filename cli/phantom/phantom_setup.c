@@ -188,10 +188,26 @@ static sdm_status grid_make(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
     return s;
 }
 
+/* Refuses options of the image where none is written: labels, truth and surface do not have them.
+ */
+static sdm_status check_image_options(const cli_args *args, sdm_error *err)
+{
+    static const char *const names[] = {"inside",  "outside", "air",         "air-cells", "blur",
+                                        "texture", "noise",   "white-noise", "type"};
+    for (size_t i = 0; i < args->n_given && !args->outputs.n; i++)
+        for (size_t k = 0; k < sizeof names / sizeof *names; k++)
+            if (!strcmp(args->given[i].option->name, names[k]))
+                return sdm_fail(err, SDM_E_ARG,
+                                "phantom: --%s does nothing without an image, -o FILE", names[k]);
+    return SDM_OK;
+}
+
 /* Refuses options that would do nothing. */
 static sdm_status check_options(const cli_args *args, sdm_error *err)
 {
     const cli_phantom_args *a = &args->phantom;
+    const sdm_status useless = check_image_options(args, err);
+    if (useless) return useless;
     if (!isnan(a->air[0]) && isnan(a->air_cells[0]))
         return sdm_fail(err, SDM_E_ARG,
                         "phantom: --air does nothing without --air-cells SHARE,MM,CLEAR");

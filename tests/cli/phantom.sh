@@ -113,6 +113,7 @@ near $(paste -d, even.csv noisy.csv | awk -F, 'NR > 1 { for (i = 1; i < 4; i++) 
 near $(awk -F, 'NR > 1 { s += $1; n++ } END { print s / n }' even.csv) 5 0.02
 [ "$(stat -c %s even.npy)" -gt 72000 ] || bad 'points as an array'
 expect 2 'surface-noise does nothing without --surface FILE.csv' sdmgen phantom $small --surface x.stl --surface-noise 1
+expect 2 '--noise does nothing without an image, -o FILE' sdmgen phantom $small --label x.nii --noise 10
 expect 2 'surface-points does nothing without --surface FILE.csv' sdmgen phantom $small --label x.nii --surface-points 9
 expect 2 "surface 'x.txt': its name must end in .ply .stl" sdmgen phantom $small --surface x.txt
 

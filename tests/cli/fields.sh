@@ -55,8 +55,8 @@ absent x.csv
 
 # In the middle of the tube the distance has a ridge; far outside it has none.
 printf 'x,y,z\n1.35031,0.225817,1.42688\n-5.5,-4.5,-4\n' >middle.csv
-expect 0 'at 1 of 2 points the gradient is shorter than 0\.7: they lie about in the middle between two parts of the surface' \
-    sdmgen generate $model --points middle.csv -o middle.npy
+sdmgen generate $model --points middle.csv -o middle.npy 2>err || bad 'points in the middle of the tube'
+grep -q 'at 1 of 2 points the gradient is shorter than 0\.7: they lie about in the middle between two parts of the surface' err || bad "$(cat err)"
 printf 'x,y,z\n-5.5,-4.5,-4\n' >outside.csv
 sdmgen generate $model --points outside.csv -o outside.npy 2>err
 grep -q 'shorter than' err && bad 'a point far outside is said to lie on a ridge'

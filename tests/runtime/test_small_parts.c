@@ -1,7 +1,7 @@
 /* Data that no shape of the family explains in a small part: a ball with a rod that is longer than
  * the range allows, as labels and in an image; labels with a pea on the ball, or with a hole in it.
  * These parts are so small that no share of the volume tells. A rod within the range passes.
- * Tests: bounds.c far_labels.c judgement.c */
+ * Tests: bounds.c far_labels.c judgement.c suffice.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -180,12 +180,58 @@ static void test_small_parts_leave_doubt(void **state)
     }
 }
 
+// The tube of a torus is 2 mm thick: labels with voxels of 2.5 mm do not show it, those of 0.5 mm
+// do.
+static void test_labels_that_are_too_coarse(void **state)
+{
+    (void)state;
+    const double major = 3, minor = 1;
+    sdm_instance *torus = NULL;
+    assert_int_equal(sdm_instance_create(sdm_registry_find(registry, "torus", NULL), NULL, 0, NULL,
+                                         &torus, NULL),
+                     SDM_OK);
+    for (int coarse = 0; coarse < 2; coarse++) {
+        const double voxel = coarse ? 2.5 : 0.5;
+        const int64_t across = (int64_t)(12 / voxel), along = (int64_t)(7.5 / voxel);
+        const sdm_grid g =
+            sdm_grid_centred((int64_t[3]){across, across, along}, voxel, (double[3]){0, 0, 0});
+        float *v = calloc(sdm_grid_count(&g), sizeof *v);
+        if (!v) abort();
+        for (int64_t k = 0, n = 0; k < g.n[2]; k++)
+            for (int64_t j = 0; j < g.n[1]; j++)
+                for (int64_t i = 0; i < g.n[0]; i++, n++) {
+                    double x[3];
+                    sdm_grid_world(&g, (double[3]){(double)i, (double)j, (double)k}, x);
+                    v[n] = hypot(hypot(x[0], x[1]) - major, x[2]) < minor;
+                }
+        const sdm_fit_source source = {
+            .shape = torus,
+            .grid = sdm_grid_centred((int64_t[3]){40, 40, 16}, 0.3, (double[3]){0, 0, 0})};
+        const sdm_fit_target t = {.kind = SDM_FIT_LABEL, .grid = g, .values = v};
+        const double start[2] = {major, minor};
+        sdm_fit_opts o = sdm_fit_defaults_for(voxel);
+        sdm_fit_result r;
+        sdm_error err = {0};
+        o.start_params = start;
+        const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);
+        if (s && s != SDM_E_QUALITY) fail_msg("coarse %d: %s", coarse, err.text);
+        const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_DATA);
+        if (f->grade != (coarse ? SDM_FIT_DOUBTFUL : SDM_FIT_PASSED))
+            fail_msg("coarse %d: figure %g, limit %g, %s", coarse, f->figure, f->limit, f->text);
+        assert_true(fabs(f->figure - voxel) < 1e-9);
+        sdm_fit_dispose(&r);
+        free(v);
+    }
+    sdm_instance_free(torus);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_beyond_the_range_is_refused),
         cmocka_unit_test(test_within_the_range_passes),
         cmocka_unit_test(test_small_parts_leave_doubt),
+        cmocka_unit_test(test_labels_that_are_too_coarse),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

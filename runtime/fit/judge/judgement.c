@@ -359,6 +359,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
     if (!s) check_bounds(p, &bounds, r, v);
     if (!s) sdm_fit_check_voxels(p, coarse, v);
+    if (!s && !points && !sdm_fit_is_image(p)) sdm_fit_check_labels(p, v);
     if (!s) sdm_fit_check_determined(p, r, v);
     sdm_fit_residuals_dispose(&residuals);
     if (!s) s = sdm_fit_check_blob(p, *factor, v, err);

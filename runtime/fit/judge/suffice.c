@@ -5,6 +5,7 @@
 
 #include "finding.h"
 #include "noise.h"
+#include "sdm/internal/part_audit.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
@@ -160,6 +161,36 @@ void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_v
         coarse.detail,
         p->target->kind == SDM_FIT_POINTS ? "larger, by an estimate of the error" : "too small",
         coarse.advice);
+}
+
+/* Thickness (mm) of the thinnest part of the fitted shape; without the shape, of the thinnest part
+ * that the training of the network found. NaN: not known. */
+static double thinnest_part(const fit_problem *p)
+{
+    const sdm_fit_source *f = p->source;
+    sdm_mesh mesh = {0};
+    sdm_part_audit audit = {0};
+    double thick = NAN;
+    if (!f->shape) return f->model ? sdm_model_get_info(f->model)->quality.thickness_mm : NAN;
+    if (!sdm_instance_mesh(f->shape, p->state.params, &mesh, NULL) &&
+        !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
+        const size_t i = sdm_part_audit_thinnest(&audit);
+        if (i < audit.n) thick = audit.part[i].thick;
+    }
+    sdm_part_audit_dispose(&audit);
+    sdm_mesh_dispose(&mesh);
+    return thick;
+}
+
+void sdm_fit_check_labels(const fit_problem *p, sdm_fit_verdict *v)
+{
+    const double voxel = fit_longest_edge(&p->target->grid), thick = thinnest_part(p);
+    if (p->opts->keep_params || !isfinite(thick)) return;
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, voxel <= thick, SDM_FIT_DOUBTFUL, voxel, thick,
+                      "the voxels of the labels, %.3g mm, are longer than the thinnest part of the "
+                      "shape is thick, %.3g mm: they hardly show it, and parameters of this part "
+                      "are not to be trusted; finer labels are needed",
+                      voxel, thick);
 }
 
 void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)

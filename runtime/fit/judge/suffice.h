@@ -26,6 +26,10 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur);
 /* Adds the finding "map voxels", unless the parameters are kept. */
 void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_verdict *v);
 
+/* Labels: adds the finding "data", doubtful where their voxels are longer than the thinnest part of
+ * the fitted shape is thick, mm; nothing where that is not known. */
+void sdm_fit_check_labels(const fit_problem *p, sdm_fit_verdict *v);
+
 /* Adds the finding "data" if nothing failed before, and the data determine none of the parameters.
  */
 void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v);

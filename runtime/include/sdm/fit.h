@@ -301,8 +301,10 @@ typedef enum sdm_fit_check_kind {
        where the training graded the network poor, see sdm_model_quality */
     SDM_FIT_CHECK_NETWORK,
     /* points: number of those on the surface, at least that of the unknowns: the pose, and the
-       parameters without a normal distribution; doubtful below three times as many. All data:
-       failed where they determine none of the parameters (sdm_fit_result.by_prior) */
+       parameters without a normal distribution; doubtful below three times as many.
+       Labels: the longest edge of their voxels, mm, at most the thickness of the thinnest part of
+       the shape; doubtful above. All data: failed where they determine none of the parameters
+       (sdm_fit_result.by_prior) */
     SDM_FIT_CHECK_DATA,
     /* points: median distance from their coordinate-wise median, mm; limit: a tenth of the reach of
        the shape. Points within less show too little of it, or are not in mm */

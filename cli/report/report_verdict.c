@@ -46,7 +46,7 @@ void cli_print_verdict(const sdm_verdict *v)
     const bool cuts = v->grade == SDM_GRADE_POOR && v->cut > SDM_CUT_POOR;
     printf("  %-11s ", sdm_grade_name(v->grade));
     if (cuts)
-        printf("its grid cuts %.2g %% of the shapes, whose surfaces end open there",
+        printf("its grid cuts %.3g %% of the shapes, whose surfaces end open there",
                fmin(v->cut < 1 ? 99 : 100, 100 * v->cut));
     else
         printf("%s", sdm_grade_text(v->grade));

@@ -49,5 +49,5 @@ methods:
 END
 expect 0 - sdmgen experiment hole.yaml --out hole -q
 grep -q '^1,true,' hole/right/fits.csv || bad "right fit: $(tail -n 1 hole/right/fits.csv)"
-grep -q '^1,false,.*the residuals inside the shape are not noise' hole/wrong/fits.csv || bad "wrong fit: $(tail -n 1 hole/wrong/fits.csv)"
+grep -q '^1,false,.*of the volume of the shape is empty in the labels' hole/wrong/fits.csv || bad "wrong fit: $(tail -n 1 hole/wrong/fits.csv)"
 finish

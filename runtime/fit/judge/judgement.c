@@ -25,6 +25,8 @@
 #define VOLUME_MIN_BIASED 0.2
 // residuals that contradict less than this share of the volume leave doubt, but refuse no fit
 #define SERIOUS_MIN 0.02
+// a refusal tells that more than this share of the shape is empty, rather than the residuals there
+#define EMPTY_TOLD 0.2
 // voxels larger than this share of the radius of the largest ball inside explain residuals
 #define COARSE 0.5
 // the same where the voxels are so large: only residuals beyond this multiple of their limit
@@ -311,9 +313,11 @@ static void check_maps(const fit_problem *p, sdm_fit_verdict *v)
 }
 
 // The finding that explains a refusal: the first one that failed. Points that show too little come
-// before it; where the image shows a shape, a grid that cuts it; and a parameter that the data want
-// beyond its range by a length that was measured. That the iterations did not converge explains
-// nothing where another check failed: they do not converge on another shape. NULL: none failed.
+// before it; where a large part of the shape is not in the data, that it is not, instead of the
+// residuals that this makes; where the image shows a shape, a grid that cuts it; and a parameter
+// that the data want beyond its range by a length that was measured. That the iterations did not
+// converge explains nothing where another check failed: they do not converge on another shape.
+// NULL: none failed.
 static const sdm_fit_finding *reason(const sdm_fit_verdict *v, const fit_at_bounds *bounds)
 {
     const sdm_fit_finding *why = NULL;
@@ -322,8 +326,11 @@ static const sdm_fit_finding *reason(const sdm_fit_verdict *v, const fit_at_boun
         if (x->grade != SDM_FIT_FAILED) continue;
         const bool cut = x->kind == SDM_FIT_CHECK_GRID && why && why->kind > SDM_FIT_CHECK_CONTRAST,
                    little = x->kind == SDM_FIT_CHECK_DATA || x->kind == SDM_FIT_CHECK_SIZE,
-                   beyond = x->kind == SDM_FIT_CHECK_BOUNDS && bounds->measured;
-        if (!why || why->kind == SDM_FIT_CHECK_CONVERGED || cut || little || beyond) why = x;
+                   beyond = x->kind == SDM_FIT_CHECK_BOUNDS && bounds->measured,
+                   empty = x->kind == SDM_FIT_CHECK_EMPTY && x->figure > EMPTY_TOLD && why &&
+                           why->kind == SDM_FIT_CHECK_RESIDUALS;
+        if (!why || why->kind == SDM_FIT_CHECK_CONVERGED || cut || little || beyond || empty)
+            why = x;
     }
     return why;
 }

@@ -58,7 +58,8 @@ static void print_stages(const sdm_train_work *w, const sdm_train_plan *p)
            format_bytes(p->all_received, bytes));
 }
 
-/* A budget of time: says when it ends before the maps are made that the configuration asks for. */
+/* Says for how many maps a budget of time is enough, if it is too short for those that the
+ * configuration asks for. */
 static void print_budget(const sdm_config *c, const sdm_train_work *w, const sdm_train_plan *p)
 {
     char a[32], made[64], all[64];
@@ -69,7 +70,7 @@ static void print_budget(const sdm_config *c, const sdm_train_work *w, const sdm
     if (!(c->train.minutes > 0) || seconds <= half) return;
     printf("  budget   half of train.minutes (%s) is enough for %s of the %s maps before training, "
            "which then starts with these: lower data.static or data.start, or raise train.minutes "
-           "to %.2g\n",
+           "to %.4g\n",
            format_seconds(half, a), cli_format_count((int64_t)(before * half / seconds), made),
            cli_format_count((int64_t)before, all), ceil(10 * seconds / 30) / 10);
 }

@@ -44,15 +44,15 @@ void cli_print_verdict(const sdm_verdict *v)
            v->rmse_mm / voxel, v->rmse_voxel_mm / voxel, v->dice, v->dice_min);
     // a network may be poor for this alone
     const bool cuts = v->grade == SDM_GRADE_POOR && v->cut > SDM_CUT_POOR;
+    const double percent = fmin(v->cut < 1 ? 99 : 100, 100 * v->cut);
     printf("  %-11s ", sdm_grade_name(v->grade));
     if (cuts)
-        printf("its grid cuts %.3g %% of the shapes, whose surfaces end open there",
-               fmin(v->cut < 1 ? 99 : 100, 100 * v->cut));
+        printf("its grid cuts %.3g %% of the shapes, whose surfaces end open there", percent);
     else
         printf("%s", sdm_grade_text(v->grade));
     if (v->inside_out > 0) printf("; not for the parts that are inside out, which are missing");
     if (v->cut > 0 && !cuts)
-        printf("; not for the %.2g %% of the shapes that the grid cuts", fmin(99, 100 * v->cut));
+        printf("; not for the %.2g %% of the shapes that the grid cuts", percent);
     if (sdm_verdict_errs_far(v))
         printf("; not for distances far from the surface: wrong by up to %.2g mm", v->largest_mm);
     if (sdm_too_thin(v->thickness_mm, v->coarse_mm))

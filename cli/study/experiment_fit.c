@@ -137,8 +137,10 @@ static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *s
     out->seconds = cli_thread_clock() - begin;
     // store the estimate
     out->converged = !s;
-    if (s) cli_name_options(why->text);
-    if (s) snprintf(out->reason, sizeof out->reason, "%.299s", why->text);
+    if (s) {
+        cli_name_options(why->text);
+        snprintf(out->reason, sizeof out->reason, "%.299s", why->text);
+    }
     out->maps_network = r.n_network;
     out->maps_exact = r.n_exact;
     for (size_t i = 0; i < job->maker.n_params; i++) {

@@ -37,8 +37,7 @@ sdm_status sdm_fit_map(const sdm_fit_source *source, const double *params, const
     if (!s) s = map_make(source, params, n_threads, &maps, err);
     if (!s) {
         // interpolate it at every voxel of the grid
-        const fit_field f = {
-            .grid = &maps.grid, .packed = maps.distance, .n_fields = 1, .distance = true};
+        const fit_field f = sdm_fit_maps_distances(&maps);
         fit_state state;
         sdm_pose_matrix(pose, state.rotation);
         memcpy(state.translation, pose->translation, sizeof state.translation);

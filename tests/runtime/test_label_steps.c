@@ -7,6 +7,7 @@
 
 #include <cmocka.h>
 
+#include "oracle/exact_meshes.h"
 #include "oracle/fit_tools.h"
 
 enum { EDGES = 3 };
@@ -17,14 +18,15 @@ static const sdm_param box_params[EDGES] = {{"width", "mm", 6, 14, 10, "along x"
 static int box_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                     const double *p, sdm_mesh_out *out)
 {
-    static const uint32_t TRI[36] = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
-                                     2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+    const double half[3] = {0.5 * p[0], 0.5 * p[1], 0.5 * p[2]};
+    sdm_mesh m = {0};
     (void)self, (void)options;
-    if (host->reserve(host, out, 8, 12)) return 1;
-    for (size_t i = 0; i < 8; i++)
-        for (size_t d = 0; d < 3; d++) out->vert[3 * i + d] = (i >> d & 1 ? 0.5 : -0.5) * p[d];
-    memcpy(out->tri, TRI, sizeof TRI);
-    return 0;
+    mesh_box(&m, (const double[3]){-half[0], -half[1], -half[2]}, half);
+    const int failed = host->reserve(host, out, m.n_vert, m.n_tri);
+    if (!failed) memcpy(out->vert, m.vert, 3 * m.n_vert * sizeof *m.vert);
+    if (!failed) memcpy(out->tri, m.tri, 3 * m.n_tri * sizeof *m.tri);
+    sdm_mesh_dispose(&m);
+    return failed;
 }
 
 static const sdm_shape box = {.abi = SDM_SHAPE_ABI,

@@ -15,6 +15,7 @@
 #include "ball_model.h"
 #include "fit/data/map_area.h"
 #include "oracle/fit_tools.h"
+#include "oracle/revolved.h"
 
 #define PI 3.14159265358979324
 
@@ -39,29 +40,7 @@ static int cup_mesh(const void *self, const sdm_host *host, const sdm_option_val
                     const double *p, sdm_mesh_out *out)
 {
     (void)self, (void)options;
-    const int failed =
-        host->reserve(host, out, CUP_RINGS * AROUND + 2, (size_t)2 * CUP_RINGS * AROUND);
-    if (failed) return failed;
-    double *v = out->vert;
-    for (int i = 0; i < CUP_RINGS; i++)
-        for (int j = 0; j < AROUND; j++, v += 3) {
-            double r;
-            cup_ring(p, i, &r, &v[2]);
-            v[0] = r * cos(2 * PI * j / AROUND), v[1] = r * sin(2 * PI * j / AROUND);
-        }
-    const uint32_t below = CUP_RINGS * AROUND, above = below + 1, last = below - AROUND;
-    v[0] = v[1] = v[2] = v[3] = v[4] = 0, v[5] = p[WALL];
-    uint32_t *t = out->tri;
-    for (uint32_t j = 0; j < AROUND; j++) {
-        const uint32_t k = (j + 1) % AROUND, ends[] = {below, k, j, last + j, last + k, above};
-        memcpy(t, ends, sizeof ends);
-        t += 6;
-        for (uint32_t a = 0; a < last; a += AROUND, t += 6) {
-            const uint32_t b = a + AROUND, quad[] = {a + j, a + k, b + k, a + j, b + k, b + j};
-            memcpy(t, quad, sizeof quad);
-        }
-    }
-    return 0;
+    return revolved_mesh(host, out, CUP_RINGS, AROUND, cup_ring, p, 0, p[WALL]);
 }
 
 static const sdm_shape cup = {.abi = SDM_SHAPE_ABI,

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "oracle/fit_tools.h"
+#include "oracle/revolved.h"
 
 #define PI 3.14159265358979324
 
@@ -36,30 +37,10 @@ static void knob_ring(const double *p, int i, double *r, double *z)
 static int knob_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                      const double *p, sdm_mesh_out *out)
 {
+    double r, top;
     (void)self, (void)options;
-    const uint32_t top = RINGS * AROUND + 1;
-    if (host->reserve(host, out, top + 1, 2 * RINGS * AROUND)) return 1;
-    double *v = out->vert + 3;
-    uint32_t *t = out->tri;
-    for (int i = 0; i < RINGS; i++)
-        for (int j = 0; j < AROUND; j++, v += 3) {
-            double r;
-            knob_ring(p, i, &r, &v[2]);
-            v[0] = r * cos(2 * PI * j / AROUND), v[1] = r * sin(2 * PI * j / AROUND);
-        }
-    out->vert[0] = out->vert[1] = v[0] = v[1] = 0;
-    out->vert[2] = -p[RADIUS], v[2] = v[-1] + 0.01;
-    for (uint32_t j = 0; j < AROUND; j++) {
-        const uint32_t a = 1 + j, b = 1 + (j + 1) % AROUND, last = (RINGS - 1) * AROUND;
-        const uint32_t ends[] = {0, b, a, last + a, last + b, top};
-        memcpy(t, ends, sizeof ends), t += 6;
-        for (uint32_t ring = 0; ring < last; ring += AROUND, t += 6) {
-            const uint32_t quad[] = {ring + a, ring + b,          ring + b + AROUND,
-                                     ring + a, ring + b + AROUND, ring + a + AROUND};
-            memcpy(t, quad, sizeof quad);
-        }
-    }
-    return 0;
+    knob_ring(p, RINGS - 1, &r, &top);
+    return revolved_mesh(host, out, RINGS, AROUND, knob_ring, p, -p[RADIUS], top + 0.01);
 }
 
 static const sdm_shape knob = {.abi = SDM_SHAPE_ABI,
@@ -80,8 +61,8 @@ static double distance_to(const double x[3], double radius, double length)
     return fmin(ball, rod);
 }
 
-// pea: radius of a ball beside the large one that belongs to the labels too, mm; hole: of one
-// within
+// pea: radius of a second ball, on the large one, that also has the label, mm; hole: radius of a
+// ball in the middle that has not
 static sdm_status fit_knob(double length, bool image, double pea, double hole, sdm_fit_result *r,
                            sdm_error *err)
 {
@@ -155,7 +136,8 @@ static void test_within_the_range_passes(void **state)
         if (fit_knob(4.5, image, 0, 0, &r, &err)) fail_msg("image %d: %s", image, err.text);
         assert_int_equal(finding(&r, SDM_FIT_CHECK_MISSING)->grade, SDM_FIT_PASSED);
         assert_int_equal(finding(&r, SDM_FIT_CHECK_EMPTY)->grade, SDM_FIT_PASSED);
-        // the mesh has few triangles: its ball is smaller by up to a fiftieth
+        // a ball of few triangles lies within the sphere through its vertices: the fit finds a
+        // larger radius, by up to a fiftieth
         if (!(fabs(r.params[LENGTH] - 4.5) < 0.3 && fabs(r.params[RADIUS] - 5) < 0.1))
             fail_msg("image %d: length %g, radius %g", image, r.params[LENGTH], r.params[RADIUS]);
         sdm_fit_dispose(&r);

@@ -110,8 +110,7 @@ static sdm_status check_parts(const sdm_mesh *m, size_t *n, double *thickness, s
     sdm_part_audit audit = {0};
     const sdm_status s = sdm_part_audit_make(m, false, &audit, err);
     *n += !s && audit.inside_out;
-    const size_t thinnest = sdm_part_audit_thinnest(&audit);
-    if (thinnest < audit.n) *thickness = fmin(*thickness, audit.part[thinnest].thick);
+    *thickness = fmin(*thickness, sdm_part_audit_thickness(&audit)); // fmin() ignores NaN
     sdm_part_audit_dispose(&audit);
     return s;
 }
@@ -123,7 +122,7 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
     surface_sums sums = {0};
     sdm_mesh mesh = {0};
     float *map = NULL;
-    double thickness = NAN; // fmin() ignores NaN
+    double thickness = NAN;
     size_t cut = 0, compared = 0, inside_out = 0;
     sdm_status s = SDM_ALLOC(&map, sdm_grid_count(d->grid), "surface", err);
     for (size_t i = 0; i < d->n_holdout && !s; i++) {

@@ -83,9 +83,15 @@ typedef struct polynomial_fit {
     const pod_state *pod;
     size_t n;
     const float *c;
-    size_t terms;
+    size_t degree, terms; /* terms: number of polynomials up to this total degree */
     double ridge; /* added to the diagonal of the normal equations, times n, but for the constant */
 } polynomial_fit;
+
+static void set_degree(polynomial_fit *p, size_t degree)
+{
+    p->degree = degree;
+    p->terms = sdm_poly_count(p->pod->arch.n_params, degree);
+}
 
 /* x[terms][R] = the solution for the maps whose number is not 3 mod 4; all: for all maps. Returns
  * SDM_E_CONFIG if the maps do not determine it. */
@@ -162,14 +168,16 @@ static sdm_status choose_fit(const pod_state *pod, polynomial_fit *best, sdm_err
     sdm_status s = SDM_OK;
     size_t top = a->degree;
     while (top > 0 && 4 * sdm_poly_count(a->n_params, top) > best->n + 4) top--;
-    best->terms = sdm_poly_count(a->n_params, top), best->ridge = POD_RIDGE;
+    set_degree(best, top);
+    best->ridge = POD_RIDGE;
     // with so many maps that the highest degree is determined, there is nothing to choose
     if (top == a->degree) return SDM_OK;
     for (size_t degree = top; degree <= a->degree && !s; degree++)
         for (size_t k = 0; k < sizeof RIDGES / sizeof *RIDGES && !s; k++) {
             polynomial_fit p = *best;
             double error;
-            p.terms = sdm_poly_count(a->n_params, degree), p.ridge = RIDGES[k];
+            set_degree(&p, degree);
+            p.ridge = RIDGES[k];
             s = fit_validate(&p, &error, err);
             if (!s && error < 0.98 * least) least = error, *best = p;
         }
@@ -180,18 +188,18 @@ static sdm_status choose_fit(const pod_state *pod, polynomial_fit *best, sdm_err
  * however many they are: the degree is then lowered until they do. */
 static sdm_status fit_determined(polynomial_fit *p, double *x, sdm_error *err)
 {
-    const size_t n_params = p->pod->arch.n_params;
-    size_t degree = p->pod->arch.degree;
-    while (sdm_poly_count(n_params, degree) > p->terms) degree--;
-    const size_t chosen = degree;
+    const size_t chosen = p->degree;
     sdm_status s = fit_solve(p, true, x, err);
-    for (; s == SDM_E_CONFIG && degree > 0; s = fit_solve(p, true, x, err))
-        p->terms = sdm_poly_count(n_params, --degree), p->ridge = POD_RIDGE;
-    if (!s && degree < chosen)
+    while (s == SDM_E_CONFIG && p->degree > 0) {
+        set_degree(p, p->degree - 1);
+        p->ridge = POD_RIDGE;
+        s = fit_solve(p, true, x, err);
+    }
+    if (!s && p->degree < chosen)
         trainer_message(p->pod->t,
                         "network.degree lowered from %zu to %zu: the maps are at too few values of "
                         "a parameter to determine more (data.static)",
-                        chosen, degree);
+                        chosen, p->degree);
     return s;
 }
 
@@ -207,7 +215,7 @@ static sdm_status fit_polynomials(pod_state *pod, size_t n, const float *c, sdm_
     if (!s) s = SDM_ALLOC(&x, p.terms * r, "polynomial fit", err);
     if (!s) s = fit_determined(&p, x, err);
     if (!s) {
-        while (sdm_poly_count(a->n_params, a->degree) > p.terms) a->degree--;
+        a->degree = p.degree;
         a->n_latent -= a->n_terms - p.terms;
         a->n_terms = p.terms;
         pod->ridge = p.ridge;

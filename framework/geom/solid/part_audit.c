@@ -300,6 +300,12 @@ size_t sdm_part_audit_thinnest(const sdm_part_audit *a)
     return thinnest;
 }
 
+double sdm_part_audit_thickness(const sdm_part_audit *a)
+{
+    const size_t thinnest = sdm_part_audit_thinnest(a);
+    return thinnest < a->n ? a->part[thinnest].thick : NAN;
+}
+
 sdm_status sdm_mesh_turn_parts(sdm_mesh *m, size_t *n, sdm_error *err)
 {
     if (!m || !n)

@@ -99,8 +99,7 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
         out->crossed += audit.part[i].crossed;
         out->flat += sdm_survey_part_is_flat(&audit, i);
     }
-    const size_t thinnest = sdm_part_audit_thinnest(&audit);
-    out->thick = thinnest < audit.n ? audit.part[thinnest].thick : NAN;
+    out->thick = sdm_part_audit_thickness(&audit);
     out->inside_out = audit.inside_out;
     out->overlaps = audit.mesh.self_intersections;
     out->degenerate = audit.mesh.degenerate;

@@ -219,6 +219,12 @@ fit_field sdm_fit_maps_field(const fit_maps *maps)
                        .distance = !maps->share};
 }
 
+fit_field sdm_fit_maps_distances(const fit_maps *maps)
+{
+    return (fit_field){
+        .grid = &maps->grid, .packed = maps->distance, .n_fields = 1, .distance = true};
+}
+
 static void voxel_centre(const sdm_grid *g, size_t voxel, double x[3])
 {
     const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1];

@@ -73,8 +73,9 @@ sdm_status sdm_fit_maps_voxels(fit_maps *m, sdm_error *err);
    needs a map that was made with derivatives. Direct: does nothing. */
 void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives);
 
-/* View of `packed` for interpolation. */
+/* Views of `packed` and of `distance` for interpolation. */
 fit_field sdm_fit_maps_field(const fit_maps *maps);
+fit_field sdm_fit_maps_distances(const fit_maps *maps);
 
 /* Where the shape lies on its map: centroid (mm); reach, the largest distance (mm) from the
  * centroid to a voxel inside; volume (mm^3). */

@@ -45,8 +45,7 @@ static bool region_contains(const sdm_fit_opts *o, const fit_region *r, const do
         if (!(x[k] >= o->box_min[k] && x[k] <= o->box_max[k])) return false;
     if (!(sqrt(v3_dist2(x, r->centre)) <= r->radius)) return false;
     if (!r->follow) return true;
-    const fit_field f = {
-        .grid = &r->follow->grid, .packed = r->follow->distance, .n_fields = 1, .distance = true};
+    const fit_field f = sdm_fit_maps_distances(r->follow);
     return sdm_fit_field_at(&f, r->state, x) <= r->margin;
 }
 

@@ -5,39 +5,38 @@
 
 #include "fit/data/samples.h"
 
-// distances at which labels and maps err: this part of an edge of the labels, and of a voxel of the
-// maps
+// labels and maps err up to this distance from the surface: this part of an edge of the labels, and
+// of a voxel of the maps
 #define LABEL_REACH 1.25
 #define MAP_REACH 0.25
-// fewer voxels, or a smaller share of the shape, are strays
+// fewer voxels, or a smaller share of the volume of the shape, are strays
 #define VOXELS_MIN 8.0
 #define SHARE_MIN 0.002
 
+// volume of the shape, in voxels of the labels
+static double volume_of(const fit_problem *p)
+{
+    const double *label = p->target->grid.spacing, *map = p->maps.grid.spacing;
+    double inside = 0;
+    for (size_t v = 0; v < p->maps.n_voxels; v++) inside += p->maps.distance[v] < 0;
+    return inside * map[0] * map[1] * map[2] / (label[0] * label[1] * label[2]);
+}
+
 fit_far_labels sdm_fit_far_labels(const fit_problem *p, double beyond)
 {
-    const fit_field field = {
-        .grid = &p->maps.grid, .packed = p->maps.distance, .n_fields = 1, .distance = true};
-    const double weight = pow((double)p->stride, 3);
-    fit_far_labels far = {.limit = LABEL_REACH * fit_longest_edge(&p->target->grid) +
-                                   MAP_REACH * fit_longest_edge(&p->maps.grid)};
+    const fit_field field = sdm_fit_maps_distances(&p->maps);
+    const double reach = LABEL_REACH * fit_longest_edge(&p->target->grid) +
+                         MAP_REACH * fit_longest_edge(&p->maps.grid),
+                 weight = pow((double)p->stride, 3), share = SHARE_MIN * volume_of(p);
+    fit_far_labels far = {.voxels = {beyond, 0}};
     for (size_t i = 0; i < p->samples.n; i++) {
         const bool label = p->samples.value[i] > 0.5f;
         const double d = sdm_fit_field_at(&field, &p->state, p->samples.world + 3 * i);
-        if (label ? d > far.limit : d < -far.limit) {
-            far.voxels[!label] += weight;
-            far.depth[!label] = fmax(far.depth[!label], fabs(d));
-        }
+        if (!(label ? d > reach : d < -reach)) continue;
+        far.voxels[!label] += weight;
+        far.depth[!label] = fmax(far.depth[!label], fabs(d));
     }
-    far.voxels[0] += beyond;
+    for (int side = 0; side < 2; side++)
+        if (!(far.voxels[side] >= VOXELS_MIN && far.voxels[side] > share)) far.voxels[side] = 0;
     return far;
-}
-
-bool sdm_fit_far_labels_count(const fit_problem *p, double voxels)
-{
-    const sdm_grid *image = &p->target->grid, *map = &p->maps.grid;
-    double inside = 0;
-    for (size_t v = 0; v < p->maps.n_voxels; v++) inside += p->maps.distance[v] < 0;
-    inside *= map->spacing[0] * map->spacing[1] * map->spacing[2] /
-              (image->spacing[0] * image->spacing[1] * image->spacing[2]);
-    return voxels >= VOXELS_MIN && voxels > SHARE_MIN * inside;
 }

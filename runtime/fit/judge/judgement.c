@@ -227,15 +227,16 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
             sdm_fit_is_image(p) ? "sdm_fit_opts.beside" : "sdm_fit_opts.tolerance");
 }
 
-// Labels that contradict the shape away from its surface, by a volume that is within its limit.
+// Labels that contradict the shape away from its surface, where the volumes that they stand for
+// pass the checks "empty" and "missing".
 static void check_far_labels(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
 {
-    const fit_far_labels far = sdm_fit_far_labels(p, m->beyond);
     if (p->opts->tolerance > 0) return;
+    const fit_far_labels far = sdm_fit_far_labels(p, m->beyond);
     for (int inside = 0; inside < 2; inside++) {
         const sdm_fit_check_kind kind = inside ? SDM_FIT_CHECK_EMPTY : SDM_FIT_CHECK_MISSING;
         char depth[60] = "";
-        if (!has_passed(v, kind) || !sdm_fit_far_labels_count(p, far.voxels[inside])) continue;
+        if (!has_passed(v, kind) || !(far.voxels[inside] > 0)) continue;
         if (far.depth[inside] > 0)
             snprintf(depth, sizeof depth, ", up to %.2g mm from its surface", far.depth[inside]);
         sdm_fit_judge_add(v, kind, false, SDM_FIT_DOUBTFUL, inside ? m->empty : m->missing,
@@ -346,15 +347,15 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     if (sdm_fit_is_image(p)) r->evidence = evidence_of(p, r, *factor);
     const fit_coarseness coarse = sdm_fit_coarseness(p, sdm_fit_is_image(p) ? r->blur : 0);
     fit_at_bounds bounds = sdm_fit_at_bounds(p, r, *factor);
-    const bool points = p->target->kind == SDM_FIT_POINTS;
-    if (!s && !points && !sdm_fit_is_image(p)) s = sdm_fit_measure_beyond(p, r, &bounds, err);
+    const bool points = p->target->kind == SDM_FIT_POINTS, labels = !points && !sdm_fit_is_image(p);
+    if (!s && labels) s = sdm_fit_measure_beyond(p, r, &bounds, err);
     check_basics(p, r, v);
     check_maps(p, v);
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     if (!s) {
         check_residuals(p, &misfit, coarse, &bounds, v);
         check_volumes(p, &misfit, r, v);
-        if (!points && !sdm_fit_is_image(p)) check_far_labels(p, &misfit, v);
+        if (labels) check_far_labels(p, &misfit, v);
         v->n_units = misfit.n_units[0] + misfit.n_units[1];
         v->chi_square = misfit.noise_chi_square;
     }
@@ -366,7 +367,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
     if (!s) check_bounds(p, &bounds, r, v);
     if (!s) sdm_fit_check_voxels(p, coarse, v);
-    if (!s && !points && !sdm_fit_is_image(p)) sdm_fit_check_labels(p, v);
+    if (!s && labels) sdm_fit_check_labels(p, v);
     if (!s) sdm_fit_check_determined(p, r, v);
     sdm_fit_residuals_dispose(&residuals);
     if (!s) s = sdm_fit_check_blob(p, *factor, v, err);

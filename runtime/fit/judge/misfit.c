@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "fit/data/step_phase.h"
 #include "noise.h"
 #include "sdm/internal/heap.h"
 
@@ -17,13 +18,10 @@
 #define MEAN_SD_MIN 0.02
 // rms error of the place of a surface that labels show, in voxels
 #define LABEL_ERROR 0.12
-// sd of a place that is known to a whole voxel
-#define STEP_SD 0.28867513459481287
 // the density at the quantile of the share a is close to DENSITY a (1 - a)
 #define DENSITY 1.6
 // shares below this and above 1 less this tell no distance
 #define SHARE_MIN 0.02
-#define TURN 6.283185307179586
 // relative uncertainty of the variance of the noise
 #define NOISE_UNCERTAINTY 0.2
 // standard normal deviate that noise exceeds once in a thousand fits
@@ -87,16 +85,15 @@ typedef struct unit_mean {
  * length of the mean of exp(2 pi i distance). The members count by their change of the share. */
 static double unit_steps(const fit_residuals *r, const member *m, size_t n)
 {
-    double all = 0, turn[2] = {0};
+    fit_step_phase f = {0};
     for (size_t k = 0; k < n && r->label_width > 0; k++) {
         const double a = fmin(fmax(r->expected[m[k].sample], SHARE_MIN), 1 - SHARE_MIN),
                      slope = DENSITY * a * (1 - a) / r->label_width,
                      distance = r->label_width * log(a / (1 - a)) / DENSITY;
-        all += slope;
-        turn[0] += slope * cos(TURN * distance);
-        turn[1] += slope * sin(TURN * distance);
+        fit_step_phase_add(&f, slope, distance);
     }
-    return all > 0 ? STEP_SD * (turn[0] * turn[0] + turn[1] * turn[1]) / (all * (double)n) : 0;
+    const double square = f.turn[0] * f.turn[0] + f.turn[1] * f.turn[1];
+    return f.all > 0 ? FIT_STEP_SD * square / (f.all * (double)n) : 0;
 }
 
 static unit_mean unit_measure(const fit_residuals *r, const member *m, size_t n, double least)

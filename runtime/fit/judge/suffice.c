@@ -173,10 +173,8 @@ static double thinnest_part(const fit_problem *p)
     double thick = NAN;
     if (!f->shape) return f->model ? sdm_model_get_info(f->model)->quality.thickness_mm : NAN;
     if (!sdm_instance_mesh(f->shape, p->state.params, &mesh, NULL) &&
-        !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
-        const size_t i = sdm_part_audit_thinnest(&audit);
-        if (i < audit.n) thick = audit.part[i].thick;
-    }
+        !sdm_part_audit_make(&mesh, false, &audit, NULL))
+        thick = sdm_part_audit_thickness(&audit);
     sdm_part_audit_dispose(&audit);
     sdm_mesh_dispose(&mesh);
     return thick;
@@ -184,8 +182,9 @@ static double thinnest_part(const fit_problem *p)
 
 void sdm_fit_check_labels(const fit_problem *p, sdm_fit_verdict *v)
 {
+    if (p->opts->keep_params) return;
     const double voxel = fit_longest_edge(&p->target->grid), thick = thinnest_part(p);
-    if (p->opts->keep_params || !isfinite(thick)) return;
+    if (!isfinite(thick)) return;
     sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, voxel <= thick, SDM_FIT_DOUBTFUL, voxel, thick,
                       "the voxels of the labels, %.3g mm, are longer than the thinnest part of the "
                       "shape is thick, %.3g mm: they hardly show it, and parameters of this part "

@@ -27,14 +27,15 @@ static void add_motion(motions *m, double x)
     m->fourths += x * x * x * x;
 }
 
-// rms of the motions, each weighted by its square: the motion of the part of the surface that
-// moves. The rms over the whole surface would be small where that part is, and the step too wide
+// How far the part of the surface moves that moves at all: the root mean square of the motions,
+// each counted by its square. A plain root mean square over the whole surface is small where that
+// part is small, and the half width would be too wide
 static double typical_motion(const motions *m)
 {
     return m->squares > 0 ? sqrt(m->fourths / m->squares) : 0;
 }
 
-// per unit of parameter k, over voxels within one voxel of the surface
+// typical motion per unit of parameter k, of the voxels within one voxel of the surface
 static double motion_on_map(const fit_maps *map, size_t k)
 {
     motions m = {0};
@@ -44,7 +45,7 @@ static double motion_on_map(const fit_maps *map, size_t k)
     return typical_motion(&m);
 }
 
-// per unit of column k, over the points
+// typical motion per unit of column k, of the points
 static double motion_at_points(const fit_samples *s, size_t k)
 {
     motions m = {0};
@@ -53,7 +54,7 @@ static double motion_at_points(const fit_samples *s, size_t k)
     return typical_motion(&m);
 }
 
-// motion of the surface over the half width, mm
+// how far that part of the surface moves over the half width, mm
 static double motion_wanted(const fit_problem *p)
 {
     const double step = MOTION * fit_longest_edge(&p->maps.grid);

@@ -4,21 +4,19 @@
 #include <math.h>
 
 #include "fit/data/samples.h"
+#include "fit/data/step_phase.h"
 #include "sdm/internal/heap.h"
 
-// sd of a place that is known to a whole voxel
-#define STEP_SD 0.28867513459481287
 // least component of the normal along an axis of the image on a face parallel to the voxels
 #define PARALLEL 0.9
-#define TURN 6.283185307179586
 // layers of voxels beyond the box of the neighbours on either side
 enum { MARGIN = 4 };
 
-/* A piece of the surface: its samples, by the size of their information; score caused by an error
- * of 1 mm of its place. */
+/* A piece of the surface between two layers of voxels. */
 typedef struct piece {
-    double all, turn[2];
-    double *score; /* [n_unknowns] */
+    fit_step_phase phase; /* places of its samples along the axis; a sample counts by its
+                             information about the place */
+    double *score;        /* [n_unknowns] the score caused by an error of 1 mm of the place */
 } piece;
 
 /* Where the surface next to sample i lies: *axis of the image along which it is nearly parallel to
@@ -56,8 +54,7 @@ static bool find_place(const fit_problem *p, const fit_field *f, size_t i, int *
 sdm_status sdm_fit_label_steps(const fit_problem *p, const fit_neighbours *v, double *out,
                                sdm_error *err)
 {
-    const fit_field field = {
-        .grid = &p->maps.grid, .packed = p->maps.distance, .n_fields = 1, .distance = true};
+    const fit_field field = sdm_fit_maps_distances(&p->maps);
     const size_t n = v->n_unknowns;
     size_t first[3], layers[3], count = 0, all = 0;
     piece *list = NULL;
@@ -81,17 +78,15 @@ sdm_status sdm_fit_label_steps(const fit_problem *p, const fit_neighbours *v, do
         const double layer = floor(place) - (double)v->first[axis] + MARGIN;
         if (!(layer >= 0 && layer < (double)layers[axis])) continue;
         piece *q = &list[first[axis] + (above ? layers[axis] : 0) + (size_t)layer];
-        const double weight = (double)v->weight[at] * (double)v->weight[at];
-        q->all += weight;
-        q->turn[0] += weight * cos(TURN * place), q->turn[1] += weight * sin(TURN * place);
+        fit_step_phase_add(&q->phase, (double)v->weight[at] * (double)v->weight[at], place);
         for (size_t k = 0; k < n; k++) q->score[k] += (double)v->model_score[at * n + k];
     }
     for (size_t i = 0; i < all && !s; i++) {
         const piece *q = &list[i];
-        if (!(q->all > 0)) continue;
+        if (!(q->phase.all > 0)) continue;
         const int axis = i < first[1] ? 0 : i < first[2] ? 1 : 2;
-        const double sd =
-            STEP_SD * p->target->grid.spacing[axis] * hypot(q->turn[0], q->turn[1]) / q->all;
+        const double sd = FIT_STEP_SD * p->target->grid.spacing[axis] *
+                          hypot(q->phase.turn[0], q->phase.turn[1]) / q->phase.all;
         for (size_t j = 0; j < n; j++)
             for (size_t k = 0; k < n; k++) out[j * n + k] += sd * sd * q->score[j] * q->score[k];
     }

@@ -74,6 +74,9 @@ double sdm_part_gap(const sdm_mesh *m, const sdm_part_audit *a, size_t index);
 /* Index of the part with the smallest thickness; a->n: none is known. */
 size_t sdm_part_audit_thinnest(const sdm_part_audit *a);
 
+/* Its thickness, mm; NaN: none is known. */
+double sdm_part_audit_thickness(const sdm_part_audit *a);
+
 /* Is a part so thin that it is missing or broken in the surface of a map with voxels of this size
  * (mm)? A tube along an axis of the grid passes between the voxel centres if it is thinner than
  * sqrt(2) voxels. false if the thickness is NaN. */

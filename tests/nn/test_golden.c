@@ -64,7 +64,20 @@ static void open_and_compute(const char *path, int level, uint64_t *crc, float v
     sdm_processor_select(-1);
 }
 
-/* Bits are promised for the baseline of x86-64; other processors round sums in another order. */
+/* Whether a file's bits are promised at this level of the instruction set: those of `template` and
+ * of integer weights everywhere, those of others for the baseline of x86-64, because other
+ * processors round sums of floats in another order. */
+static bool promised(const char *name, int level)
+{
+    if (!strncmp(name, "template", 8) || !strcmp(name, "pod_i8") || !strcmp(name, "pod_fine"))
+        return true;
+#if defined(__x86_64__)
+    return level == SDM_PROCESSOR_BASELINE;
+#else
+    return false;
+#endif
+}
+
 static void check_model(const char *name, uint64_t wanted_crc, const float wanted[3 * MAPS])
 {
     char path[1024];
@@ -77,12 +90,9 @@ static void check_model(const char *name, uint64_t wanted_crc, const float wante
             if (!(fabsf(value[i] - wanted[i]) <= 1e-4f))
                 fail_msg("%s, level %d: value %zu is %.9g, was %.9g", name, level, i,
                          (double)value[i], (double)wanted[i]);
+        if (promised(name, level) && crc != wanted_crc)
+            fail_msg("%s, level %d: other bits: %016llx", name, level, (unsigned long long)crc);
     }
-#if defined(__x86_64__)
-    if (crc != wanted_crc) fail_msg("%s: other bits: %016llx", name, (unsigned long long)crc);
-#else
-    (void)wanted_crc;
-#endif
 }
 
 static void models_of_every_kind_give_their_bits(void **state)

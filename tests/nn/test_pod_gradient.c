@@ -1,4 +1,5 @@
-/* Derivatives of the maps of the pod network against differences.
+/* Derivatives of the maps of the pod network against differences, and their bits on every
+ * instruction set.
  * Tests: pod_decode_back.c pod_forward.c pod_latent.c */
 #include <math.h>
 #include <setjmp.h>
@@ -82,6 +83,56 @@ static void jacobian_is_the_slope(void **state)
         sdm_free(scratch);
         sdm_free(forward);
         sdm_model_free(m);
+        sdm_free(t.memory);
+    }
+    n_levels = 3;
+}
+
+enum { SEVEN = 7 };
+
+/* Of a model file with the kernels of one level: seven maps, the Jacobian of the first one and its
+ * derivative along a direction. */
+typedef struct outputs {
+    float maps[SEVEN * 315], value[315], jacobian[P * 315], along[315], tangent[315];
+} outputs;
+
+static void outputs_at(const uint8_t *file, size_t size, int level, outputs *o)
+{
+    sdm_model *m;
+    sdm_processor_select(level);
+    assert_int_equal(sdm_model_open_memory("toy", file, size, &m, NULL), SDM_OK);
+    const size_t bytes[] = {sdm_model_scratch_bytes(m, SEVEN), sdm_model_jacobian_scratch_bytes(m),
+                            sdm_model_jvp_scratch_bytes(m)};
+    double p[SEVEN * P];
+    void *scratch;
+    for (int i = 0; i < SEVEN; i++) random_params((uint64_t)i, p + i * P);
+    assert_int_equal(sdm_alloc(&scratch, bytes[0] + bytes[1] + bytes[2], 1, "scratch", NULL), 0);
+    sdm_model_forward(m, p, SEVEN, o->maps, scratch);
+    sdm_model_jacobian(m, p, o->value, o->jacobian, scratch);
+    sdm_model_jvp(m, p, (const double[P]){0.3, -1, 0.7}, o->along, o->tangent, scratch);
+    sdm_free(scratch);
+    sdm_model_free(m);
+    sdm_processor_select(-1);
+}
+
+// Integer weights: maps and derivatives have the bits of the baseline on every instruction set.
+static void bytes_have_the_same_bits_everywhere(void **state)
+{
+    (void)state;
+    static outputs here, baseline;
+    for (int mode = 0; mode < 12; mode++) {
+        n_levels = 1 + (size_t)mode / 4;
+        toy t;
+        uint8_t *file;
+        size_t size;
+        toy_make(&t, SDM_POD_I8, mode % 4);
+        assert_int_equal(sdm_pod_build(&t.spec, &file, &size, NULL), SDM_OK);
+        outputs_at(file, size, SDM_PROCESSOR_BASELINE, &baseline);
+        for (int level = sdm_processor_select(-1); level > SDM_PROCESSOR_BASELINE; level--) {
+            outputs_at(file, size, level, &here);
+            assert_memory_equal(&here, &baseline, sizeof here);
+        }
+        sdm_free(file);
         sdm_free(t.memory);
     }
     n_levels = 3;
@@ -225,6 +276,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(jacobian_is_the_slope),
         cmocka_unit_test(jacobian_of_bytes),
+        cmocka_unit_test(bytes_have_the_same_bits_everywhere),
         cmocka_unit_test(jacobian_of_bytes_is_the_slope),
         cmocka_unit_test(maps_with_derivatives_are_smooth),
     };

@@ -2,11 +2,14 @@
    sdm/internal/kernels.h. A lane of 32 bits holds the weights of one output for a pair of
    neighbouring inputs, as two integers of 16 bits.
 
+   Maps and their derivatives in forward mode have the same bits on every instruction set: sums of
+   integers are exact, and floats are multiplied and added in separate roundings. Only the sums of
+   the backward pass use FMA() and depend on VW.
+
    An instruction set may define, before inclusion:
      LOAD_PAIRS(p)          VW lanes loaded from 2 VW narrow weights (bytes) at p
      MADD(a, b)             in each lane the sum of the two products of 16-bit integers
      ADD_MADD(sum, a, b)    sum + MADD(a, b) in one instruction
-     FMA(a, b, c)           a * b + c in one rounding
      ROUND_TO_SHORTS(v)     floats rounded to nearest integers of 16 bits
      MIN_VEC, MAX_VEC       minimum and maximum of two vectors of floats
      MAX_VECI               maximum of two vectors of signed integers
@@ -41,12 +44,6 @@ static inline veci load_pairs(const int8_t *p)
     return (veci) __builtin_convertvector(bytes, shorts);
 }
 #define LOAD_PAIRS(p) load_pairs(p)
-#endif
-
-// Instruction sets with a fused multiply-add define FMA explicitly: the compiler would contract
-// a * b + c in some loops only, so that the results of different block sizes would differ.
-#ifndef FMA
-#define FMA(a, b, c) ((a) * (b) + (c))
 #endif
 
 // VW lanes of wide weights, two 16-bit integers each
@@ -167,11 +164,10 @@ static const float no_mean[8 * VW] = {0}; // zeros, added to rows without a mean
             if ((size_t)i >= n_mean) mean = no_mean;                                               \
             EACH(j, n)                                                                             \
             {                                                                                      \
-                vec v =                                                                            \
-                    FMA(s, __builtin_convertvector((veci)acc[i][j], vec), load(mean + j * VW));    \
+                vec v = s * __builtin_convertvector((veci)acc[i][j], vec) + load(mean + j * VW);   \
                 if (i == 0 && rows > 1 && to->residual)                                            \
-                    v = FMA(splat(scale[rows - 1]),                                                \
-                            __builtin_convertvector((veci)acc[rows - 1][j], vec), v);              \
+                    v += splat(scale[rows - 1]) *                                                  \
+                         __builtin_convertvector((veci)acc[rows - 1][j], vec);                     \
                 store_rows(y + (size_t)(j * VW / 4) * line, line, v);                              \
             }                                                                                      \
             y += ld;                                                                               \
@@ -344,8 +340,8 @@ static void panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *b, co
                 const veci weight =                                                                \
                     load_pair(w + j / SDM_PANEL * panel + j % SDM_PANEL * (pair / SDM_PANEL));     \
                 const vec at = load(y + j);                                                        \
-                a += __builtin_convertvector(first_of(weight), vec) * at;                          \
-                b += __builtin_convertvector(second_of(weight), vec) * at;                         \
+                a = FMA(__builtin_convertvector(first_of(weight), vec), at, a);                    \
+                b = FMA(__builtin_convertvector(second_of(weight), vec), at, b);                   \
             }                                                                                      \
             x[2 * p] += SUM_LANES(a);                                                              \
             x[2 * p + 1] += SUM_LANES(b);                                                          \

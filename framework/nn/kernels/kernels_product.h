@@ -34,7 +34,7 @@ static inline void product_tile(size_t k, const float *a, size_t row, size_t col
         for (int j = 0; j < NV; j++) columns[j] = load(b + j * VW);
         for (int i = 0; i < MR; i++) {
             const vec s = splat(at[i / 3][(size_t)(i % 3) * row]);
-            for (int j = 0; j < NV; j++) acc[i][j] += s * columns[j];
+            for (int j = 0; j < NV; j++) acc[i][j] = FMA(s, columns[j], acc[i][j]);
         }
         for (int i = 0; i < MR / 3; i++) at[i] += col;
     }

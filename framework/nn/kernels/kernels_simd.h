@@ -52,7 +52,7 @@ static inline vec load_half(const uint16_t *p)
             for (int j = 0; j < n; j++) weight[j] = load_weights(w + PANEL_AT(j));                 \
             for (int i = 0; i < rows; i++) {                                                       \
                 const vec s = splat(x[(size_t)i * ldx + p]);                                       \
-                for (int j = 0; j < n; j++) acc[i][j] += s * weight[j];                            \
+                for (int j = 0; j < n; j++) acc[i][j] = FMA(s, weight[j], acc[i][j]);              \
             }                                                                                      \
         }                                                                                          \
         for (int i = 0; i < rows; i++)                                                             \
@@ -146,9 +146,9 @@ static inline vec load_half(const uint16_t *p)
             for (size_t p = 0; p < k; p++) {                                                       \
                 vec sum = {0};                                                                     \
                 for (size_t j = 0; j < n; j += VW)                                                 \
-                    sum += load_weights(w + j / SDM_PANEL * SDM_PANEL * k + p * SDM_PANEL +        \
-                                        j % SDM_PANEL) *                                           \
-                           load(y + o + j);                                                        \
+                    sum = FMA(load_weights(w + j / SDM_PANEL * SDM_PANEL * k + p * SDM_PANEL +     \
+                                           j % SDM_PANEL),                                         \
+                              load(y + o + j), sum);                                               \
                 x[p] += SUM_LANES(sum);                                                            \
             }                                                                                      \
         }                                                                                          \
@@ -158,6 +158,7 @@ PANEL(uint16_t, f16, load_half)
 
 // exp(x) = 2^n exp(r), n = x / ln 2 rounded, abs(r) <= ln 2 / 2. exp(r) is a polynomial of degree 7
 // with the coefficients of expf() in the Cephes library (Moshier). x is clamped to -87 .. 88.
+// Without FMA(), so that networks have the same activations on every instruction set.
 static inline vec exp_vec(vec x)
 {
     const vec lo = splat(-87.0f), hi = splat(88.0f);

@@ -1,6 +1,7 @@
 /* Vector types, loads and loop pragmas for kernels that are compiled once for each instruction set.
    Before inclusion, define VW: the number of floats in a register of the instruction set. A source
-   with a faster horizontal sum defines SUM_LANES(v) too. */
+   with a faster horizontal sum defines SUM_LANES(v) too, one with a fused multiply-add
+   FMA(a, b, c) = a * b + c in one rounding. */
 #pragma once
 
 #include <stdint.h>
@@ -27,6 +28,10 @@ typedef uint32_t vecu __attribute__((vector_size(4 * VW)));
 static inline vec load(const float *p) { return *(const vec_u *)p; }
 static inline void store(float *p, vec v) { *(vec_u *)p = v; }
 static inline vec splat(float v) { return v - (vec){0}; }
+
+#ifndef FMA
+#define FMA(a, b, c) ((a) * (b) + (c))
+#endif
 
 /* Sum of the elements of v. */
 #ifndef SUM_LANES

@@ -525,7 +525,8 @@ const cli_option cli_options[] = {
      "length over which the fractions of the tissues outside vary in space; 0: constant fractions "
      "(default 1, but 1 to 10 voxels)"},
     {"blur", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.blur),
-     "standard deviation of the point spread at the start (default 0.2, but 0.25 to 2 voxels)"},
+     "standard deviation of the point spread at the start; the fit estimates it, unless --keep "
+     "blur (default 0.2, but 0.25 to 2 voxels)"},
     {"l-ref", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.l_ref),
      "scale of the logistic prior of labels (default 0.2, but 0.25 to 2 voxels)"},
     {"point-sd", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.point_sd),

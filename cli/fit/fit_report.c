@@ -1,15 +1,21 @@
 /* Prints the result of a fit as text. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "fit_command.h"
 
 static void print_params(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
+    int width = 12; // of the names
+    for (size_t i = 0; i < f->n_params; i++) {
+        const int length = (int)strlen(f->params[i].name);
+        if (length > width) width = length;
+    }
     for (size_t i = 0; i < f->n_params; i++) {
         const sdm_param *p = &f->params[i];
-        printf("  %-12s %10.5g", p->name, r->params[i]);
+        printf("  %-*s %10.5g", width, p->name, r->params[i]);
         if (isnan(r->sd[i])) printf(" +- %-9s", "unknown");
         if (r->sd[i] > 0) printf(" +- %-9.2g", r->sd[i]);
         printf(" %s%s%s\n", p->unit,

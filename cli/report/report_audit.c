@@ -13,14 +13,31 @@
 /* Parts in the table and in JSON, and notices about parts. */
 enum { ROWS = 20, JSON_PARTS = 1000, NOTICES = 3 };
 
-static const char *state_name(const sdm_part *p)
+/* Whether the vertices of a part's triangles are to be reversed. Where maps turn the whole mesh for
+ * the larger parts, these are, not the ones that are subtracted then. */
+static bool inside_out(const sdm_part_audit *a, size_t i)
+{
+    const sdm_part *p = &a->part[i];
+    if (p->state == SDM_PART_INSIDE_OUT) return !(p->volume > 0);
+    return p->state == SDM_PART_SOLID && a->mesh.inverted && a->inside_out > 0 && p->volume < 0;
+}
+
+static size_t count_inside_out(const sdm_part_audit *a)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < a->n; i++) n += inside_out(a, i);
+    return n;
+}
+
+/* Name of a part's state in the mesh as given. */
+static const char *state_name(const sdm_part_audit *a, size_t i)
 {
     static const char *const names[] = {[SDM_PART_SOLID] = "solid",
                                         [SDM_PART_CAVITY] = "cavity",
-                                        [SDM_PART_INSIDE_OUT] = "inside out",
+                                        [SDM_PART_INSIDE_OUT] = "subtracted",
                                         [SDM_PART_FLAT] = "flat",
                                         [SDM_PART_OPEN] = "open"};
-    return names[p->state];
+    return inside_out(a, i) ? "inside out" : names[a->part[i].state];
 }
 
 static void print_parts(const sdm_part_audit *a)
@@ -33,7 +50,7 @@ static void print_parts(const sdm_part_audit *a)
         snprintf(range, sizeof range, "%zu .. %zu", p->first_vert, p->last_vert);
         printf("  %-6zu  %-9zu  %-18s  %-10s  %-6s  %-8s  %-12.6g  %.6g %.6g %.6g .. %.6g %.6g "
                "%.6g\n",
-               i + 1, p->n_tri, range, state_name(p), p->turned ? "yes" : "no",
+               i + 1, p->n_tri, range, state_name(a, i), p->turned ? "yes" : "no",
                p->met ? "yes" : "no", p->volume, p->min[0], p->min[1], p->min[2], p->max[0],
                p->max[1], p->max[2]);
     }
@@ -49,7 +66,7 @@ void cli_print_audit(const sdm_part_audit *audit)
     printf("closed               %s\n", a->closed ? "yes" : "no");
     printf("manifold             %s\n", a->manifold ? "yes" : "no");
     printf("inside out           %s\n", a->inverted ? "yes" : "no");
-    printf("parts inside out     %zu\n", audit->inside_out);
+    printf("parts inside out     %zu\n", count_inside_out(audit));
     printf("boundary edges       %zu\n", a->boundary_edges);
     printf("non-manifold edges   %zu\n", a->nonmanifold_edges);
     printf("misoriented edges    %zu\n", a->misoriented_edges);
@@ -101,13 +118,13 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
 {
     sdm_json_real(json, "union_volume_mm3", a->union_volume);
     sdm_json_real(json, "union_area_mm2", a->union_area);
-    sdm_json_int(json, "parts_inside_out", (int64_t)a->inside_out);
+    sdm_json_int(json, "parts_inside_out", (int64_t)count_inside_out(a));
     sdm_json_text(json, "verdict", cli_verdict_name(cli_audit_verdict(a, "", NULL)));
     sdm_json_open(json, "parts", '[');
     for (size_t i = 0; i < a->n && i < JSON_PARTS; i++) {
         const sdm_part *p = &a->part[i];
         sdm_json_open(json, NULL, '{');
-        sdm_json_text(json, "state", state_name(p));
+        sdm_json_text(json, "state", state_name(a, i));
         sdm_json_bool(json, "turned", p->turned);
         sdm_json_int(json, "triangles", (int64_t)p->n_tri);
         sdm_json_int(json, "first_triangle", (int64_t)p->first_tri);
@@ -185,18 +202,17 @@ void cli_describe_open(const sdm_part_audit *a, sdm_text *text)
 void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
 {
     const sdm_part *p = &a->part[index];
+    cli_name_part(a, index, text);
     if (p->volume > 0) {
         size_t largest = 0;
         for (size_t i = 1; i < a->n; i++)
             if (a->part[i].volume < a->part[largest].volume) largest = i;
-        cli_name_part(a, largest, text);
         sdm_text_add(text,
-                     "is inside out and larger than the rest: maps turn the whole mesh, and ");
-        cli_name_part(a, index, text);
-        sdm_text_add(text, "is subtracted from what it overlaps");
+                     "is subtracted from what it overlaps, because maps turn the whole mesh: ");
+        cli_name_part(a, largest, text);
+        sdm_text_add(text, "is inside out and larger than the rest");
         return;
     }
-    cli_name_part(a, index, text);
     sdm_text_add(text,
                  "is inside out%s: it is subtracted from what it overlaps and is not solid itself",
                  p->met ? " and overlaps another" : "");

@@ -50,14 +50,18 @@ static void format_rate(char buf[32], double rate)
         snprintf(buf, 32, "%.1fM", rate / 1e6);
 }
 
-/* "1:53 left  1,250 of 8,177 exact maps  61 maps/s" */
+/* "1:53 left  1,250 of 8,177 exact maps  61 maps/s"; the number of maps is not known at first */
 static void format_maps(const sdm_progress *p, char *text, size_t size)
 {
     char done[32], all[32], rate[32], left[32];
     format_rate(rate, p->samples_per_second);
     format_time(left, sizeof left, p->seconds_left);
-    snprintf(text, size, "%s left  %s of %s exact maps  %s maps/s", left,
-             cli_format_count(p->samples, done), cli_format_count(p->samples_at_start, all), rate);
+    if (p->samples_at_start > 0)
+        snprintf(text, size, "%s left  %s of %s exact maps  %s maps/s", left,
+                 cli_format_count(p->samples, done), cli_format_count(p->samples_at_start, all),
+                 rate);
+    else
+        snprintf(text, size, "%s left", left);
 }
 
 /* "1:05 left  held-out 0.0123 mm (12 s ago)  18k maps/s  loss 3.1e-05 mm^2  step 1,200"; what

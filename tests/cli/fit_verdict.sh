@@ -25,6 +25,15 @@ expect 4 '^sdmgen: error: torus-label.nii: ' $wrong torus-label.nii --label 1
 has '^  (empty|missing)  +FAILED '
 expect 2 '--beside does nothing in a fit to labels' $wrong torus-label.nii --label 1 --beside 1
 
+# Maps too coarse for the point spread: the advised voxel passes its own check.
+expect 0 - sdmgen phantom --shape ellipsoid -p rx=4.5 -p ry=3.5 -p rz=3 --spacing 0.5 --blur 0.22 --seed 2 -o sharp.nii --quiet
+sharp='sdmgen fit --shape ellipsoid sharp.nii --rotation 0,0,0 --quiet --spacing'
+expect 0 - $sharp 0.8
+has '^  map voxels   doubtful  0\.8, .* beside the point spread .* exact maps with voxels of [0-9.]+ mm'
+advice=$(sed -n 's/^  map voxels .*voxels of \([0-9.]*\) mm.*/\1/p' out)
+expect 0 - $sharp "$advice"
+has '^  map voxels   passed '
+
 # The side of an ear is found; the wrong one is refused.
 expect 0 - sdmgen phantom --shape cochlea -O edge=0.6 -O ear=left --spacing 0.4 --seed 5 -o left.nii --quiet
 ear='sdmgen fit --shape cochlea -O edge=0.6 left.nii --quiet --rotation 0,0,0 --spacing 0.4 --eps 1e-3'

@@ -30,7 +30,12 @@ faulty() {
 }
 inside_out='part 2 of 2 \(12 triangles, vertices 8 \.\. 15, box 2 -0\.25 -0\.25 \.\. 4 0\.25 0\.25 mm\) is inside out and overlaps another'
 faulty handle 4 "^warning +$inside_out.*\(in all 21 shapes\); reverse the vertices"
-faulty body 4 '^warning +part 1 of 2 .* is inside out and larger than the rest: maps turn the whole mesh, and part 2 of 2 .* is subtracted from what it overlaps'
+faulty body 4 '^warning +part 2 of 2 .* is subtracted from what it overlaps, because maps turn the whole mesh: part 1 of 2 .* is inside out and larger than the rest'
+if grep -q 'the exact engine turns' out; then bad "the parts that maps turn are told beside those that they lose: $(cat out)"; fi
+expect 4 'is inside out and larger' sdmgen mesh --shape faulty -O fault=body --plugin "$plugin" --audit
+has '^parts inside out +1$'
+has '^  1 .* inside out '
+has '^  2 .* subtracted '
 faulty jump 4 '^warning +vertex (8|9|1[0-5]) jumps by 0\.125 mm at size=2, with reach='
 faulty sizes 4 '^warning +the numbers of vertices and triangles change: 24 and 36 at first, others in [0-9]+ of 21 shapes, for example 16 vertices'
 faulty sizes 4 '^warning +the number of vertices or triangles changes at size=2, with reach='

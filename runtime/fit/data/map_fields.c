@@ -242,10 +242,11 @@ sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err)
         n++;
         for (int k = 0; k < 3; k++) sum[k] += x[k];
     }
-    if (!(n > 0))
-        return sdm_fail(
-            err, SDM_E_QUALITY,
-            "no voxel of the map lies inside the shape: its grid is too coarse or lies elsewhere");
+    if (!(n > 1))
+        return sdm_fail(err, SDM_E_QUALITY,
+                        "%s voxel of the map lies inside the shape: its voxels, %.3g mm, are too "
+                        "large for the shape, or its grid lies elsewhere",
+                        n > 0 ? "only one" : "no", fit_longest_edge(&maps->grid));
     *out = (fit_extent){.volume = n * maps->grid.spacing[0] * maps->grid.spacing[1] *
                                   maps->grid.spacing[2]};
     for (int k = 0; k < 3; k++) out->centre[k] = sum[k] / n;

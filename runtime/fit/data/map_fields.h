@@ -83,8 +83,8 @@ typedef struct fit_extent {
     double centre[3], reach, volume;
 } fit_extent;
 
-/* Computes the extent from the voxels of maps->distance that lie inside. SDM_E_QUALITY: there is no
- * such voxel. */
+/* Computes the extent from the voxels of maps->distance that lie inside. SDM_E_QUALITY: there are
+ * not two of them. */
 sdm_status sdm_fit_extent(const fit_maps *maps, fit_extent *out, sdm_error *err);
 
 /* Radius (mm) of the largest ball inside the shape, centred on a voxel of the map. */

@@ -14,10 +14,14 @@
 
 // longest edge of a voxel that shows the thickness, over the radius of the largest ball inside
 #define VOXEL_OVER_RADIUS_MAX 0.5
+// from this edge on, over the same radius, voxels miss the shape
+#define VOXEL_OVER_RADIUS_FAR 2
 // larger voxels bias the standard deviations: edge over the sd of the point spread
 #define VOXEL_OVER_BLUR_MAX 1.5
 // labels: edge over that of a voxel of the labels
 #define VOXEL_OVER_LABEL_MAX 1.5
+// sd of the point spread, over the voxels of the image, where the maps are too coarse to show it
+#define BLUR_OVER_IMAGE_VOXEL 0.5
 // advised edge of a voxel, over the longest edge that passes
 #define ADVISED 0.8
 // the limit by the details is known to this share of it: an edge so little beyond passes
@@ -130,7 +134,7 @@ static void coarseness_limit(fit_coarseness *c, double limit, const char *detail
 
 fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
 {
-    fit_coarseness c = {INFINITY, INFINITY, ""};
+    fit_coarseness c = {INFINITY, INFINITY, "", false};
     if (fit_maps_direct(&p->maps)) return c;
     const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
                  details = detail_share(&p->maps);
@@ -145,7 +149,13 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
         coarseness_limit(&c, VOXEL_OVER_LABEL_MAX * fit_longest_edge(&p->target->grid),
                          "the voxels of the labels");
     if (blur > 0) coarseness_limit(&c, VOXEL_OVER_BLUR_MAX * blur, "the point spread of the image");
+    c.blind = voxel > VOXEL_OVER_RADIUS_FAR * radius;
     if (voxel > c.limit) c.advice = ADVISED * c.limit;
+    // an estimate of the point spread at its smallest value with these maps is an upper bound:
+    // finer maps may show a shorter one
+    if (voxel > c.limit && blur > 0 && blur <= p->maps.min_blur * (1 + LIMIT_ERROR))
+        c.advice = fmin(c.advice, ADVISED * VOXEL_OVER_BLUR_MAX * BLUR_OVER_IMAGE_VOXEL *
+                                      fit_longest_edge(&p->target->grid));
     return c;
 }
 
@@ -153,14 +163,15 @@ void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_v
 {
     const double voxel = fit_longest_edge(&p->maps.grid);
     if (p->opts->keep_params || fit_maps_direct(&p->maps)) return;
-    sdm_fit_judge_add(
-        v, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit), SDM_FIT_DOUBTFUL, voxel, coarse.limit,
-        "the voxels of the maps are coarse beside %s: estimates are less exact, and "
-        "standard deviations %s; exact maps with voxels of %.2g mm "
-        "(sdm_fit_source.grid) show it",
-        coarse.detail,
-        p->target->kind == SDM_FIT_POINTS ? "larger, by an estimate of the error" : "too small",
-        coarse.advice);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit),
+                      coarse.blind ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, voxel, coarse.limit,
+                      "the voxels of the maps are coarse beside %s: estimates are less exact, and "
+                      "standard deviations %s; exact maps with voxels of %.2g mm "
+                      "(sdm_fit_source.grid) show it",
+                      coarse.detail,
+                      p->target->kind == SDM_FIT_POINTS ? "larger, by an estimate of the error"
+                                                        : "too small",
+                      coarse.advice);
 }
 
 /* Thickness (mm) of the thinnest part of the fitted shape; without the shape, of the thinnest part

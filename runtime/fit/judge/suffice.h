@@ -17,6 +17,8 @@ typedef struct fit_coarseness {
     double advice;
     /* what limits the edge, "the thickness of the shape" */
     const char *detail;
+    /* the voxels of the maps are longer than the thickest part of the shape is thick */
+    bool blind;
 } fit_coarseness;
 
 /* Judges the maps by the fitted shape, by labels and by the point spread. blur: its sd, mm; 0: the

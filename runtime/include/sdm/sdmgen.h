@@ -18,7 +18,7 @@
  *                         sdm/field.h           the same on any grid, at points, as a narrow band
  *                         sdm/check.h           error of a map
  *   a narrow band         sdm/blocks.h          values near a surface, in blocks of voxels
- *   use of a map          sdm/map.h             gradient
+ *   use of a map          sdm/map.h             gradient and volume
  *                         sdm/isosurface.h      surface as a mesh
  *                         sdm/vdb.h             OpenVDB level set [sdmgen::vdb]
  *                         sdm/image.h           .nii .nrrd .mha .npy files [sdmgen::image]
@@ -50,7 +50,7 @@
  *   if (!s) s = sdm_generate_points(model, p, NULL, x, 1, &value, gradient, NULL, NULL, &err);
  *   if (!s) printf("%g mm at (1, 2, 0.5)\n", value);
  *   if (s) fputs(err.text, stderr);
- *   sdm_model_free(model); */
+ *   free(values), free(p), sdm_model_free(model); */
 // clang-format on
 #ifndef SDM_SDMGEN_H
 #define SDM_SDMGEN_H

@@ -22,9 +22,10 @@ void cli_fit_print_verdict(const cli_fit *f)
     for (size_t i = 0; i < v->n_findings; i++) {
         const sdm_fit_finding *x = &v->findings[i];
         // + 0: no negative zero
-        printf("  %-12s %-9s %.3g", sdm_fit_check_name(x->kind), GRADES[x->grade], x->figure + 0);
+        printf("  %-12s %-9s", sdm_fit_check_name(x->kind), GRADES[x->grade]);
+        if (!isnan(x->figure)) printf(" %.3g", x->figure + 0);
         if (!isnan(x->limit)) printf(", limit %.3g", x->limit);
-        printf("%s%s\n", *x->text ? ": " : "", x->text);
+        printf("%s%s\n", !*x->text ? "" : isnan(x->figure) ? " " : ": ", x->text);
     }
     if (v->grade != SDM_FIT_PASSED && f->opts.turns == SDM_FIT_TURNS_NONE &&
         !isnan(f->args->pose.rotation[0]))

@@ -58,7 +58,7 @@ class Tissue:
 class Finding:
     """One check of a fit. `check`: its name ("residuals"), as in docs/fitting-reference.md; `grade`:
     "passed", "doubtful" or "failed"; `figure` and the `limit` that separates passed from the rest (NaN:
-    none); `text`: why it did not pass, else empty."""
+    none); `text`: why it did not pass or has no figure, else empty."""
 
     check: str
     grade: str

@@ -330,7 +330,16 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     if (!s) s = least_gain(p, &own, &least, err);
     sdm_free(own.distance);
     p->opts = given;
-    if (s || isnan(least.gain)) return s;
+    if (s) return s;
+    if (isnan(least.gain)) {
+        sdm_fit_verdict_add(
+            v, &(sdm_fit_finding){.kind = SDM_FIT_CHECK_NEXT_POSE,
+                                  .figure = NAN,
+                                  .limit = NAN,
+                                  .text = "no other start, rotation or value of one parameter "
+                                          "gives another surface that explains the data"});
+        return SDM_OK;
+    }
     const bool passed = least.gain > SDM_FIT_PREFERRED, points = p->target->kind == SDM_FIT_POINTS;
     const char *name = NULL;
     double low, high;

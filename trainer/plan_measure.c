@@ -235,10 +235,11 @@ static sdm_status measure(const sdm_config *config, const sdm_instance *shape, s
 {
     small_config(config, FEWEST, c);
     sdm_status s = prepare(&m[0], c, shape, err);
-    if (s || m[0].t.data.only_holdout) {
+    if (s) return s;
+    if (m[0].t.data.only_holdout) { // one is enough: there are no steps
         m[1] = m[0];
-        m[0].t.kind = NULL;
-        return s;
+        m[0] = (measurement){.hooks = m[0].hooks};
+        return SDM_OK;
     }
     const double n = MAP_SECONDS * FEWEST / fmax(m[0].maps, 1e-3);
     small_config(config, (size_t)fmin(MOST, fmax(FEWEST + 8, n)), c);

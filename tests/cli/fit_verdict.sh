@@ -26,6 +26,18 @@ expect 4 '^sdmgen: error: torus-label.nii: ' $wrong torus-label.nii --label 1
 has '^  (empty|missing)  +FAILED '
 expect 2 '--beside does nothing in a fit to labels' $wrong torus-label.nii --label 1 --beside 1
 
+# Points with errors on another shape: each neighbourhood is off by less than errors that its points share explain, but not by their own.
+for square in 0.7 1; do
+    expect 0 - sdmgen phantom --shape ellipsoid -p rx=4 -p ry=3.2 -p rz=2.5 -O e1=$square -O e2=$square --spacing 0.4 --seed 3 -o any.nii \
+        --surface square.csv --surface-noise 0.08 --quiet
+    expect 0 - sdmgen fit --shape ellipsoid square.csv --rotation 0,0,0 --quiet
+    if [ $square = 1 ]; then
+        has '^  residuals    passed '
+    else
+        has '^  residuals    doubtful  2\.[0-9]+, limit 1\.[0-9]+: neighbourhoods of points lie 1\.[0-9] times as far off the surface as the scatter'
+    fi
+done
+
 # Maps too coarse for the point spread: the advised voxel passes its own check.
 expect 0 - sdmgen phantom --shape ellipsoid -p rx=4.5 -p ry=3.5 -p rz=3 --spacing 0.5 --blur 0.22 --seed 2 -o sharp.nii --quiet
 sharp='sdmgen fit --shape ellipsoid sharp.nii --rotation 0,0,0 --quiet --spacing'

@@ -50,6 +50,10 @@ has '^  design  '
 has '^  refine   20 steps '
 has '^  nodes    1: '
 has '; (more than one does not pay|it pays up to [0-9]+)'
+# A template whose parts need no correction makes no maps for the training and no steps.
+expect 0 - sdmgen train "$source_folder/configs/linkage.yaml" network.kind=template grid=auto grid.voxels=24 --plan -q
+has '^  maps     [0-9]+ maps '
+grep -q '^  refine' out && bad 'steps of a template without a correction'
 expect 2 '--nodes and --cores belong to --plan' sdmgen train "$tiny" --nodes 2
 expect 2 "'0'" sdmgen train "$tiny" --plan --nodes 0
 finish

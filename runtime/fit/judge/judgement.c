@@ -120,11 +120,13 @@ static bool has_passed(const sdm_fit_verdict *v, sdm_fit_check_kind kind)
 // is, or are longer by a length that was measured, the fit has not found the shape of the data. In
 // an image, residuals beside the shape and a second material outside show together that the shape
 // goes on there.
-static void check_bounds(const fit_problem *p, const fit_at_bounds *b, const sdm_fit_result *r,
-                         sdm_fit_verdict *v)
+static void check_bounds(const fit_problem *p, const fit_misfit *m, const fit_at_bounds *b,
+                         const sdm_fit_result *r, sdm_fit_verdict *v)
 {
-    const bool matched =
-                   r->outliers <= STRAY_AT_BOUND_MAX && has_passed(v, SDM_FIT_CHECK_RESIDUALS) &&
+    const bool noise = m->n_units[1] > 0 && m->chi_square[1] <= m->limit[1],
+               matched =
+                   r->outliers <= STRAY_AT_BOUND_MAX &&
+                   (noise || has_passed(v, SDM_FIT_CHECK_RESIDUALS)) &&
                    has_passed(v, SDM_FIT_CHECK_EMPTY) && has_passed(v, SDM_FIT_CHECK_MISSING) &&
                    has_passed(v, SDM_FIT_CHECK_PATCH) && has_passed(v, SDM_FIT_CHECK_COVERED) &&
                    (has_passed(v, SDM_FIT_CHECK_BESIDE) || has_passed(v, SDM_FIT_CHECK_OUTSIDE)),
@@ -162,6 +164,15 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, fit_coars
         sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL, 0, NAN,
                           "the points lie too far apart to tell their scatter from errors of the "
                           "shape: nothing tests this fit");
+        return;
+    }
+    if (points && m->chi_square[1] <= m->limit[1] && m->scatter_chi_square > m->limit[1]) {
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL,
+                          m->scatter_chi_square, m->limit[1],
+                          "neighbourhoods of points lie %.2g times as far off the surface as the "
+                          "scatter of the points explains: another shape lies there, or "
+                          "neighbouring points share their errors, as those of a segmentation do",
+                          sqrt(m->scatter_chi_square));
         return;
     }
     // the likely causes in their order; voxels that are a little too coarse do not explain
@@ -365,7 +376,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     if (!s && points && !has_passed(v, SDM_FIT_CHECK_PATCH))
         s = sdm_fit_measure_beyond(p, r, &bounds, err);
     if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
-    if (!s) check_bounds(p, &bounds, r, v);
+    if (!s) check_bounds(p, &misfit, &bounds, r, v);
     if (!s) sdm_fit_check_voxels(p, coarse, v);
     if (!s && labels) sdm_fit_check_labels(p, v);
     if (!s) sdm_fit_check_determined(p, r, v);

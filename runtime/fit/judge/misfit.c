@@ -6,6 +6,7 @@
 
 #include "fit/data/step_phase.h"
 #include "noise.h"
+#include "sdm/internal/vec3.h"
 #include "sdm/internal/heap.h"
 
 // members of a unit between which correlations are computed; of more, every second, third ... one
@@ -16,6 +17,12 @@
 #define BEYOND 3.0
 // smallest sd of a unit's mean, as a share: errors of the maps and of the scale of the shares
 #define MEAN_SD_MIN 0.02
+// points: the same, over the largest radius, where their errors are independent: facets
+#define POINTS_SD_MIN 0.005
+// points: the correlation of neighbours is known to this
+#define CORRELATION_ERROR 0.05
+// points of a unit whose nearest neighbours are looked for
+#define NEAREST_MAX 200
 // rms error of the place of a surface that labels show, in voxels
 #define LABEL_ERROR 0.12
 // the density at the quantile of the share a is close to DENSITY a (1 - a)
@@ -144,6 +151,44 @@ static sdm_status points_scatter(fit_residuals *r, const member *m, size_t n, sd
     return s;
 }
 
+/* The nearest other member of a unit. */
+static size_t nearest(const fit_problem *p, const member *m, size_t n, size_t k)
+{
+    const double *x = p->samples.world + 3 * (size_t)m[k].sample;
+    double least = INFINITY;
+    size_t found = k;
+    for (size_t j = 0; j < n; j++) {
+        const double d = v3_dist2(x, p->samples.world + 3 * (size_t)m[j].sample);
+        if (j != k && d < least) least = d, found = j;
+    }
+    return found;
+}
+
+/* *correlation = of the distances of neighbouring points from the surface, after the means of the
+ * units: 1 less the variance of half their differences over the variance of all. Points farther
+ * apart have no larger one. Robust, so that units beside another shape do not count. */
+static sdm_status points_correlation(const fit_problem *p, const fit_residuals *r, const member *m,
+                                     size_t n, double *correlation, sdm_error *err)
+{
+    double *list = NULL;
+    size_t count = 0;
+    const sdm_status s = SDM_ALLOC(&list, n, "residuals of the fit", err);
+    for (size_t from = 0, to; from < n && !s; from = to) {
+        for (to = from; to < n && m[to].unit == m[from].unit; to++) {
+        }
+        const size_t size = to - from, step = (size + NEAREST_MAX - 1) / NEAREST_MAX;
+        for (size_t k = 0; k < size && size > 1; k += step) {
+            const size_t j = nearest(p, m + from, size, k);
+            list[count++] = (r->residual[m[from + k].sample] - r->residual[m[from + j].sample]) *
+                            0.70710678118654752;
+        }
+    }
+    const double sd = count ? sdm_fit_robust_sd(list, count, 0) : 0, all = r->n ? r->sd[0] : 0;
+    *correlation = count >= SCATTER_MIN && all > 0 ? fmin(fmax(1 - sd * sd / (all * all), 0), 1) : 1;
+    sdm_free(list);
+    return s;
+}
+
 // area of the surface times the largest radius, over the volume of the shape: the part of the
 // volume that a displacement of the whole surface by this radius stands for
 static double points_volume_factor(const fit_problem *p)
@@ -206,6 +251,9 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
     const bool labels = p->given_labels || p->target->kind == SDM_FIT_LABEL;
     const double least = labels ? fmax(LABEL_ERROR / r->edge[0], MEAN_SD_MIN) : MEAN_SD_MIN;
     const double factor = points ? points_volume_factor(p) : 1;
+    double correlation = 1;
+    if (!s && points) s = points_correlation(p, r, m, n, &correlation, err);
+    correlation = fmin(correlation + CORRELATION_ERROR, 1);
     if (labels) out->beyond = label_beyond(p), out->missing = out->beyond / volume;
     for (size_t from = 0, to; from < n && !s; from = to) {
         for (to = from; to < n && m[to].unit == m[from].unit; to++) {
@@ -217,11 +265,18 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
         out->n_units[side]++;
         out->chi_square[side] += z2;
         out->noise_chi_square += u.mean * u.mean / u.noise;
+        if (points) {
+            const double one = 1 / (double)(to - from), sd = r->sd[0], maps = r->map_error[0];
+            out->scatter_chi_square +=
+                u.mean * u.mean / (sd * sd * (one + (1 - one) * correlation) + maps * maps +
+                                   POINTS_SD_MIN * POINTS_SD_MIN);
+        }
         if (z2 > BEYOND * BEYOND)
             *(u.mean < 0 ? &out->empty : &out->missing) +=
                 factor * contradicted(&u) * (double)(to - from) / volume;
     }
-    out->noise_chi_square /= fmax((double)(out->n_units[0] + out->n_units[1]), 1);
+    const double all_units = fmax((double)(out->n_units[0] + out->n_units[1]), 1);
+    out->noise_chi_square /= all_units, out->scatter_chi_square /= all_units;
     for (int side = 0; side < 2; side++) {
         const double units = fmax((double)out->n_units[side], 1);
         out->chi_square[side] /= units;

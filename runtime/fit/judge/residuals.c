@@ -3,9 +3,11 @@
 
 #include <math.h>
 
+#include "fit/data/interpolate.h"
 #include "fit/trust/posterior.h"
 #include "noise.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/vec3.h"
 
 // a voxel whose share differs from 0 or 1 by at most this much lies deep outside or deep inside
 #define DEEP 0.01
@@ -327,15 +329,31 @@ static void map_errors_fill(const fit_problem *p, fit_residuals *r, double radiu
                                        : error / radius;
 }
 
+/* The place on the surface to which a point belongs, to first order: the point less its distance
+ * along the gradient. By their own places, points with errors would be parted into those inside and
+ * those outside. */
+static void foot_of(const fit_problem *p, const fit_field *map, size_t i, double foot[3])
+{
+    double y[3], gradient[3];
+    sdm_fit_to_shape(&p->state, p->samples.world + 3 * i, y);
+    const double distance = sdm_fit_interpolate_all(map, y, gradient, NULL),
+                 square = v3_dot(gradient, gradient);
+    for (int a = 0; a < 3 && square > 0.25; a++) y[a] -= distance * gradient[a] / square;
+    sdm_fit_to_world(&p->state, y, foot);
+}
+
 // points: distances over the largest radius; their noise is the scatter of the distances
 static void points_fill(const fit_problem *p, fit_residuals *r, double radius)
 {
+    const fit_field map = sdm_fit_maps_distances(&p->maps);
     for (size_t i = 0; i < r->n; i++) {
+        double foot[3];
+        foot_of(p, &map, i, foot);
         r->expected[i] = 1;
         r->used[i] = sdm_fit_point_belongs(&p->observation, p->samples.field[i]) >= 0.5;
         r->residual[i] = p->samples.field[i] / radius;
         for (size_t a = 0; a < 3; a++) {
-            const double place = floor(2 * p->samples.world[3 * i + a] / radius);
+            const double place = floor(2 * foot[a] / radius);
             r->place[3 * i + a] = (int32_t)fmax(fmin(place, PLACE_MAX), -PLACE_MAX);
         }
     }

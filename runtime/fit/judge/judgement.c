@@ -149,9 +149,10 @@ static void check_bounds(const fit_problem *p, const fit_misfit *m, const fit_at
 // The residuals on both sides of the surface. The older observation model is biased in blurred
 // images, and labels and points show a surface with errors of their own: their residuals are not
 // noise alone, so that only a multiple of the limit refuses the fit.
-static void check_residuals(const fit_problem *p, const fit_misfit *m, fit_coarseness coarse,
-                            const fit_at_bounds *bounds, sdm_fit_verdict *v)
+static void check_residuals(const fit_problem *p, const fit_misfit *own, const fit_misfit *feet,
+                            fit_coarseness coarse, const fit_at_bounds *bounds, sdm_fit_verdict *v)
 {
+    const fit_misfit *m = own;
     const double voxel = fit_longest_edge(&p->maps.grid), beyond = m->chi_square[1] / m->limit[1];
     const bool image = sdm_fit_is_image(p), points = p->target->kind == SDM_FIT_POINTS,
                serious = m->empty + m->missing > SERIOUS_MIN,
@@ -166,13 +167,15 @@ static void check_residuals(const fit_problem *p, const fit_misfit *m, fit_coars
                           "shape: nothing tests this fit");
         return;
     }
-    if (points && m->chi_square[1] <= m->limit[1] && m->scatter_chi_square > m->limit[1]) {
+    // errors as large as a neighbourhood are judged by the places to which the points belong
+    if (points && !refused && feet->chi_square[1] / feet->limit[1] < beyond) m = feet;
+    if (points && m->chi_square[1] <= m->limit[1] && feet->scatter_chi_square > feet->limit[1]) {
         sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL,
-                          m->scatter_chi_square, m->limit[1],
+                          feet->scatter_chi_square, feet->limit[1],
                           "neighbourhoods of points lie %.2g times as far off the surface as the "
                           "scatter of the points explains: another shape lies there, or "
                           "neighbouring points share their errors, as those of a segmentation do",
-                          sqrt(m->scatter_chi_square));
+                          sqrt(feet->scatter_chi_square));
         return;
     }
     // the likely causes in their order; voxels that are a little too coarse do not explain
@@ -351,7 +354,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
 {
     sdm_fit_verdict *v = &r->verdict;
     fit_residuals residuals;
-    fit_misfit misfit;
+    fit_misfit misfit, feet = {0};
     sdm_status s = sdm_fit_residuals_create(p, &residuals, err);
     const double robust = s ? 0 : sdm_fit_residual_correlation(&residuals);
     *factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
@@ -363,8 +366,10 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     check_basics(p, r, v);
     check_maps(p, v);
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
+    if (!s && points) sdm_fit_residuals_use_feet(p, &residuals);
+    if (!s && points) s = sdm_fit_misfit(p, &residuals, &feet, err);
     if (!s) {
-        check_residuals(p, &misfit, coarse, &bounds, v);
+        check_residuals(p, &misfit, &feet, coarse, &bounds, v);
         check_volumes(p, &misfit, r, v);
         if (labels) check_far_labels(p, &misfit, v);
         v->n_units = misfit.n_units[0] + misfit.n_units[1];

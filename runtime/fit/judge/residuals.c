@@ -32,6 +32,8 @@
 #define WIDER 1.5
 // largest place along an axis; points farther away, in units of the radius, share a place
 #define PLACE_MAX 1e5
+// smallest square of the gradient of a distance that leads to the surface
+#define GRADIENT_MIN 0.25
 // correlations below this count as none
 #define CORRELATION_MIN 0.05
 
@@ -329,33 +331,37 @@ static void map_errors_fill(const fit_problem *p, fit_residuals *r, double radiu
                                        : error / radius;
 }
 
-/* The place on the surface to which a point belongs, to first order: the point less its distance
- * along the gradient. By their own places, points with errors would be parted into those inside and
- * those outside. */
-static void foot_of(const fit_problem *p, const fit_field *map, size_t i, double foot[3])
+static void set_place(fit_residuals *r, size_t i, const double x[3], double radius)
 {
-    double y[3], gradient[3];
-    sdm_fit_to_shape(&p->state, p->samples.world + 3 * i, y);
-    const double distance = sdm_fit_interpolate_all(map, y, gradient, NULL),
-                 square = v3_dot(gradient, gradient);
-    for (int a = 0; a < 3 && square > 0.25; a++) y[a] -= distance * gradient[a] / square;
-    sdm_fit_to_world(&p->state, y, foot);
+    for (size_t a = 0; a < 3; a++) {
+        const double place = floor(2 * x[a] / radius);
+        r->place[3 * i + a] = (int32_t)fmax(fmin(place, PLACE_MAX), -PLACE_MAX);
+    }
 }
 
 // points: distances over the largest radius; their noise is the scatter of the distances
 static void points_fill(const fit_problem *p, fit_residuals *r, double radius)
 {
-    const fit_field map = sdm_fit_maps_distances(&p->maps);
     for (size_t i = 0; i < r->n; i++) {
-        double foot[3];
-        foot_of(p, &map, i, foot);
         r->expected[i] = 1;
         r->used[i] = sdm_fit_point_belongs(&p->observation, p->samples.field[i]) >= 0.5;
         r->residual[i] = p->samples.field[i] / radius;
-        for (size_t a = 0; a < 3; a++) {
-            const double place = floor(2 * foot[a] / radius);
-            r->place[3 * i + a] = (int32_t)fmax(fmin(place, PLACE_MAX), -PLACE_MAX);
-        }
+        set_place(r, i, p->samples.world + 3 * i, radius);
+    }
+}
+
+void sdm_fit_residuals_use_feet(const fit_problem *p, fit_residuals *r)
+{
+    const fit_field map = sdm_fit_maps_distances(&p->maps);
+    const double radius = sdm_fit_inradius(&p->maps);
+    for (size_t i = 0; i < r->n; i++) {
+        double y[3], gradient[3], foot[3];
+        sdm_fit_to_shape(&p->state, p->samples.world + 3 * i, y);
+        const double distance = sdm_fit_interpolate_all(&map, y, gradient, NULL),
+                     square = v3_dot(gradient, gradient);
+        for (int a = 0; a < 3 && square > GRADIENT_MIN; a++) y[a] -= distance * gradient[a] / square;
+        sdm_fit_to_world(&p->state, y, foot);
+        set_place(r, i, foot, radius);
     }
 }
 

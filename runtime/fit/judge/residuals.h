@@ -49,6 +49,12 @@ typedef struct fit_residuals {
 /* Computes the residuals at problem->state from its samples. Call sdm_fit_residuals_dispose() even
  * after an error. */
 sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sdm_error *err);
+
+/* Points: moves place[] from the points to the places on the surface to which they belong, to first
+   order (the point less its distance along the gradient). By their own places, points with errors
+   as large as the edge of a cube are parted into those inside and those outside. */
+void sdm_fit_residuals_use_feet(const fit_problem *p, fit_residuals *r);
+
 /* Number of correlated voxels that carry as much information as one independent one: the product
    over the axes of the sums of all correlations, 1 or more. 0: nothing is correlated, too few
    voxels lie away from the surface, or the correlation reaches farther than the lags. */

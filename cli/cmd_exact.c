@@ -256,14 +256,21 @@ static void warn_torn(const job *j)
         cli_warn_torn_blocks("", &j->blocks, mend);
 }
 
+static bool writes_level_set(const job *j)
+{
+    for (size_t i = 0; i < j->args->outputs.n; i++)
+        if (cli_ends_with(j->args->outputs.items[i], ".vdb")) return true;
+    return false;
+}
+
 static void notice_mesh(const job *j)
 {
     const sdm_audit *a = &j->report.audit;
     int64_t inside = 1; // a level set without voxels inside is refused when it is written
     float min, max;
     if (j->values) find_range(j, &min, &max, &inside);
-    if (!inside)
-        cli_notice("no voxel of the grid is inside the surface: does the grid cover the shape?");
+    if (!inside && !writes_level_set(j))
+        cli_warn("no voxel of the grid is inside the surface: does the grid cover the shape?");
     if (j->report.turned) cli_notice("the mesh was inside out; its orientation has been reversed");
     if (j->report.parts_turned)
         cli_notice("%zu parts were inside out; their orientation has been reversed",
@@ -274,8 +281,8 @@ static void notice_mesh(const job *j)
     const double size = sqrt(v3_dist2(a->min, a->max));
     bool thin = false;
     if (size > 0 && (size < SDM_SURVEY_SIZE_MIN || size > SDM_SURVEY_SIZE_MAX))
-        cli_notice("the mesh measures %.3g mm across: is it in %s? lengths are mm", size,
-                   sdm_unit_near(size < SDM_SURVEY_SIZE_MIN ? 1e3 : 1e-3, NULL));
+        cli_warn("the mesh measures %.3g mm across: is it in %s? lengths are mm", size,
+                 sdm_unit_near(size < SDM_SURVEY_SIZE_MIN ? 1e3 : 1e-3, NULL));
     // a closed part that meets no other cannot be inside out after the engine has turned it; the
     // audit of the single part of a file, which may be large, would only tell its thickness
     if (a->components > 1 || !a->closed || j->args->shape)

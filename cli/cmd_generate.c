@@ -121,7 +121,8 @@ static sdm_status read_rows(job *j, sdm_error *err)
     sdm_status s = SDM_ALLOC(&base, n, "parameters", err);
     if (!s) s = cli_read_params(j->params, n, &j->args->params, base, err);
     if (!s && j->args->rows)
-        s = cli_read_rows(j->args->rows, j->params, n, base, &j->rows, &j->lines, &j->n_rows, err);
+        s = cli_read_rows(j->args->rows, j->params, n, base, &j->args->params, &j->rows, &j->lines,
+                          &j->n_rows, err);
     else if (!s) {
         j->rows = base;
         base = NULL;

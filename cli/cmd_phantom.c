@@ -13,6 +13,9 @@
 #include "sdm/memory.h"
 #include "sdm/volume.h"
 
+/* Fewer voxels inside show hardly any shape. */
+enum { FEW_INSIDE = 50 };
+
 /* ---- before any work ---- */
 
 static sdm_status check_ending(const char *option, const char *path, const char *endings,
@@ -107,6 +110,9 @@ static sdm_status make_image(const cli_phantom *p, sdm_error *err)
     if (!s) s = cli_check_interrupt(err);
     for (size_t i = 0; i < n && !s; i++) inside += label[i];
     if (!s && !inside) cli_warn("no voxel is inside the shape: does the grid cover it?");
+    if (!s && inside > 0 && inside < FEW_INSIDE)
+        cli_warn("only %zu voxel%s inside the shape: smaller ones (--spacing) show it", inside,
+                 inside == 1 ? " is" : "s are");
     if (!s && p->cut && !isnan(args->phantom.crop[0]))
         cli_notice("the shape leaves the field of view");
     if (!s && values) s = write_images(p, values, text, err);

@@ -235,7 +235,9 @@ static sdm_status print_shape(const cli_args *args, const sdm_registry *registry
 {
     // the shape
     const char *name = args->files.items[0];
-    if (!sdm_registry_find(registry, name, NULL) && suggest_subcommand(args, err)) return SDM_E_ARG;
+    const char *near = NULL;
+    if (!sdm_registry_find(registry, name, &near) && !near && suggest_subcommand(args, err))
+        return SDM_E_ARG;
     const sdm_shape *shape = cli_find_shape(registry, name, err);
     if (!shape) return SDM_E_ARG;
     sdm_instance *instance = NULL;

@@ -80,11 +80,12 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
     if (s) return s;
     if (t->data.n_start < start)
         trainer_message(t,
-                        "half of the budget is over after %zu of %zu random maps: training starts "
-                        "with these (lower "
-                        "data.start or raise "
-                        "train.minutes)",
-                        t->data.n_start, start);
+                        "half of the budget is over after %zu of %zu random maps%s: training "
+                        "starts with these (lower %s or raise train.minutes)",
+                        t->data.n_start, start,
+                        t->data.n_static > t->data.n_start ? " and all maps of the static grid"
+                                                           : "",
+                        t->data.n_static > t->data.n_start ? "data.static" : "data.start");
     return trainer_check_grid(t, err);
 }
 

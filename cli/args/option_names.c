@@ -15,16 +15,27 @@ static size_t structure_length(const char *at)
                : 0;
 }
 
-/* The option of the command line for the grid of a fit's exact maps. */
-static const char GRID[] = "sdm_fit_source.grid", GRID_OPTIONS[] = "--exact --spacing";
+/* Names of the C interface, and options of the command line in their place, which are not longer.
+ */
+static const char *const NAMES[][2] = {{"sdm_fit_source.grid", "--exact --spacing"},
+                                       {"sdm_registry_load()", "--plugin FILE"}};
+
+/* The pair of names that begins at `at`; NULL: none. */
+static const char *const *find_name(const char *at)
+{
+    for (size_t i = 0; i < sizeof NAMES / sizeof *NAMES; i++)
+        if (!strncmp(at, NAMES[i][0], strlen(NAMES[i][0]))) return NAMES[i];
+    return NULL;
+}
 
 void cli_name_options(char *text)
 {
     char *to = text;
     for (const char *at = text; *at;) {
-        if (!strncmp(at, GRID, sizeof GRID - 1)) {
-            at += sizeof GRID - 1;
-            for (const char *o = GRID_OPTIONS; *o;) *to++ = *o++;
+        const char *const *name = find_name(at);
+        if (name) {
+            at += strlen(name[0]);
+            for (const char *o = name[1]; *o;) *to++ = *o++;
             continue;
         }
         const size_t skip = structure_length(at);

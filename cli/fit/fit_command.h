@@ -138,6 +138,10 @@ sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_l
  * there are more than `most` or one is no whole number. NaN does not count. */
 size_t cli_fit_distinct(const sdm_volume *v, size_t most, float *found);
 
+/* Warns of labels that look like an image; mend: what to do. */
+sdm_status cli_fit_warn_many_values(const char *path, const sdm_volume *v, const char *mend,
+                                    sdm_error *err);
+
 /* With --label-close: morphological closing of values[grid] (1 and 0) by a ball of that radius. */
 sdm_status cli_fit_close_labels(const cli_fit *f, const sdm_grid *grid, float *values,
                                 sdm_error *err);

@@ -25,6 +25,9 @@ static sdm_status read_appearance(const cli_fit_args *a, sdm_fit_appearance *t, 
                     "fit: --inside, --outside and --air need standard deviations above 0");
 }
 
+/* Shortest margin that shows what lies beside the surface, in voxels. */
+#define MARGIN_MIN 1.5
+
 /* The shape that the default tissues belong to: in CT it is fluid in bone. */
 #define SHAPE_OF_TISSUES "cochlea"
 
@@ -100,6 +103,10 @@ void cli_fit_default_lengths(cli_fit *f)
     o->blur = isnan(a->blur) ? d.blur : a->blur;
     o->l_ref = isnan(a->l_ref) ? d.l_ref : a->l_ref;
     o->margin = isnan(a->margin) ? d.margin : a->margin;
+    if (f->target.kind != SDM_FIT_POINTS && o->margin < 0.999 * MARGIN_MIN * voxel)
+        cli_warn("--margin %g mm is less than %g voxels of %.3g mm: the fit hardly sees what lies "
+                 "beside the surface, and its verdict is blind there",
+                 o->margin, MARGIN_MIN, voxel);
     o->tissue_mm = isnan(a->tissue_field) ? d.tissue_mm : a->tissue_field;
     o->point_sd = isnan(a->point_sd) ? d.point_sd : a->point_sd;
 }

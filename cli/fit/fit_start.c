@@ -58,7 +58,7 @@ static sdm_status pose_from_points(const cli_fit *f, sdm_pose *pose, sdm_error *
     const char *path = f->args->fit.start_points;
     double *rows = NULL, *shape = NULL, *world = NULL;
     size_t n = 0;
-    sdm_status s = cli_read_rows(path, columns, 6, none, &rows, NULL, &n, err);
+    sdm_status s = cli_read_rows(path, columns, 6, none, &(cli_list){0}, &rows, NULL, &n, err);
     if (!s) s = SDM_ALLOC(&shape, 3 * n, "points", err);
     if (!s) s = SDM_ALLOC(&world, 3 * n, "points", err);
     for (size_t i = 0; i < 6 * n && !s; i++) {

@@ -40,15 +40,13 @@ static void notice_few_values(const cli_fit *f)
                f->path, n, (double)found[0], (double)found[n - 1], (double)found[n - 1]);
 }
 
-/* A warning where labels look like an image. */
-static sdm_status warn_many_values(const cli_fit *f, sdm_error *err)
+sdm_status cli_fit_warn_many_values(const char *path, const sdm_volume *v, const char *mend,
+                                    sdm_error *err)
 {
     float *found = NULL;
     const sdm_status s = SDM_ALLOC(&found, MANY_VALUES, "labels", err);
-    if (!s && cli_fit_distinct(&f->image, MANY_VALUES, found) > MANY_VALUES)
-        cli_warn("%s holds over %d different values, or fractions: if it is an image, leave "
-                 "--label out",
-                 f->path, MANY_VALUES);
+    if (!s && cli_fit_distinct(v, MANY_VALUES, found) > MANY_VALUES)
+        cli_warn("%s holds over %d different values, or fractions: %s", path, MANY_VALUES, mend);
     sdm_free(found);
     return s;
 }
@@ -74,7 +72,9 @@ static sdm_status use_labels(cli_fit *f, sdm_error *err)
 {
     sdm_status s = SDM_ALLOC(&f->mask, sdm_grid_count(&f->image.grid), "labels", err);
     if (!s) s = cli_fit_label_mask(f->path, &f->image, &f->args->fit.labels, f->mask, err);
-    if (!s && !f->image.n_segments) s = warn_many_values(f, err);
+    if (!s && !f->image.n_segments)
+        s = cli_fit_warn_many_values(f->path, &f->image, "if it is an image, leave --label out",
+                                     err);
     if (!s) s = cli_fit_close_labels(f, &f->image.grid, f->mask, err);
     f->target.kind = SDM_FIT_LABEL;
     f->target.values = f->mask;

@@ -111,8 +111,26 @@ static size_t count_lines(const char *text)
     return n;
 }
 
+/* Refuses a parameter that both a column and -p give. */
+static sdm_status check_columns(const csv_table *t, const sdm_param *params, const cli_list *given,
+                                sdm_error *err)
+{
+    for (size_t i = 0; i < t->n_columns; i++) {
+        const char *name = params[t->column[i]].name;
+        const size_t length = strlen(name);
+        for (size_t k = 0; k < given->n; k++)
+            if (!strncmp(given->items[k], name, length) && given->items[k][length] == '=')
+                return sdm_fail(err, SDM_E_ARG,
+                                "%s: the column '%s' and -p %s both give this parameter: leave one "
+                                "of them out",
+                                t->path, name, given->items[k]);
+    }
+    return SDM_OK;
+}
+
 sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, const double *base,
-                         double **values, int **lines, size_t *n_rows, sdm_error *err)
+                         const cli_list *given, double **values, int **lines, size_t *n_rows,
+                         sdm_error *err)
 {
     if (n > MAX_COLUMNS)
         return sdm_fail(err, SDM_E_ARG, "%zu parameters, a table has at most %d", n, MAX_COLUMNS);
@@ -129,6 +147,7 @@ sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, co
     if (!s) s = SDM_ALLOC(values, total, "table of parameters", err);
     if (!s && lines) s = SDM_ALLOC(lines, count_lines(t.at), "table of parameters", err);
     if (!s) s = read_header(&t, params, n, err);
+    if (!s) s = check_columns(&t, params, given, err);
     // the rows
     *n_rows = 0;
     for (char *line; !s && (line = next_line(&t)); (*n_rows)++) {

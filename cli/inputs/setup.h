@@ -66,11 +66,13 @@ sdm_status cli_read_params(const sdm_param *params, size_t n, const cli_list *gi
                            sdm_error *err);
 
 /* Reads a CSV table of parameters: a header line of names, then a line of numbers for each row.
- * Parameters without a column have the values base[n]. *values[*n_rows][n] and, unless lines is
+ * Parameters without a column have the values base[n]; one with a column must not be in given, the
+ * texts of -p name=value. *values[*n_rows][n] and, unless lines is
  * NULL, *lines[*n_rows], the number of the line of each row, are freed with sdm_free(). SDM_E_ARG:
- * too many parameters; SDM_E_IO; SDM_E_FORMAT with file and line. */
+ * too many parameters, or one given twice; SDM_E_IO; SDM_E_FORMAT with file and line. */
 sdm_status cli_read_rows(const char *path, const sdm_param *params, size_t n, const double *base,
-                         double **values, int **lines, size_t *n_rows, sdm_error *err);
+                         const cli_list *given, double **values, int **lines, size_t *n_rows,
+                         sdm_error *err);
 
 /* SDM_E_RANGE with the name of the first parameter that is not finite or outside of its range. */
 sdm_status cli_check_range(const sdm_param *params, size_t n, const double *values, sdm_error *err);

@@ -74,6 +74,9 @@ static void read_options(cli_phantom *p)
     set_tissue(a->inside, &p->opts.inside);
     set_tissue(a->outside, &p->opts.outside);
     set_tissue(a->air, &p->opts.air);
+    const double contrast = fabs(p->opts.inside.mean - p->opts.outside.mean);
+    if (p->args->outputs.n && !(contrast > 0))
+        cli_warn("--inside and --outside have the same mean: the image does not show the shape");
     if (!isnan(a->air_cells[0])) {
         p->opts.air_share = a->air_cells[0];
         p->opts.air_mm = a->air_cells[1];

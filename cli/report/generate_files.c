@@ -11,6 +11,10 @@ static sdm_status add_name(const cli_args *args, const char *name, size_t row, c
                            const char **place, sdm_error *err)
 {
     char *numbered = f->text + f->list.n * SDM_PATH_TEXT_MAX;
+    if (!args->rows && cli_has_number(name))
+        return sdm_fail(err, SDM_E_ARG,
+                        "output '%.200s': %%d is the number of a row of --params, which is missing",
+                        name);
     const sdm_status s =
         args->rows ? cli_number_path(name, row, numbered, SDM_PATH_TEXT_MAX, err) : SDM_OK;
     f->list.items[f->list.n++] = args->rows ? numbered : name;

@@ -289,6 +289,14 @@ static size_t number_mark(const char *at, int *width)
     return digits + 2;
 }
 
+bool cli_has_number(const char *path)
+{
+    int width;
+    for (const char *mark = path; (mark = strchr(mark, '%')); mark++)
+        if (number_mark(mark, &width)) return true;
+    return false;
+}
+
 sdm_status cli_number_path(const char *path, size_t row, char *buf, size_t size, sdm_error *err)
 {
     int width = 4, written;

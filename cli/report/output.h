@@ -59,6 +59,9 @@ sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *a
 sdm_status cli_write_labels(const char *path, const sdm_grid *grid, const uint8_t *labels,
                             const char *name, const char *text, sdm_error *err);
 
+/* Whether a name has a place for a number: %d, %4d, %04d. */
+bool cli_has_number(const char *path);
+
 /* buf[size] = path with `row` in place of its %d (or %4d, %04d); without one, "-0001" is inserted
  * before the ending. SDM_E_ARG: the name is too long. */
 sdm_status cli_number_path(const char *path, size_t row, char *buf, size_t size, sdm_error *err);

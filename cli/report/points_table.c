@@ -32,8 +32,8 @@ static sdm_status add_column(cli_points_table *t, const char *word, size_t lengt
         return SDM_OK;
     }
     return sdm_fail(err, SDM_E_ARG,
-                    "--columns: unknown column '%.*s', known are distance, gradient, closest, "
-                    "triangle",
+                    "--columns: unknown column '%.*s', known are distance and gradient, with exact "
+                    "also closest and triangle",
                     (int)(length < 60 ? length : 60), word);
 }
 

@@ -212,7 +212,7 @@ static const sdm_field DATA[] = {
      .unit = "points",
      .help = "points of the static grid, a regular grid of parameters, along each parameter: one "
              "number for all or a list with one per parameter; 0: no static grid; auto: at most 5, "
-             "and at most 3,125 in the grid"},
+             "and at most 3,125 in the grid, with train.minutes at most 300 for each minute"},
     ROW("online", INT64, data.online, 0, 1e7, "4096", "shapes",
         "random shapes generated during training"),
     ROW("start", INT64, data.start, 0, 1e6, "3456", "shapes",
@@ -238,7 +238,8 @@ static const sdm_field DATA[] = {
 
 static const sdm_field TRAIN[] = {
     ROW("minutes", REAL, train.minutes, 0, 1e6, "0", "min",
-        "time budget, including data generation and evaluation; 0: not limited by time"),
+        "time budget, including data generation and evaluation (the maps of data.static and "
+        "data.holdout are made in any case); 0: not limited by time"),
     ROW("steps", INT64, train.steps, 0, 1e12, "0", "steps",
         "budget of optimiser steps; 0: not limited by steps"),
     ROW("samples", INT64, train.samples, 0, 1e15, "0", "samples",

@@ -2,6 +2,7 @@
  * ranges, options and the counts of the static grid. */
 #include "special.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -13,6 +14,8 @@
 // data.static: auto: points along a parameter, and points of the grid, at most
 #define STATIC_AUTO_MOST 5
 #define STATIC_AUTO_ALL 3125
+// with a budget of time, which the maps of the grid must leave for training
+#define STATIC_AUTO_A_MINUTE 300
 
 /* Reads [x, y, z] within min .. max and reports the mistakes in all three numbers. */
 static bool read_three(sdm_reader *r, const sdm_tree_node *node, const char *path, double min,
@@ -212,10 +215,13 @@ int64_t sdm_config_static_count(const sdm_config *c, size_t n_params, size_t i)
     if (!c->data.n_static_counts) return 0;
     const int64_t count = c->data.static_counts[c->data.n_static_counts == 1 ? 0 : i];
     if (count != SDM_STATIC_AUTO) return count;
+    const double minutes = c->train.minutes,
+                 limit = minutes > 0 ? fmin(STATIC_AUTO_ALL, STATIC_AUTO_A_MINUTE * minutes)
+                                     : STATIC_AUTO_ALL;
     for (int64_t most = STATIC_AUTO_MOST; most > 1; most--) {
-        int64_t all = 1;
-        for (size_t k = 0; k < n_params && all <= STATIC_AUTO_ALL; k++) all *= most;
-        if (all <= STATIC_AUTO_ALL) return most;
+        double all = 1;
+        for (size_t k = 0; k < n_params && all <= limit; k++) all *= (double)most;
+        if (all <= limit) return most;
     }
     return 0;
 }

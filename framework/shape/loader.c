@@ -114,8 +114,10 @@ static sdm_status object_load(sdm_registry *r, const char *path, sdm_error *err)
     void *object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!object) {
         const char *why = dlerror();
-        return sdm_fail(err, SDM_E_PLUGIN, "plug-in %s cannot be loaded: %s", path,
-                        why ? why : "unknown reason");
+        return sdm_fail(err, SDM_E_PLUGIN, "plug-in %s cannot be loaded: %s%s", path,
+                        why ? why : "unknown reason",
+                        why && strstr(why, "ELF") ? "; a plug-in is a compiled shared object (.so)"
+                                                  : "");
     }
     // call the entry function for all shapes of the file
     sdm_plugin_entry plugin_shape = NULL;

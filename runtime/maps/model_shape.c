@@ -138,7 +138,8 @@ sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r, sdm_i
     if (!shape)
         return sdm_fail(
             err, SDM_E_PLUGIN,
-            "the model was trained on shape '%s', which is not known here; load its plug-in",
+            "the model was trained on shape '%s', which is not known here: load its plug-in "
+            "(sdm_registry_load())",
             info->shape);
     model_options options = {0};
     sdm_instance *made = NULL;

@@ -111,7 +111,7 @@ plugin=../../plugins/good/octahedron.so
 if [ -e $plugin ]; then
     expect 0 - sdmgen train "$source_folder/tests/cli/tiny.yaml" shape.name=octahedron 'shape.ranges={radius: [1, 4]}' train.steps=2 --plugin $plugin --out away --quiet
     expect 0 - sdmgen generate away/model.sdm -o o.npy
-    expect 3 "^sdmgen: error: --check needs the exact shape: .*'octahedron', which is not known here; load its plug-in" \
+    expect 3 "^sdmgen: error: --check needs the exact shape: .*'octahedron', which is not known here: load its plug-in \(--plugin FILE\)" \
         sdmgen generate away/model.sdm --check
     expect 3 '^sdmgen: error: --max-error needs the exact shape: ' sdmgen generate away/model.sdm --max-error 1 -o never.npy
     expect 0 - sdmgen generate away/model.sdm --check --plugin $plugin

@@ -8,7 +8,7 @@ printf 'x,y,z\n3,0,0\n0,2,0\n0,0,2\n-3,0,0\n' >points.csv
 sdmgen mesh $shape -o mesh.ply --quiet >out
 
 targets=('image.nii' 'image.nii --image-model labels' 'labels.nii --label 1' 'labels.nii --label 1 --image-model labels' 'points.csv' 'mesh.ply')
-declare -A value=([--region]=-9,-9,-9,9,9,9 [--margin]=1 [--least-inside]=0.5 [--image-model labels]= [--inside]=40,170 [--outside]=1300,270
+declare -A value=([--region]=-9,-9,-9,9,9,9 [--margin]=1.2 [--least-inside]=0.5 [--image-model labels]= [--inside]=40,170 [--outside]=1300,270
     [--air]=-880,150 [--cavity]=3 [--tissue-places]=1 [--blur]=0.4 [--keep blur]= [--l-ref]=0.2 [--keep appearance]= [--point-sd]=0.1
     [--beside]=0.5 [--find]=)
 
@@ -78,5 +78,9 @@ expect 4 'points.csv: [0-4] points on the surface cannot determine [6-9] unknown
 # options have the names of the command line
 sdmgen fit $shape image.nii --rotation 0,0,0 --spacing 0.8 --max-iterations 1 --quiet >out 2>err
 grep -q -- '(--max-iterations)' err || bad "no option in: $(cat err)"
+# a reference that is no label map, and a margin that shows nothing beside the surface
+sdmgen fit $shape image.nii --rotation 0,0,0 --spacing 0.8 --max-iterations 1 --quiet --reference image.nii --margin 0.1 >out 2>err
+grep -q 'warning: image.nii holds over [0-9]* different values, or fractions: --reference needs labels' err || bad "an image as reference: $(cat err)"
+grep -q 'warning: --margin 0.1 mm is less than 1.5 voxels of' err || bad "a small margin: $(cat err)"
 grep -qE 'sdm_fit_(opts|source)' out err && bad "names of C: $(cat out err)"
 finish

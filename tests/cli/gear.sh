@@ -23,8 +23,8 @@ expect 0 - sdmgen train "$config" "${small[@]}" --plugin $plugin --out run --qui
 expect 0 - sdmgen generate run/model.sdm -p angle=0.1 -o map.npy
 present map.npy
 # measures are those of the shape itself
-expect 3 "^sdmgen: error: --measure needs the exact shape: .*'gear', which is not known here; load its plug-in" sdmgen generate run/model.sdm --measure
-expect 3 "^sdmgen: error: --measure needs the exact shape: .*'gear', which is not known here; load its plug-in" sdmgen fit run/model.sdm map.npy --measure
+expect 3 "^sdmgen: error: --measure needs the exact shape: .*'gear', which is not known here: load its plug-in \(--plugin FILE\)" sdmgen generate run/model.sdm --measure
+expect 3 "^sdmgen: error: --measure needs the exact shape: .*'gear', which is not known here: load its plug-in \(--plugin FILE\)" sdmgen fit run/model.sdm map.npy --measure
 expect 0 - sdmgen generate run/model.sdm -p angle=0.1 --measure --plugin $plugin
 has '^  volume +[0-9.]+ mm\^3$'
 expect 0 - sdmgen eval run/model.sdm --samples 2 --naive 0 --json --quiet --plugin $plugin

@@ -75,6 +75,8 @@ printf 'a\n3\nnan\n' >nan.csv
 expect 5 'nan\.csv:3: row 2: ' sdmgen generate $model --params nan.csv --policy clamp -o 'n%d.npy'
 absent n1.npy n2.npy
 expect 2 'given twice' sdmgen generate $model --params rows.csv -o 'same%d.npy' -o 'same%d.npy'
+expect 2 "the column 'a' and -p a=3 both give this parameter" sdmgen generate $model --params rows.csv -p a=3 -o 'x%d.npy'
+expect 2 "output 'x%d.npy': %d is the number of a row of --params" sdmgen generate $model -o 'x%d.npy'
 absent same1.npy
 printf '\357\273\277a,b\r\n3,0.1\r\n' >bom.csv
 expect 0 - sdmgen generate $model --params bom.csv -o 'bom%d.npy' --quiet

@@ -32,7 +32,7 @@ quiet_tissue='--inside 40,0 --outside 1300,0 --noise 0'
 expect 0 - sdmgen phantom $small --size 21,21,21 $quiet_tissue -o flat.npy
 near "$(values flat.npy | sed -n 4631p)" 40 0.01
 near "$(values flat.npy | sed -n 1p)" 1300 0.01
-expect 0 - sdmgen phantom $small --size 21,21,21 --inside 7,0 --outside 7,0 --noise 50 --white-noise -o noise.npy
+expect 0 'have the same mean' sdmgen phantom $small --size 21,21,21 --inside 7,0 --outside 7,0 --noise 50 --white-noise -o noise.npy
 values noise.npy | awk '{ n++; s += $1; q += ($1 - 7) ^ 2 } END { m = s / n - 7; v = sqrt(q / n); exit !(m < 3 && m > -3 && v > 48 && v < 52) }' ||
     bad 'white noise of 50 HU'
 
@@ -127,6 +127,9 @@ done
 expect 0 'the surface leaves the grid' sdmgen phantom --shape ellipsoid --like frame.nrrd --translation 3,0,0 -o far.nrrd
 expect 2 'like and --frame exclude each other' sdmgen phantom --shape ellipsoid --like frame.nrrd --frame 0,0,1 -o x.nii
 expect 2 'like and --crop exclude each other' sdmgen phantom --shape ellipsoid --like frame.nrrd --crop 0,0,0.5 -o x.nii
+# Images that show hardly any shape, or none.
+expect 0 'warning: only [0-9]+ voxels are inside the shape' sdmgen phantom --shape ellipsoid --spacing 2 -o few.nii -q
+expect 0 'warning: --inside and --outside have the same mean' sdmgen phantom --shape ellipsoid --spacing 1 --inside 9,1 --outside 9,2 -o none.nii -q
 # Work of long duration stops on SIGTERM.
 # --foreground: without it timeout sends the signal twice, and a second one stops the program at once, without a message
 expect 130 'stopped on request|interrupted' timeout --foreground --preserve-status -s TERM 1 "$program" phantom --shape ellipsoid --spacing 0.03 --supersample 16 -o x.nii

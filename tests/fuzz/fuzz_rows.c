@@ -13,8 +13,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     int *lines = NULL;
     size_t n = 0;
     sdm_error err = {0};
-    const sdm_status s = cli_read_rows(fuzz_file("fuzz.csv", data, size), params, 3, base, &values,
-                                       &lines, &n, &err);
+    const sdm_status s = cli_read_rows(fuzz_file("fuzz.csv", data, size), params, 3, base,
+                                       &(cli_list){0}, &values, &lines, &n, &err);
     fuzz_check_status(s, &err);
     fuzz_require((s == SDM_OK) == (values != NULL && n > 0));
     for (size_t i = 0; !s && i < n; i++) fuzz_require(lines[i] > (i ? lines[i - 1] : 0));

@@ -48,8 +48,7 @@ static sdm_verdict figures(void)
 static sdm_verdict decide(const char *override, sdm_cause cause, double fall, double modes_mm2)
 {
     const sdm_config c = config_of(&override, override ? 1 : 0);
-    const verdict_input in = {
-        .config = &c, .maps = 200, .steps = 1500, .asked = true, .budget = 1000};
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .budget = 1000};
     sdm_verdict v = figures();
     v.part_mm2[SDM_CAUSE_BASES] = v.part_mm2[SDM_CAUSE_NETWORK] = v.part_mm2[SDM_CAUSE_MAPS] = 1e-5;
     v.part_mm2[cause] = 8e-5;
@@ -83,7 +82,7 @@ static void largest_part_limits(void **state)
         {"data.memory_gb=0.005", SDM_CAUSE_MAPS, 0, 0, "to 400 and data.memory_gb to 1;"},
         {NULL, SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f16"},
         {"network.weights=f16", SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f32"},
-        {NULL, SDM_CAUSE_FAR, 0, 0, "set network.kind to auto, which trains pod, too"},
+        {NULL, SDM_CAUSE_FAR, 0, 0, "set network.kind to pod, which may be worse near the surface"},
         {NULL, SDM_CAUSE_TEMPLATE, 0, 0,
          "lower grid.spacing from 0.8 to 0.4 (and double grid.size, if it is given)"},
     };
@@ -125,18 +124,19 @@ static void length_of_the_training(void **state)
     assert_true(v.from == 1500 && v.to == 3000);
 }
 
-// After `auto` the other kind is a choice, not a remedy. An error of less than a voxel, or near the
+// The other kind is a choice, not a remedy. An error of less than a voxel, or near the
 // surface, is not told with the grade.
 static void error_far_from_the_surface(void **state)
 {
     (void)state;
     const sdm_config c = config_of(NULL, 0);
-    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .asked = false};
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500};
     sdm_verdict v = figures();
     v.part_mm2[SDM_CAUSE_TEMPLATE] = 1e-5, v.part_mm2[SDM_CAUSE_FAR] = 3e-5;
     trainer_verdict_decide(&in, &v);
     assert_int_equal(v.limit, SDM_CAUSE_FAR);
-    assert_true(!v.key[0] && strstr(v.sentence, "set network.kind to pod; a finer grid does not"));
+    assert_true(!v.key[0] &&
+                strstr(v.sentence, "set network.kind to pod, which may be worse near"));
     assert_non_null(strstr(v.sentence, "75 %"));
     v.near_mm = 1.6, v.largest_mm = 0.9, v.largest_at_mm = -5;
     assert_true(sdm_verdict_errs_far(&v));
@@ -201,8 +201,7 @@ static void inside_out_is_the_cause(void **state)
 {
     (void)state;
     const sdm_config c = config_of(NULL, 0);
-    const verdict_input in = {
-        .config = &c, .maps = 200, .steps = 1500, .asked = true, .budget = 1000};
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .budget = 1000};
     for (int good = 0; good < 2; good++) {
         sdm_verdict v = figures();
         v.inside_out = 1;

@@ -154,20 +154,17 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
 static void write_sentence(const verdict_input *in, const char *what, sdm_verdict *v)
 {
     const sdm_config *c = in->config;
-    char change[160] = "", also[96] = "", time[64] = "", result[96] = "", share[96] = "";
+    char change[200] = "", also[96] = "", time[64] = "", result[96] = "", share[96] = "";
     if (v->key[0])
         snprintf(change, sizeof change, ": %s %s from %.6g to %.6g",
                  v->to < v->from ? "lower" : "raise", v->key, v->from, v->to);
     if (v->limit == SDM_CAUSE_ROUNDING)
         snprintf(change, sizeof change, ": set network.weights to %s",
                  c->network.weights == SDM_WEIGHT_I8 ? "f16" : "f32");
-    // a run of `auto` has compared the kinds, or found pod far worse
     if (v->limit == SDM_CAUSE_FAR)
-        snprintf(change, sizeof change, "%s",
-                 in->asked ? ": set network.kind to auto, which trains pod, too, and keeps the "
-                             "better one"
-                           : ": where such distances matter, set network.kind to pod; a finer grid "
-                             "does not change them");
+        snprintf(change, sizeof change,
+                 ": where such distances matter, set network.kind to pod, which may be worse near "
+                 "the surface; a finer grid does not change them");
     if (!strcmp(v->key, "grid.spacing"))
         snprintf(also, sizeof also, " (and double grid.size, if it is given)");
     // with `auto`, a value that is the default of `auto` would become that of the kind
@@ -327,7 +324,6 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
         .cut = trainer_by_time(t) && !d->only_holdout &&
                (int64_t)d->n_start<t->config->data.start, .ended_early = t->saved_seconds> 0,
         .steps = (double)t->step,
-        .asked = !t->turns->chosen,
         .budget = t->turns->budget};
     trainer_verdict_decide(&in, out);
     trainer_history_dispose(&h);

@@ -27,7 +27,6 @@ typedef struct verdict_input {
     bool cut;         /* the time of the budget ended before all maps of data.start were made */
     bool ended_early; /* by train.patience */
     double steps;     /* of the optimiser */
-    bool asked;       /* the configuration gives the kind, `auto` has not chosen it */
     double budget;    /* of the run, in the unit of the key that gives it; with `auto` this training
                          may have had a part of it */
 } verdict_input;

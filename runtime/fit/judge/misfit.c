@@ -6,8 +6,8 @@
 
 #include "fit/data/step_phase.h"
 #include "noise.h"
-#include "sdm/internal/vec3.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/vec3.h"
 
 // members of a unit between which correlations are computed; of more, every second, third ... one
 #define MEMBERS_MAX 64
@@ -184,7 +184,8 @@ static sdm_status points_correlation(const fit_problem *p, const fit_residuals *
         }
     }
     const double sd = count ? sdm_fit_robust_sd(list, count, 0) : 0, all = r->n ? r->sd[0] : 0;
-    *correlation = count >= SCATTER_MIN && all > 0 ? fmin(fmax(1 - sd * sd / (all * all), 0), 1) : 1;
+    *correlation =
+        count >= SCATTER_MIN && all > 0 ? fmin(fmax(1 - sd * sd / (all * all), 0), 1) : 1;
     sdm_free(list);
     return s;
 }
@@ -267,9 +268,9 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
         out->noise_chi_square += u.mean * u.mean / u.noise;
         if (points) {
             const double one = 1 / (double)(to - from), sd = r->sd[0], maps = r->map_error[0];
-            out->scatter_chi_square +=
-                u.mean * u.mean / (sd * sd * (one + (1 - one) * correlation) + maps * maps +
-                                   POINTS_SD_MIN * POINTS_SD_MIN);
+            out->scatter_chi_square += u.mean * u.mean /
+                                       (sd * sd * (one + (1 - one) * correlation) + maps * maps +
+                                        POINTS_SD_MIN * POINTS_SD_MIN);
         }
         if (z2 > BEYOND * BEYOND)
             *(u.mean < 0 ? &out->empty : &out->missing) +=

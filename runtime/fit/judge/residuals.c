@@ -359,7 +359,8 @@ void sdm_fit_residuals_use_feet(const fit_problem *p, fit_residuals *r)
         sdm_fit_to_shape(&p->state, p->samples.world + 3 * i, y);
         const double distance = sdm_fit_interpolate_all(&map, y, gradient, NULL),
                      square = v3_dot(gradient, gradient);
-        for (int a = 0; a < 3 && square > GRADIENT_MIN; a++) y[a] -= distance * gradient[a] / square;
+        for (int a = 0; a < 3 && square > GRADIENT_MIN; a++)
+            y[a] -= distance * gradient[a] / square;
         sdm_fit_to_world(&p->state, y, foot);
         set_place(r, i, foot, radius);
     }

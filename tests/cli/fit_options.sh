@@ -79,8 +79,9 @@ expect 4 'points.csv: [0-4] points on the surface cannot determine [6-9] unknown
 sdmgen fit $shape image.nii --rotation 0,0,0 --spacing 0.8 --max-iterations 1 --quiet >out 2>err
 grep -q -- '(--max-iterations)' err || bad "no option in: $(cat err)"
 # a reference that is no label map, and a margin that shows nothing beside the surface
-sdmgen fit $shape image.nii --rotation 0,0,0 --spacing 0.8 --max-iterations 1 --quiet --reference image.nii --margin 0.1 >out 2>err
-grep -q 'warning: image.nii holds over [0-9]* different values, or fractions: --reference needs labels' err || bad "an image as reference: $(cat err)"
+expect 0 - sdmgen exact $shape --spacing 0.4 -o map.nii --quiet
+sdmgen fit $shape image.nii --rotation 0,0,0 --spacing 0.8 --max-iterations 1 --quiet --reference map.nii --margin 0.1 >out 2>err
+grep -q 'warning: map.nii holds over [0-9]* different values, or fractions: --reference needs labels' err || bad "an image as reference: $(cat err)"
 grep -q 'warning: --margin 0.1 mm is less than 1.5 voxels of' err || bad "a small margin: $(cat err)"
 grep -qE 'sdm_fit_(opts|source)' out err && bad "names of C: $(cat out err)"
 finish

@@ -256,21 +256,14 @@ static void warn_torn(const job *j)
         cli_warn_torn_blocks("", &j->blocks, mend);
 }
 
-static bool writes_level_set(const job *j)
-{
-    for (size_t i = 0; i < j->args->outputs.n; i++)
-        if (cli_ends_with(j->args->outputs.items[i], ".vdb")) return true;
-    return false;
-}
-
 static void notice_mesh(const job *j)
 {
     const sdm_audit *a = &j->report.audit;
     int64_t inside = 1; // a level set without voxels inside is refused when it is written
     float min, max;
     if (j->values) find_range(j, &min, &max, &inside);
-    if (!inside && !writes_level_set(j))
-        cli_warn("no voxel of the grid is inside the surface: does the grid cover the shape?");
+    if (!inside)
+        cli_notice("no voxel of the grid is inside the surface: does the grid cover the shape?");
     if (j->report.turned) cli_notice("the mesh was inside out; its orientation has been reversed");
     if (j->report.parts_turned)
         cli_notice("%zu parts were inside out; their orientation has been reversed",

@@ -359,7 +359,8 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     const double robust = s ? 0 : sdm_fit_residual_correlation(&residuals);
     *factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
     if (sdm_fit_is_image(p)) r->evidence = evidence_of(p, r, *factor);
-    const fit_coarseness coarse = sdm_fit_coarseness(p, sdm_fit_is_image(p) ? r->blur : 0);
+    fit_coarseness coarse = sdm_fit_coarseness(p, sdm_fit_is_image(p) ? r->blur : 0);
+    if (!r->converged) coarse.blind = false; // the shape may be small on its way
     fit_at_bounds bounds = sdm_fit_at_bounds(p, r, *factor);
     const bool points = p->target->kind == SDM_FIT_POINTS, labels = !points && !sdm_fit_is_image(p);
     if (!s && labels) s = sdm_fit_measure_beyond(p, r, &bounds, err);

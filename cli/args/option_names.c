@@ -15,8 +15,8 @@ static size_t structure_length(const char *at)
                : 0;
 }
 
-/* Names of the C interface, and options of the command line in their place, which are not longer.
- */
+/* Each name of the C interface, and the option that replaces it in messages of the program. The
+ * option must not be longer than the name, because the text is changed in place. */
 static const char *const NAMES[][2] = {{"sdm_fit_source.grid", "--exact --spacing"},
                                        {"sdm_registry_load()", "--plugin FILE"}};
 

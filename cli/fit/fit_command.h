@@ -138,7 +138,8 @@ sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_l
  * there are more than `most` or one is no whole number. NaN does not count. */
 size_t cli_fit_distinct(const sdm_volume *v, size_t most, float *found);
 
-/* Warns of labels that look like an image; mend: what to do. */
+/* Prints a warning if the file `path`, read as v, has more different values than labels have, or
+ * fractions. mend: the end of the warning, what to do. SDM_E_NOMEM. */
 sdm_status cli_fit_warn_many_values(const char *path, const sdm_volume *v, const char *mend,
                                     sdm_error *err);
 

@@ -289,20 +289,26 @@ static size_t number_mark(const char *at, int *width)
     return digits + 2;
 }
 
+/* The first placeholder of a name, its length and its field width; NULL: there is none. */
+static const char *find_mark(const char *path, size_t *length, int *width)
+{
+    const char *mark = path;
+    while ((mark = strchr(mark, '%')) && !(*length = number_mark(mark, width))) mark++;
+    return mark;
+}
+
 bool cli_has_number(const char *path)
 {
+    size_t length;
     int width;
-    for (const char *mark = path; (mark = strchr(mark, '%')); mark++)
-        if (number_mark(mark, &width)) return true;
-    return false;
+    return find_mark(path, &length, &width) != NULL;
 }
 
 sdm_status cli_number_path(const char *path, size_t row, char *buf, size_t size, sdm_error *err)
 {
     int width = 4, written;
-    const char *mark = path, *suffix = path + strlen(path);
     size_t length = 0;
-    while ((mark = strchr(mark, '%')) && !(length = number_mark(mark, &width))) mark++;
+    const char *mark = find_mark(path, &length, &width), *suffix = path + strlen(path);
     if (mark)
         written =
             snprintf(buf, size, "%.*s%0*zu%s", (int)(mark - path), path, width, row, mark + length);

@@ -8,7 +8,8 @@
 
 #include "sdm/shape.h"
 
-/* *r, *z = radius and height of ring i of a shape at p */
+/* A ring of vertices around the z axis: *r = radius and *z = height (mm) of ring i, where the shape
+ * has the parameters p. */
 typedef void revolved_ring(const double *p, int i, double *r, double *z);
 
 /* mesh() of a shape: n_rings rings of `around` vertices, from the first, next to the vertex (0, 0,

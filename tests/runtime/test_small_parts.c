@@ -136,8 +136,8 @@ static void test_within_the_range_passes(void **state)
         if (fit_knob(4.5, image, 0, 0, &r, &err)) fail_msg("image %d: %s", image, err.text);
         assert_int_equal(finding(&r, SDM_FIT_CHECK_MISSING)->grade, SDM_FIT_PASSED);
         assert_int_equal(finding(&r, SDM_FIT_CHECK_EMPTY)->grade, SDM_FIT_PASSED);
-        // a ball of few triangles lies within the sphere through its vertices: the fit finds a
-        // larger radius, by up to a fiftieth
+        // the triangles of the mesh lie within the sphere through their vertices, so the radius
+        // that the fit finds is too large, by up to 2 %
         if (!(fabs(r.params[LENGTH] - 4.5) < 0.3 && fabs(r.params[RADIUS] - 5) < 0.1))
             fail_msg("image %d: length %g, radius %g", image, r.params[LENGTH], r.params[RADIUS]);
         sdm_fit_dispose(&r);

@@ -241,8 +241,8 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
             sdm_fit_is_image(p) ? "sdm_fit_opts.beside" : "sdm_fit_opts.tolerance");
 }
 
-// Labels that contradict the shape away from its surface, where the volumes that they stand for
-// pass the checks "empty" and "missing".
+// Doubts a fit to labels whose checks "empty" and "missing" pass, although some voxels far from the
+// surface contradict the shape.
 static void check_far_labels(const fit_problem *p, const fit_misfit *m, sdm_fit_verdict *v)
 {
     if (p->opts->tolerance > 0) return;

@@ -164,9 +164,9 @@ static size_t nearest(const fit_problem *p, const member *m, size_t n, size_t k)
     return found;
 }
 
-/* *correlation = of the distances of neighbouring points from the surface, after the means of the
- * units: 1 less the variance of half their differences over the variance of all. Points farther
- * apart have no larger one. Robust, so that units beside another shape do not count. */
+/* *correlation = that of the errors of two neighbouring points of a unit: 1 less (half the variance
+ * of the difference of nearest neighbours) / (variance of the points about the means of their
+ * units). Both variances are robust, so that a few units on another shape do not change them. */
 static sdm_status points_correlation(const fit_problem *p, const fit_residuals *r, const member *m,
                                      size_t n, double *correlation, sdm_error *err)
 {
@@ -253,7 +253,7 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
     const double least = labels ? fmax(LABEL_ERROR / r->edge[0], MEAN_SD_MIN) : MEAN_SD_MIN;
     const double factor = points ? points_volume_factor(p) : 1;
     double correlation = 1;
-    if (!s && points) s = points_correlation(p, r, m, n, &correlation, err);
+    if (!s && r->at_feet) s = points_correlation(p, r, m, n, &correlation, err);
     correlation = fmin(correlation + CORRELATION_ERROR, 1);
     if (labels) out->beyond = label_beyond(p), out->missing = out->beyond / volume;
     for (size_t from = 0, to; from < n && !s; from = to) {
@@ -266,7 +266,7 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
         out->n_units[side]++;
         out->chi_square[side] += z2;
         out->noise_chi_square += u.mean * u.mean / u.noise;
-        if (points) {
+        if (r->at_feet) {
             const double one = 1 / (double)(to - from), sd = r->sd[0], maps = r->map_error[0];
             out->scatter_chi_square += u.mean * u.mean /
                                        (sd * sd * (one + (1 - one) * correlation) + maps * maps +

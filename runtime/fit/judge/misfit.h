@@ -19,9 +19,9 @@ typedef struct fit_misfit {
     double chi_square[2];
     /* the same on both sides together, with the variance of the noise alone */
     double noise_chi_square;
-    /* points: the same, if they share no more of their errors than nearest neighbours do. (The
-       chi_square takes the points of a unit to share all of them, as those of a segmentation
-       may.) */
+    /* points at their feet, else 0: the same, if they share no more of their errors than nearest
+       neighbours do. (The chi_square takes the points of a unit to share all of them, as those of a
+       segmentation may.) */
     double scatter_chi_square;
     /* largest chi_square that noise alone exceeds once in a thousand fits, with the uncertainty of
        the noise itself; the units count as correlated with their neighbours as the noise is */

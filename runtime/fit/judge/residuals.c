@@ -364,6 +364,7 @@ void sdm_fit_residuals_use_feet(const fit_problem *p, fit_residuals *r)
         sdm_fit_to_world(&p->state, y, foot);
         set_place(r, i, foot, radius);
     }
+    r->at_feet = true;
 }
 
 sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sdm_error *err)

@@ -34,6 +34,8 @@ typedef struct fit_residuals {
     /* [n][3] place of the sample, in steps of the image (points: in halves of the largest radius)
      */
     int32_t *place;
+    /* points: place[] is that of the feet (sdm_fit_residuals_use_feet()) */
+    bool at_feet;
     /* edge of the cubes in which residuals are averaged, in steps along each axis, >= 1 */
     int32_t edge[3];
     /* correlation of the noise of voxels that lie so many steps apart along each axis */
@@ -50,9 +52,9 @@ typedef struct fit_residuals {
  * after an error. */
 sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sdm_error *err);
 
-/* Points: moves place[] from the points to the places on the surface to which they belong, to first
-   order (the point less its distance along the gradient). By their own places, points with errors
-   as large as the edge of a cube are parted into those inside and those outside. */
+/* Points: place[] becomes the place of the foot of each point: the nearest place on the surface, to
+   first order (the point less its distance along the gradient). Errors as large as the edge of a
+   cube would otherwise sort the points inside and outside of the surface into different cubes. */
 void sdm_fit_residuals_use_feet(const fit_problem *p, fit_residuals *r);
 
 /* Number of correlated voxels that carry as much information as one independent one: the product

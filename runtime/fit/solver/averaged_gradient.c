@@ -27,9 +27,9 @@ static void add_motion(motions *m, double x)
     m->fourths += x * x * x * x;
 }
 
-// How far the part of the surface moves that moves at all: the root mean square of the motions,
-// each counted by its square. A plain root mean square over the whole surface is small where that
-// part is small, and the half width would be too wide
+// How far the moving part of the surface moves: sqrt(sum of m^4 / sum of m^2) over the motions m.
+// The root mean square of m over the whole surface would be small where only a small part moves,
+// and the derivative would be averaged over too wide an interval
 static double typical_motion(const motions *m)
 {
     return m->squares > 0 ? sqrt(m->fourths / m->squares) : 0;

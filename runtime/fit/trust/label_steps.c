@@ -14,9 +14,10 @@ enum { MARGIN = 4 };
 
 /* A piece of the surface between two layers of voxels. */
 typedef struct piece {
-    fit_step_phase phase; /* places of its samples along the axis; a sample counts by its
-                             information about the place */
-    double *score;        /* [n_unknowns] the score caused by an error of 1 mm of the place */
+    /* sums over the samples of the piece; the weight of a sample is its information about the
+       place of the surface */
+    fit_step_phase phase;
+    double *score; /* [n_unknowns] the score caused by an error of 1 mm of the place */
 } piece;
 
 /* Where the surface next to sample i lies: *axis of the image along which it is nearly parallel to

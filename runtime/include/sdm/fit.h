@@ -351,7 +351,7 @@ typedef struct sdm_fit_finding {
     sdm_fit_grade grade;
     /* the figure, and the limit that separates passed from the rest; NaN: none */
     double figure, limit;
-    /* why it did not pass, or why it has no figure; else empty */
+    /* why the check did not pass, or why it has no figure; empty: it passed with a figure */
     char text[320];
 } sdm_fit_finding;
 

@@ -74,6 +74,7 @@ static bool promised(const char *name, int level)
 #if defined(__x86_64__)
     return level == SDM_PROCESSOR_BASELINE;
 #else
+    (void)level;
     return false;
 #endif
 }

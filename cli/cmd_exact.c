@@ -256,14 +256,23 @@ static void warn_torn(const job *j)
         cli_warn_torn_blocks("", &j->blocks, mend);
 }
 
+/* A warning, or a notice for grids of one voxel along an axis: probes and slices may miss. */
+static void tell_nothing_inside(const sdm_grid *g)
+{
+    static const char *const text =
+        "no voxel of the grid is inside the surface: does the grid cover the shape?";
+    if (g->n[0] > 1 && g->n[1] > 1 && g->n[2] > 1)
+        cli_warn("%s", text);
+    else
+        cli_notice("%s", text);
+}
+
 static void notice_mesh(const job *j)
 {
     const sdm_audit *a = &j->report.audit;
     int64_t inside = 1; // a level set without voxels inside is refused when it is written
     float min, max;
     if (j->values) find_range(j, &min, &max, &inside);
-    if (!inside)
-        cli_notice("no voxel of the grid is inside the surface: does the grid cover the shape?");
     if (j->report.turned) cli_notice("the mesh was inside out; its orientation has been reversed");
     if (j->report.parts_turned)
         cli_notice("%zu parts were inside out; their orientation has been reversed",
@@ -283,7 +292,9 @@ static void notice_mesh(const job *j)
                              j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
     else
         cli_warn_audit(a);
+    // a part that is too thin, told above, is the cause of both
     if (!thin && inside) warn_torn(j);
+    if (!thin && !inside) tell_nothing_inside(&j->grid);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
                    "triangles (error at most %.2g mm)",

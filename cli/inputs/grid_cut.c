@@ -11,13 +11,13 @@
 
 /* beyond[axis][side]: how far the shape reaches beyond the first and the last voxel, mm; least:
  * these are lower bounds. */
-static void warn(const char *where, double beyond[3][2], bool least, const char *mend)
+static void warn(const char *where, const sdm_grid *g, double beyond[3][2], bool least, const char *mend)
 {
     char faces[240] = "";
     for (int a = 0; a < 3; a++)
         for (int side = 0; side < 2; side++) {
             const size_t used = strlen(faces);
-            if (beyond[a][side] > 0)
+            if (beyond[a][side] > 0 && g->n[a] > 1) // a slice cuts every shape
                 snprintf(faces + used, sizeof faces - used, "%s%c%c (%s%.2g mm)", used ? ", " : "",
                          side ? '+' : '-', "xyz"[a], least ? "at least " : "", beyond[a][side]);
         }
@@ -30,7 +30,7 @@ void cli_warn_cut_shape(const sdm_grid *g, const double *vertex, size_t n, const
 {
     double beyond[3][2] = {{0}};
     for (size_t v = 0; v < n; v++) sdm_grid_beyond(g, vertex + 3 * v, beyond);
-    warn("", beyond, false, mend);
+    warn("", g, beyond, false, mend);
 }
 
 void cli_warn_cut_map(const char *where, const sdm_grid *g, const float *values, const char *mend)
@@ -48,7 +48,7 @@ void cli_warn_cut_map(const char *where, const sdm_grid *g, const float *values,
                     beyond[a][side] = fmax(beyond[a][side], -d);
                 }
         }
-    warn(where, beyond, true, mend);
+    warn(where, g, beyond, true, mend);
 }
 
 /* a torn place is told from this share of the voxels on the surface on, and from this number; fewer

@@ -60,21 +60,54 @@ static sdm_status check_outputs(const cli_args *args, sdm_error *err)
     return cli_check_files(args, NULL, err);
 }
 
+/* An option that does not apply to points. */
+typedef struct map_option {
+    const char *name;
+    bool given;
+    const char *remedy; /* the end of the message */
+} map_option;
+
+#define USE_COLUMNS "; --columns chooses the values at points"
+
+/* SDM_E_ARG if one of options[n], or an option of the grid, is given. */
+static sdm_status refuse_map_options(const char *command, const cli_args *args,
+                                     const map_option *options, size_t n, sdm_error *err)
+{
+    const map_option grid[] = {{"--size", args->size[0] > 0, ""},
+                               {"--spacing", args->spacing[0] > 0, ""},
+                               {"--origin", !isnan(args->origin[0]), ""},
+                               {"--like", args->like && true, ""}};
+    const size_t n_grid = sizeof grid / sizeof *grid;
+    for (size_t i = 0; i < n_grid + n; i++) {
+        const map_option *o = i < n_grid ? &grid[i] : &options[i - n_grid];
+        if (o->given)
+            return sdm_fail(err, SDM_E_ARG, "%s --points: %s is an option of maps%s", command,
+                            o->name, o->remedy);
+    }
+    return SDM_OK;
+}
+
 sdm_status cli_points_check(const cli_args *args, cli_points_table *t, sdm_error *err)
 {
     const sdm_status s = read_columns(args, t, err);
     if (s) return s;
     if (args->outputs.n == 0)
         return sdm_fail(err, SDM_E_ARG, "exact --points: an output is needed: -o FILE.csv or .npy");
-    if (strcmp(args->method, "exact") || args->certify || args->narrow > 0 || args->json ||
-        args->closest || args->normal || args->triangle || args->jacobian || args->size[0] > 0 ||
-        args->spacing[0] > 0 || !isnan(args->origin[0]) || args->like)
-        return sdm_fail(
-            err, SDM_E_ARG,
-            "exact --points: options of maps (--size, --spacing, --origin, --like, --method, "
-            "--narrow, --certify, --json, --closest, --normal, --triangle, --jacobian) "
-            "do not apply; use --columns");
-    return check_outputs(args, err);
+    const map_option options[] = {
+        {"--jacobian",
+         args->jacobian && true,
+         "; the derivatives of a network at points: `sdmgen generate MODEL --points FILE "
+         "--jacobian FILE.npy`"},
+        {"--method", strcmp(args->method, "exact") != 0, ""},
+        {"--certify", args->certify, ""},
+        {"--narrow", args->narrow > 0, ""},
+        {"--json", args->json, ""},
+        {"--closest", args->closest && true, USE_COLUMNS},
+        {"--normal", args->normal && true, "; --columns gradient is the normal"},
+        {"--triangle", args->triangle && true, USE_COLUMNS}};
+    const sdm_status other =
+        refuse_map_options("exact", args, options, sizeof options / sizeof *options, err);
+    return other ? other : check_outputs(args, err);
 }
 
 static bool has_column(const cli_points_table *t, int kind)
@@ -94,14 +127,15 @@ sdm_status cli_points_check_model(const cli_args *args, cli_points_table *t, sdm
     if (args->outputs.n == 0 && !args->jacobian)
         return sdm_fail(err, SDM_E_ARG,
                         "generate --points: an output is needed: -o FILE.csv or .npy, --jacobian");
-    if (args->rows || args->check || args->max_error > 0 || args->gradient || args->json ||
-        args->size[0] > 0 || args->spacing[0] > 0 || !isnan(args->origin[0]) ||
-        !isnan(args->direction[0]) || args->like)
-        return sdm_fail(
-            err, SDM_E_ARG,
-            "generate --points: options of maps (--size, --spacing, --origin, "
-            "--direction, --like, --params, --check, --max-error, --gradient, --json) do not "
-            "apply; use --columns");
+    const map_option options[] = {{"--params", args->rows && true, ""},
+                                  {"--check", args->check, ""},
+                                  {"--max-error", args->max_error > 0, ""},
+                                  {"--gradient", args->gradient && true, USE_COLUMNS},
+                                  {"--json", args->json, ""},
+                                  {"--direction", !isnan(args->direction[0]), ""}};
+    const sdm_status other =
+        refuse_map_options("generate", args, options, sizeof options / sizeof *options, err);
+    if (other) return other;
     if (args->jacobian && !cli_ends_with(args->jacobian, ".npy"))
         return sdm_fail(err, SDM_E_ARG, "--jacobian '%s': its name must end in .npy",
                         args->jacobian);

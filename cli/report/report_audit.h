@@ -56,7 +56,7 @@ sdm_status cli_turn_parts(sdm_mesh *mesh, sdm_error *err);
 /* What is said of a part that is too thin. printf(): its thickness, the voxel, the spacing that
  * shows it, mm */
 #define CLI_THIN_PART                                                                              \
-    "%.2g mm thick, too thin for voxels of %.2g mm: it will be missing or broken in surfaces; a "  \
+    "%.2g mm thick, too thin for voxels of %.3g mm: it will be missing or broken in surfaces; a "  \
     "spacing of at most %.2g mm shows it"
 
 /* What to do about an inside-out part: of the mesh of a shape, and of a mesh file. */

@@ -369,15 +369,20 @@ static void check_budget(sdm_reader *r, sdm_mark section)
 {
     sdm_given *given[3];
     bool positive[3], refused = false;
-    int n = 0, last = -1;
+    int n = 0, last = -1, zero = -1;
     budgets(r, given, positive);
     for (int i = 0; i < 3; i++) {
         refused |= given[i]->refused;
+        if (!positive[i] && sdm_mark_is_set(given[i]->mark)) zero = i;
         if (!positive[i]) continue;
         n++;
         if (last < 0 || sdm_mark_is_later(given[i]->mark, given[last]->mark)) last = i;
     }
-    if (n == 0 && !refused)
+    if (n == 0 && !refused && zero >= 0)
+        sdm_mistakes_add(r->mistakes, given[zero]->mark,
+                         "the training has no budget: one of train.minutes, train.steps and "
+                         "train.samples must be positive");
+    else if (n == 0 && !refused)
         sdm_mistakes_add(
             r->mistakes, section,
             "missing key: one of train.minutes, train.steps and train.samples must be positive");

@@ -390,8 +390,12 @@ static sdm_status tree_allocate(sdm_tree *tree, size_t size, sdm_error *err)
 
 sdm_status sdm_tree_read(const char *path, uint8_t **data, size_t *size, sdm_error *err)
 {
-    const sdm_status s = sdm_file_read(path, SDM_TREE_BYTES_MAX, data, size, err);
-    if (s != SDM_E_FORMAT) return s;
+    sdm_error why = {0};
+    const sdm_status s = sdm_file_read(path, SDM_TREE_BYTES_MAX, data, size, &why);
+    if (s == SDM_E_IO && strchr(path, '='))
+        return sdm_fail(err, s, "%s: the first argument is a configuration file, key=value follows",
+                        why.text);
+    if (s != SDM_E_FORMAT) return s ? sdm_fail(err, s, "%s", why.text) : s;
     return sdm_fail(err, SDM_E_CONFIG, "%s:1:1: more than %zu bytes; a configuration is smaller",
                     path, SDM_TREE_BYTES_MAX);
 }

@@ -143,6 +143,9 @@ bool sdm_is_name(const char *text)
     return !text[n] && n <= SDM_NAME_LENGTH_MAX;
 }
 
+/* A word of this length or longer may be the beginning of a name. */
+enum { SHORTEST_BEGINNING = 3 };
+
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n)
 {
     const int length = (int)strnlen(word, WORD_MAX);
@@ -152,5 +155,8 @@ const char *sdm_nearest_name(const char *word, const char *const *names, size_t 
         const int d = edit_distance(word, names[i]);
         if (d < best) best = d, nearest = names[i];
     }
+    // else the first name that begins with the word
+    for (size_t i = 0; i < n && !nearest && length >= SHORTEST_BEGINNING; i++)
+        if (!strncmp(word, names[i], (size_t)length)) nearest = names[i];
     return nearest;
 }

@@ -157,9 +157,15 @@ expect 2 'like and --spacing exclude each other' sdmgen exact --mesh cube.off --
 expect 2 "like 'cube.off': its name must end in .sdm" sdmgen exact --mesh cube.off --like cube.off -o x.npy
 expect 1 'nix.nrrd' sdmgen exact --mesh cube.off --like nix.nrrd -o x.npy
 expect 2 "would overwrite the input 'grid.nrrd'" sdmgen exact --mesh cube.off --like grid.nrrd -o grid.nrrd
-expect 2 'options of maps .*--like' sdmgen exact --mesh cube.off --points points.csv --like grid.nrrd -o x.csv
+expect 2 '--like is an option of maps' sdmgen exact --mesh cube.off --points points.csv --like grid.nrrd -o x.csv
 sdmgen exact --mesh cube.off --size 9,9,9 --spacing 9 --quiet -o wide.nrrd 2>/dev/null
 expect 5 'other points need --outside bound or exact' sdmgen generate "$model" --like wide.nrrd -o x.npy
+
+# A grid beside the shape: a warning, which --quiet does not hide; probes and slices may lie there. A slice cuts every shape.
+expect 0 '^sdmgen: warning: no voxel of the grid is inside the surface' sdmgen exact --mesh cube.off --origin 900,0,0 --size 4,4,4 --spacing 0.5 --quiet -o x.npy
+expect 0 - sdmgen exact --mesh cube.off --origin 900,0,0 --size 1,4,4 --spacing 0.5 --quiet -o x.npy
+expect 0 - sdmgen exact --mesh cube.off --origin -4,-4,0 --size 17,17,1 --spacing 0.5 --quiet -o x.npy
+expect 3 '`sdmgen mesh FILE --audit` checks a mesh' sdmgen verify cube.off
 
 # --certify: signs compared with crossings along y and z.
 expect 0 '343 of 343 voxels compared with crossings along y and z, all agree' sdmgen exact --mesh cube.off "${grid[@]}" --json --certify

@@ -76,7 +76,9 @@ expect 2 "output 'no.nii': with --points" sdmgen exact --mesh cube.off --points 
 expect 2 'an output is needed' sdmgen exact --mesh cube.off --points p.csv
 expect 2 "unknown column 'normal', known are" sdmgen exact --mesh cube.off --points p.csv -o no.csv --columns distance,normal
 expect 2 "'distance' is given twice" sdmgen exact --mesh cube.off --points p.csv -o no.csv --columns distance,distance
-expect 2 'options of maps' sdmgen exact --mesh cube.off --points p.csv -o no.csv --size 4,4,4
+expect 2 'exact --points: --size is an option of maps$' sdmgen exact --mesh cube.off --points p.csv -o no.csv --size 4,4,4
+expect 2 'exact --points: --jacobian is an option of maps; .*sdmgen generate MODEL --points' sdmgen exact --mesh cube.off --points p.csv -o no.csv --jacobian j.npy
+expect 2 'exact --points: --closest is an option of maps; --columns' sdmgen exact --mesh cube.off --points p.csv -o no.csv --closest c.npy
 expect 2 '--columns belongs to --points' sdmgen exact --mesh cube.off -o no.npy --columns distance
 expect 2 'would overwrite the input' sdmgen exact --mesh cube.off --points p.csv -o p.csv
 absent no.csv no.nii no.npy

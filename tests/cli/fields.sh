@@ -48,7 +48,7 @@ expect 0 - sdmgen generate $model -p a=4.2 --points points.csv -o one.csv --outs
 printf 'x,y,z\n0,0,0\n\n90,1,1\n' >far.csv
 expect 5 'far\.csv:4: point 2 of 2 \(90, 1, 1\) mm lies outside of the box' sdmgen generate $model --points far.csv -o x.csv
 expect 2 'distance and gradient only' sdmgen generate $model --points points.csv --columns triangle -o x.csv
-expect 2 'do not apply' sdmgen generate $model --points points.csv --spacing 0.45 -o x.csv
+expect 2 '--spacing is an option of maps' sdmgen generate $model --points points.csv --spacing 0.45 -o x.csv
 expect 2 'an output is needed' sdmgen generate $model --points points.csv
 expect 2 'belongs to --points' sdmgen generate $model --columns distance -o x.npy
 absent x.csv

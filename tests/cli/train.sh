@@ -38,6 +38,8 @@ expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen t
 expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
 [ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
 
+expect 1 "^sdmgen: error: train.steps=1: cannot open: .*: the first argument is a configuration file" sdmgen train train.steps=1
+
 # A refused training leaves no folder that it has made, an empty one that was there stays.
 mkdir -p there/already
 expect 2 'data.memory_gb' sdmgen train "$tiny" --out there/already/new/run data.memory_gb=0.001 'grid.size=[60,60,60]'

@@ -159,6 +159,16 @@ static sdm_status write_page(const cli_fit *f, sdm_error *err)
     return s;
 }
 
+/* The end of the error of a fit that is not trustworthy: what to try; "": nothing to add. */
+static const char *remedy(const cli_fit *f)
+{
+    if (f->suspicion) return f->suspicion;
+    const bool network = f->model && f->shape && !f->args->fit.exact && !f->args->fit.polish;
+    return f->found && !f->result.converged && network
+               ? "; if the network is the limit, --exact fits with exact maps"
+               : "";
+}
+
 /* Prints the result and writes the files; if the fit is not trustworthy, fails with the reason. */
 static sdm_status show_result(cli_fit *f, const char *json, sdm_error *err)
 {
@@ -178,7 +188,7 @@ static sdm_status show_result(cli_fit *f, const char *json, sdm_error *err)
         if (!s) s = measured;
     }
     if (s || !f->doubt.status) return s;
-    return sdm_fail(err, f->doubt.status, "%s: %s%s", f->path, f->doubt.text,
+    return sdm_fail(err, f->doubt.status, "%s: %s%s%s", f->path, f->doubt.text, remedy(f),
                     files && f->found && !write ? "; no file was written (--force writes them)"
                                                 : "");
 }

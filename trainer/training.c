@@ -111,11 +111,27 @@ static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_er
     return s;
 }
 
+/* Names the keys that were changed in vain: a template without a correction is not trained. Not
+ * with network.kind: auto, where the keys are for the other kind. */
+static void tell_vain_keys(trainer *t)
+{
+    sdm_text keys = {0};
+    if (!t->data.only_holdout || t->turns->chosen) return;
+    sdm_config_changed_keys(t->config, "network", " kind weights fine ", &keys);
+    sdm_config_changed_keys(t->config, "data", " holdout memory_gb workers ", &keys);
+    sdm_config_changed_keys(t->config, "train", " minutes steps samples near_mm clamp_mm ", &keys);
+    if (keys.size && !keys.failed)
+        trainer_message(t, "the template needs no training, so these keys have no effect: %s",
+                        keys.data);
+    sdm_text_dispose(&keys);
+}
+
 /* Does all that precedes the first step: set-up, checkpoint, maps. *found: the run goes on from a
  * checkpoint. The folder stays as it was. */
 static sdm_status train_begin(trainer *t, bool resume, bool *found, sdm_error *err)
 {
     sdm_status s = sdm_comm_agree(t->hooks.comm, trainer_set_up(t, err), err);
+    if (!s) tell_vain_keys(t);
     if (!s && resume) {
         s = trainer_checkpoint_read(t, found, err);
         if (!s && !*found)

@@ -53,6 +53,7 @@ typedef struct cli_fit {
     double *points; /* [n_points][3] mm; NULL: the target is a volume */
     bool of_surface; /* the points were spread over the surface of a mesh */
     sdm_fit_target target;
+    const char *suspicion; /* why a fit may fail: the end of its error; NULL: no suspicion */
 
     sdm_fit_opts opts;
 
@@ -139,9 +140,9 @@ sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_l
 size_t cli_fit_distinct(const sdm_volume *v, size_t most, float *found);
 
 /* Prints a warning if the file `path`, read as v, has more different values than labels have, or
- * fractions. mend: the end of the warning, what to do. SDM_E_NOMEM. */
+ * fractions, and sets *warned. mend: the end of the warning, what to do. SDM_E_NOMEM. */
 sdm_status cli_fit_warn_many_values(const char *path, const sdm_volume *v, const char *mend,
-                                    sdm_error *err);
+                                    bool *warned, sdm_error *err);
 
 /* With --label-close: morphological closing of values[grid] (1 and 0) by a ball of that radius. */
 sdm_status cli_fit_close_labels(const cli_fit *f, const sdm_grid *grid, float *values,

@@ -97,7 +97,9 @@ static sdm_status find_sizes(const cli_fit *f, shape_sizes *out, sdm_error *err)
 /* Refuses a fit that cannot succeed, unless --force is given: then this is a warning. */
 static sdm_status refuse(const cli_fit *f, const char *what, sdm_error *err)
 {
-    if (!f->args->force) return sdm_fail(err, SDM_E_ARG, "%s; --force fits nevertheless", what);
+    if (!f->args->force)
+        return sdm_fail(err, SDM_E_ARG, "%s%s; --force fits nevertheless", what,
+                        f->suspicion ? f->suspicion : "");
     cli_warn("%s", what);
     return SDM_OK;
 }

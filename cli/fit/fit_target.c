@@ -28,7 +28,7 @@ void cli_fit_negate_xy(double *points, size_t n)
 /* ---- images ---- */
 
 /* A notice where an image looks like labels. */
-static void notice_few_values(const cli_fit *f)
+static void notice_few_values(cli_fit *f)
 {
     float found[FEW_VALUES];
     const size_t n = f->image.stored > SDM_VOXEL_INT64
@@ -38,14 +38,16 @@ static void notice_few_values(const cli_fit *f)
     cli_notice("%s holds only %zu different values, %g to %g: if it is a label map, give --label "
                "with the value of the shape, e.g. --label %g",
                f->path, n, (double)found[0], (double)found[n - 1], (double)found[n - 1]);
+    f->suspicion = "; if the file is a label map, give --label";
 }
 
 sdm_status cli_fit_warn_many_values(const char *path, const sdm_volume *v, const char *mend,
-                                    sdm_error *err)
+                                    bool *warned, sdm_error *err)
 {
     float *found = NULL;
     const sdm_status s = SDM_ALLOC(&found, MANY_VALUES, "labels", err);
-    if (!s && cli_fit_distinct(v, MANY_VALUES, found) > MANY_VALUES)
+    *warned = !s && cli_fit_distinct(v, MANY_VALUES, found) > MANY_VALUES;
+    if (*warned)
         cli_warn("%s holds over %d different values, or fractions: %s", path, MANY_VALUES, mend);
     sdm_free(found);
     return s;
@@ -72,9 +74,11 @@ static sdm_status use_labels(cli_fit *f, sdm_error *err)
 {
     sdm_status s = SDM_ALLOC(&f->mask, sdm_grid_count(&f->image.grid), "labels", err);
     if (!s) s = cli_fit_label_mask(f->path, &f->image, &f->args->fit.labels, f->mask, err);
+    bool many = false;
     if (!s && !f->image.n_segments)
         s = cli_fit_warn_many_values(f->path, &f->image, "if it is an image, leave --label out",
-                                     err);
+                                     &many, err);
+    if (many) f->suspicion = "; if the file is an image, leave --label out";
     if (!s) s = cli_fit_close_labels(f, &f->image.grid, f->mask, err);
     f->target.kind = SDM_FIT_LABEL;
     f->target.values = f->mask;

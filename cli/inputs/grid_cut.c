@@ -11,7 +11,8 @@
 
 /* beyond[axis][side]: how far the shape reaches beyond the first and the last voxel, mm; least:
  * these are lower bounds. */
-static void warn(const char *where, const sdm_grid *g, double beyond[3][2], bool least, const char *mend)
+static void warn(const char *where, const sdm_grid *g, double beyond[3][2], bool least,
+                 const char *mend)
 {
     char faces[240] = "";
     for (int a = 0; a < 3; a++)

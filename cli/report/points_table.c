@@ -94,8 +94,7 @@ sdm_status cli_points_check(const cli_args *args, cli_points_table *t, sdm_error
     if (args->outputs.n == 0)
         return sdm_fail(err, SDM_E_ARG, "exact --points: an output is needed: -o FILE.csv or .npy");
     const map_option options[] = {
-        {"--jacobian",
-         args->jacobian && true,
+        {"--jacobian", args->jacobian && true,
          "; the derivatives of a network at points: `sdmgen generate MODEL --points FILE "
          "--jacobian FILE.npy`"},
         {"--method", strcmp(args->method, "exact") != 0, ""},

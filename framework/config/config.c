@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "config_parse.h"
+#include "kinds.h"
 #include "schema.h"
 #include "sdm/memory.h"
 #include "yaml_tree.h"
@@ -159,6 +160,39 @@ void sdm_config_choose_kind(sdm_config *c, sdm_network_kind kind)
                 choose_default(c, &r, &r.sections[s].fields[k], (int)kind);
     c->network.kind = kind;
     if (kind != SDM_NETWORK_POD) c->data.sampling = SDM_SAMPLING_UNIFORM;
+}
+
+/* Is the value of a plain field the default of the kind of network? plain: reads defaults. */
+static bool has_default(const sdm_config *c, sdm_reader *plain, const sdm_field *f)
+{
+    static const size_t bytes[] = {[SDM_FIELD_INT] = sizeof(int),
+                                   [SDM_FIELD_INT64] = sizeof(int64_t),
+                                   [SDM_FIELD_UINT64] = sizeof(uint64_t),
+                                   [SDM_FIELD_REAL] = sizeof(double),
+                                   [SDM_FIELD_CHOICE] = sizeof(int)};
+    sdm_field_set_default(plain, f, f->kind_defs ? f->kind_defs[c->network.kind] : f->def);
+    return !memcmp((const char *)c + f->offset, (const char *)plain->config + f->offset,
+                   bytes[f->type]);
+}
+
+void sdm_config_changed_keys(const sdm_config *c, const char *section, const char *but,
+                             sdm_text *out)
+{
+    sdm_config plain = *c;
+    sdm_mistakes mistakes = {.file = ""};
+    sdm_reader r = {.target = &plain, .config = &plain, .mistakes = &mistakes};
+    r.sections = sdm_config_sections(&r.n_sections);
+    for (size_t s = 0; s < r.n_sections; s++)
+        for (size_t k = 0; k < r.sections[s].n_fields; k++) {
+            const sdm_field *f = &r.sections[s].fields[k];
+            char word[SDM_KEY_PATH_MAX];
+            snprintf(word, sizeof word, " %s ", f->key);
+            if (strcmp(r.sections[s].name, section) || strstr(but, word) ||
+                f->type == SDM_FIELD_SPECIAL || f->type == SDM_FIELD_TEXT ||
+                !sdm_kind_has(f, (int)c->network.kind) || has_default(c, &r, f))
+                continue;
+            sdm_text_add(out, "%s%s.%s", out->size ? ", " : "", section, f->key);
+        }
 }
 
 void sdm_config_strip(sdm_config *c)

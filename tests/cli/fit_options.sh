@@ -56,10 +56,12 @@ grep -q 'not given: the fit' err && bad "given tissues: $(cat err)"
 sdmgen fit $shape labels.nii --rotation 0,0,0 --max-iterations 1 >out 2>err
 grep -q 'labels.nii holds only 2 different values, 0 to 1: if it is a label map, give --label with the value of the shape, e.g. --label 1$' err ||
     bad "labels as an image: $(cat err)"
+grep -q '^sdmgen: error: labels.nii: .*; if the file is a label map, give --label$' err || bad "labels as an image, at the end: $(cat err)"
 expect 3 "image.nii: no voxel has the label '31000' .*if it is an image, leave --label out" sdmgen fit $shape image.nii --label 31000
 sdmgen phantom $shape --spacing 0.3 -o fine.nii --quiet
 sdmgen fit $shape fine.nii --label "$(sdmgen info fine.nii --json | sed 's/.*"max": *\([-0-9]*\).*/\1/')" --rotation 0,0,0 --max-iterations 1 >out 2>err
 grep -q 'fine.nii holds over 1000 different values, or fractions: if it is an image, leave --label out' err || bad "an image as labels: $(cat err)"
+grep -q '^sdmgen: error: fine.nii: .*; if the file is an image, leave --label out; --force' err || bad "an image as labels, at the end: $(cat err)"
 
 # a mesh in metres or micrometres
 sed 's/\([0-9.-]\{1,\}\)/\1e-3/g; 1s/.*/x,y,z/' points.csv >metres.csv

@@ -91,6 +91,10 @@ train: {steps: 60, batch: 16, refine_batch: 8}
 YAML
 expect 0 'warning: auto: template is kept, because pod failed: ' sdmgen train link.yaml --out link --quiet
 
+# Keys that a template without a correction does not need: told, by kind.
+sdmgen train link.yaml network.kind=template --out vain >out 2>err || bad "vain: $(cat err)"
+grep -q '^sdmgen: the template needs no training, so these keys have no effect: network.width, .*, network.degree, data.online, ' err || bad "vain keys: $(cat err)"
+
 # A grid that is fitted to the shapes: an interrupted run goes on with the same one, and the model has its numbers.
 interrupted fitted "$tiny" grid.voxels=16
 grep -q '^sdmgen: grid: size: \[16, ' err || bad "no word of the fitted grid: $(cat err)"

@@ -423,9 +423,10 @@ static void test_rules_between_keys(void **state)
                    "must be positive");
     snprintf(text, sizeof text, "%strain: {steps: -3}\n", NAME_GRID);
     expect_mistake(text, NULL, "x.yaml:3:16: train.steps: -3 is out of range (0 .. 1000000000000)");
-    expect_mistake(BASE, "train.steps=0",
-                   "argument 'train.steps=0': the training has no budget: one of train.minutes, train.steps "
-                   "and train.samples must be positive");
+    expect_mistake(
+        BASE, "train.steps=0",
+        "argument 'train.steps=0': the training has no budget: one of train.minutes, train.steps "
+        "and train.samples must be positive");
     snprintf(text, sizeof text, "%strain: {minutes: 0}\n", NAME_GRID);
     expect_mistake(text, NULL,
                    "x.yaml:3:9: the training has no budget: one of train.minutes, train.steps and "

@@ -235,6 +235,12 @@ void sdm_config_strip(sdm_config *c);
  * `kind`. */
 void sdm_config_choose_kind(sdm_config *c, sdm_network_kind kind);
 
+/* Appends the names of the keys of a section whose values are not the defaults of the kind of
+ * network, e.g. "network.rank, network.modes"; after a comma if *out is not empty. Leaves out
+ * data.static, and the keys that `but` names between spaces, e.g. " kind weights ". */
+void sdm_config_changed_keys(const sdm_config *c, const char *section, const char *but,
+                             sdm_text *out);
+
 /* Appends a table of every key: name, type, range, default, unit, meaning; with `markdown` as a
  * Markdown table, else as aligned text. */
 void sdm_config_describe(bool markdown, sdm_text *out);

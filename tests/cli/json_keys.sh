@@ -6,8 +6,8 @@ export OMP_WAIT_POLICY=passive
 page=$source_folder/docs/command-line.md
 sed -n '/^## Keys of the JSON$/,/^<!-- begin/p' "$page" | grep '^| ' >rows
 
-# words NAME: the words in backticks of the row NAME.
-words() { awk -F ' [|] ' -v name="| $1" '{ sub(/ \(\[[^|]*\)$/, "", $1) } $1 == name { print $2 }' rows | grep -oE '`[^`]+`' | grep -oE '[A-Za-z_0-9]+' | sort -u; }
+# words NAME: the words in backticks of the row NAME and of the rows "NAME: ...".
+words() { awk -F ' [|] ' -v name="| $1" '{ sub(/ \(\[[^|]*\)$/, "", $1) } $1 == name || index($1, name ": ") == 1 { print $2 }' rows | grep -oE '`[^`]+`' | grep -oE '[A-Za-z_0-9]+' | sort -u; }
 
 # documented ROW COMMAND...: all keys of the JSON that COMMAND prints are in ROW; names of parameters and options are no keys.
 documented() {

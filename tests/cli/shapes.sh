@@ -62,6 +62,7 @@ absent x.ply x.vdb nowhere
 echo 'not a library' >false.so
 expect 3 'false\.so' sdmgen shapes --plugin ./false.so
 expect 3 'missing\.so' sdmgen shapes --plugin ./missing.so
+expect 3 'plug-in .*\.c cannot be loaded: .*; a plug-in is a compiled shared object \(\.so\)$' sdmgen shapes --plugin "$source_folder/shapes/capsule.c"
 
 # Folders of plug-ins: a file given twice is one; one that cannot be loaded is skipped unless its shape is asked for.
 good=$(realpath ../../plugins/good)

@@ -66,6 +66,13 @@ static void test_defaults(void **state)
     for (size_t n = 1; n < sizeof by_params / sizeof *by_params; n++)
         assert_int_equal(sdm_config_static_count(&config, n, n - 1), by_params[n]);
     assert_int_equal(sdm_config_static_count(&config, SDM_MAX_PARAMS, 0), 0);
+    // with a budget of time at most 300 maps for each minute of it
+    const double budget = config.train.minutes;
+    config.train.minutes = 1;
+    static const int64_t of_a_minute[] = {0, 5, 5, 5, 4, 3, 2, 2, 2, 0};
+    for (size_t n = 1; n < sizeof of_a_minute / sizeof *of_a_minute; n++)
+        assert_int_equal(sdm_config_static_count(&config, n, 0), of_a_minute[n]);
+    config.train.minutes = budget;
     assert_int_equal(config.data.online, 4096);
     assert_int_equal(config.data.start, 3456);
     assert_int_equal(config.data.holdout, 100);

@@ -190,7 +190,7 @@ sdm_status cli_open_unknown(const cli_args *args, const char *path, sdm_model **
     const bool other = s == SDM_E_FORMAT && !cli_ends_with(path, ".sdm");
     return sdm_fail(err, s, "%s%s", why.text,
                     other && cli_ends_with_any(path, CLI_MESH_ENDINGS)
-                        ? "; `sdmgen mesh FILE --audit` checks a mesh"
+                        ? "; `sdmgen mesh --mesh FILE --audit` checks a mesh"
                     : other
                         ? "; its name is neither that of a level set (.vdb) nor of an image (.nii "
                           ".nii.gz .nrrd .nhdr .mha .mhd)"

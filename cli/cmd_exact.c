@@ -324,22 +324,6 @@ static sdm_status judge_signs(const job *j, sdm_error *err)
         c->below_zero);
 }
 
-/* If a surface is written, sets what it is compared with: map->volume, and map->pieces where no
- * parts grow together. */
-static void measure_shape_of(const job *j, cli_map *map)
-{
-    sdm_part_audit audit;
-    bool surface = false;
-    for (size_t i = 0; i < j->args->outputs.n; i++)
-        surface = surface || cli_ends_with_any(j->args->outputs.items[i], CLI_MESH_ENDINGS);
-    if (!surface || sdm_part_audit_make(&j->mesh, true, &audit, NULL)) return;
-    if (audit.mesh.closed && !audit.inside_out) {
-        map->volume = audit.union_volume;
-        if (!audit.mesh.self_intersections && !audit.mesh.nonmanifold_edges) map->pieces = audit.n;
-    }
-    sdm_part_audit_dispose(&audit);
-}
-
 static sdm_status write_outputs(const job *j, sdm_error *err)
 {
     cli_map map = {.grid = &j->grid,
@@ -352,7 +336,7 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
                    .origin = j->args->method,
                    .engine = j->args->narrow > 0 ? NULL : j->engine};
     sdm_status s = SDM_OK;
-    measure_shape_of(j, &map);
+    if (cli_writes_surface(j->args)) cli_map_compare(&j->mesh, &map);
     for (size_t i = 0; i < j->args->outputs.n && !s; i++) {
         const char *path = j->args->outputs.items[i];
         s = cli_write_map(path, &map, j->args, err);

@@ -1,5 +1,6 @@
 /* sdmgen fit: estimates the parameters and the pose of a shape from an image, labels, a
  * mesh or points. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -164,9 +165,10 @@ static const char *remedy(const cli_fit *f)
 {
     if (f->suspicion) return f->suspicion;
     const bool network = f->model && f->shape && !f->args->fit.exact && !f->args->fit.polish;
-    return f->found && !f->result.converged && network
-               ? "; if the network is the limit, --exact fits with exact maps"
-               : "";
+    if (f->found && !f->result.converged && network)
+        return "; if the network is the limit, --exact fits with exact maps";
+    const bool turned = !isnan(f->args->pose.rotation[0]) && !f->opts.keep_pose;
+    return turned ? "; a wrong start ends like this, too: without --rotation many are tried" : "";
 }
 
 /* Prints the result and writes the files; if the fit is not trustworthy, fails with the reason. */

@@ -32,6 +32,7 @@ typedef struct job {
     const cli_args *args;
     sdm_registry *registry;
     sdm_instance *shape; /* for the exact engine and checks; NULL: not needed */
+    sdm_instance *solid; /* to compare surfaces with; NULL: none is written, or it is not known */
     sdm_model *model;
     const sdm_model_info *info;
     sdm_param *params;
@@ -78,6 +79,7 @@ static void job_dispose(job *j)
     sdm_free(j->params);
     sdm_model_free(j->model);
     sdm_instance_free(j->shape);
+    sdm_instance_free(j->solid);
     sdm_registry_free(j->registry);
 }
 
@@ -133,15 +135,17 @@ static sdm_status read_rows(job *j, sdm_error *err)
 }
 
 /* Creates the shape if --check, --max-error, --measure, --policy exact or --outside exact need
- * it. */
+ * it; also, if it is known, to compare surfaces with. */
 static sdm_status open_shape(job *j, sdm_error *err)
 {
     const cli_args *args = j->args;
     const bool checks = args->check || args->max_error > 0 || args->measure;
     const bool exact =
         cli_policy(args) == SDM_RANGE_EXACT || cli_outside(args) == SDM_OUTSIDE_EXACT;
+    if (cli_writes_surface(args) && !cli_open_registry(args, &j->registry, NULL))
+        (void)sdm_runtime_instance(j->model, j->registry, &j->solid, NULL);
     if (!checks && !exact) return SDM_OK;
-    sdm_status s = cli_open_registry(args, &j->registry, err);
+    sdm_status s = j->registry ? SDM_OK : cli_open_registry(args, &j->registry, err);
     if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, err);
     return s && checks ? sdm_fail_in(err, s, "--%s needs the exact shape",
                                      args->check           ? "check"
@@ -226,6 +230,15 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     return s ? s : allocate_maps(j, err);
 }
 
+/* Compares surfaces with the mesh of the row, which is no error where it cannot be made. */
+static void compare_shape(const job *j, size_t row, cli_map *map)
+{
+    sdm_mesh mesh = {0};
+    if (!sdm_instance_mesh(j->solid, j->rows + row * j->info->n_params, &mesh, NULL))
+        cli_map_compare(&mesh, map);
+    sdm_mesh_dispose(&mesh);
+}
+
 static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
                              const cli_row_files *files, sdm_error *err)
 {
@@ -235,17 +248,19 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
     cli_add_params(j->params, j->info->n_params, j->rows + row * j->info->n_params, &params);
     sdm_status s =
         params.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the metadata") : SDM_OK;
-    const cli_map map = {.grid = &j->grid,
-                         .values = j->values,
-                         .blocks = j->band.tile ? &j->band : NULL,
-                         .shape = j->info->shape,
-                         .params = params.data,
-                         .source = result->source,
-                         .clamped = result->clamped,
-                         .error_mm = result->error_mm,
-                         .origin = result->source == SDM_SOURCE_EXACT ? "exact" : origin,
-                         .reason = result->reason,
-                         .check = result->checked ? &result->check : NULL};
+    cli_map map = {.grid = &j->grid,
+                   .values = j->values,
+                   .blocks = j->band.tile ? &j->band : NULL,
+                   .shape = j->info->shape,
+                   .params = params.data,
+                   .source = result->source,
+                   .clamped = result->clamped,
+                   .error_mm = result->error_mm,
+                   .origin = result->source == SDM_SOURCE_EXACT ? "exact" : origin,
+                   .reason = result->reason,
+                   .check = result->checked ? &result->check : NULL};
+    if (result->source == SDM_SOURCE_NETWORK) map.trained_mm = sdm_grid_coarsest(&j->info->grid);
+    if (j->solid) compare_shape(j, row, &map);
     for (size_t i = 0; i < j->args->outputs.n && !s; i++)
         s = cli_write_map(files->list.items[i], &map, j->args, err);
     sdm_text_dispose(&params);

@@ -2,6 +2,7 @@
 #include "options.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "sdm/memory.h"
@@ -43,8 +44,11 @@ static sdm_status unknown_option(const cli_args *args, const char *word, size_t 
     if (near)
         return sdm_fail(err, SDM_E_ARG, "%s: unknown option --%s; did you mean --%s?", command,
                         name, near);
-    return sdm_fail(err, SDM_E_ARG, "%s: unknown option --%s; see sdmgen %s --help", command, name,
-                    command);
+    return sdm_fail(err, SDM_E_ARG, "%s: unknown option --%s; see sdmgen %s --help%s", command,
+                    name, command,
+                    strstr(args->command->synopsis, "key=value")
+                        ? "; keys of the configuration are given without dashes: train.minutes=3"
+                        : "");
 }
 
 /* -o is most often meant for --out where a command writes a folder. */
@@ -90,14 +94,19 @@ static bool is_choice(const char *choices, const char *value)
 
 static bool in_range(const cli_option *o, double v) { return v >= o->min && v <= o->max; }
 
+/* A range that ends here or beyond says nothing to a user. */
+#define UNLIMITED 1e12
+
 static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *err)
 {
     if (o->kind == CLI_CHOICE)
         return sdm_fail(err, SDM_E_ARG, "--%s '%s': need one of %s", o->name, value, o->choices);
+    char two[48];
+    snprintf(two, sizeof two, "two numbers %.20s", o->value);
     const char *form = o->kind == CLI_INT     ? "a whole number"
                        : o->kind == CLI_INT3  ? "three whole numbers X,Y,Z"
                        : o->kind == CLI_REAL  ? "a number"
-                       : o->kind == CLI_REAL2 ? "two numbers X,Y"
+                       : o->kind == CLI_REAL2 ? two
                        : o->kind == CLI_REAL3 ? "three numbers X,Y,Z"
                        : o->kind == CLI_REAL6 ? "six numbers"
                        : o->kind == CLI_REAL9 ? "nine numbers"
@@ -108,6 +117,11 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
                         "--%s '%s': need %s in radians, at most a turn of 6.2832 (90 degrees are "
                         "1.5708)",
                         o->name, value, form);
+    if (o->max >= UNLIMITED && o->min <= -UNLIMITED)
+        return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s", o->name, value, form);
+    if (o->max >= UNLIMITED)
+        return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s, at least %s", o->name, value, form,
+                        sdm_format_real(o->min, low));
     return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s in %s .. %s", o->name, value, form,
                     sdm_format_real(o->min, low), sdm_format_real(o->max, high));
 }

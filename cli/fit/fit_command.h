@@ -123,8 +123,8 @@ sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err);
 sdm_status cli_fit_check_size(const cli_fit *f, sdm_error *err);
 
 /* Images: says which values of the tissues a fit starts from if the command line does not give
- * them, unless the shape is the one for which they are made. */
-void cli_fit_notice_tissues(const cli_fit *f);
+ * them, unless the shape is the one for which they are made; sets f->suspicion. */
+void cli_fit_notice_tissues(cli_fit *f);
 
 /* Sets the start pose and the rotations to try. SDM_E_ARG; SDM_E_FORMAT: a bad file of points. */
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);

@@ -31,7 +31,7 @@ static sdm_status read_appearance(const cli_fit_args *a, sdm_fit_appearance *t, 
 /* The shape that the default tissues belong to: in CT it is fluid in bone. */
 #define SHAPE_OF_TISSUES "cochlea"
 
-void cli_fit_notice_tissues(const cli_fit *f)
+void cli_fit_notice_tissues(cli_fit *f)
 {
     const bool inside = isnan(f->args->fit.inside[0]), outside = isnan(f->args->fit.outside[0]);
     const sdm_fit_appearance *t = &f->opts.appearance;
@@ -46,6 +46,8 @@ void cli_fit_notice_tissues(const cli_fit *f)
                                  : "--outside is",
                t->inside[0].mean, t->inside[0].sd, t->outside[0].mean, t->outside[0].sd,
                (double)f->image.min, (double)f->image.max);
+    if (!f->suspicion)
+        f->suspicion = "; values of CT were taken, as --inside and --outside are not both given";
 }
 
 static sdm_status read_keep(const cli_list *words, sdm_fit_opts *o, sdm_error *err)

@@ -9,6 +9,7 @@
 #include "files.h"
 #include "sdm/image.h"
 #include "sdm/internal/near.h"
+#include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/isosurface.h"
 #include "sdm/memory.h"
@@ -195,16 +196,38 @@ static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *s
     sdm_audit audit;
     if (!(map->volume > 0) || sdm_mesh_audit(surface, &audit, NULL) || !audit.closed) return;
     const double more = fabs(audit.volume) / map->volume - 1, voxel = sdm_grid_coarsest(map->grid);
+    const bool trained = map->trained_mm >= voxel; // a finer grid shows no more of the shape
     if (map->pieces && audit.components > map->pieces)
         cli_warn("%s: the surface has %zu pieces, the shape %zu: a neck or a wall is thinner than "
-                 "a voxel of %.3g mm and is torn; a smaller --spacing shows it",
-                 path, audit.components, map->pieces, voxel);
+                 "a voxel of %.3g mm and is torn; %s shows it",
+                 path, audit.components, map->pieces, trained ? map->trained_mm : voxel,
+                 trained ? "a training with a smaller grid.spacing" : "a smaller --spacing");
     else if (fabs(more) > VOLUME_OFF_MAX)
         cli_warn(
             "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
-            "%.3g mm cut its edges and thin parts; --spacing %.2g shows more of them",
+            "%.3g mm cut its edges and thin parts; %s%.2g shows more of them",
             path, fabs(audit.volume), 100 * fabs(more), more < 0 ? "less" : "more", map->volume,
-            voxel, 0.5 * voxel);
+            trained ? map->trained_mm : voxel,
+            trained ? "a training with grid.spacing " : "--spacing ",
+            0.5 * (trained ? map->trained_mm : voxel));
+}
+
+void cli_map_compare(const sdm_mesh *shape, cli_map *map)
+{
+    sdm_part_audit audit;
+    if (sdm_part_audit_make(shape, true, &audit, NULL)) return;
+    if (audit.mesh.closed && !audit.inside_out) {
+        map->volume = audit.union_volume;
+        if (!audit.mesh.self_intersections && !audit.mesh.nonmanifold_edges) map->pieces = audit.n;
+    }
+    sdm_part_audit_dispose(&audit);
+}
+
+bool cli_writes_surface(const cli_args *args)
+{
+    for (size_t i = 0; i < args->outputs.n; i++)
+        if (cli_ends_with_any(args->outputs.items[i], CLI_MESH_ENDINGS)) return true;
+    return false;
 }
 
 static sdm_status write_surface(const char *path, const cli_map *map, sdm_error *err)

@@ -23,13 +23,22 @@ typedef struct cli_map {
     double error_mm;    /* of a network: its RMSE; else the bound on the error */
     double volume; /* of the shape, mm^3: a surface that encloses much less or more is warned of; 0:
                       not known */
-    size_t pieces; /* closed surfaces of the shape: more of them in a file are warned of; 0: not
-                      known */
+    double trained_mm; /* of a network: longest edge of a voxel of its training; 0: exact maps */
+    size_t pieces;     /* closed surfaces of the shape: more of them in a file are warned of; 0: not
+                          known */
     const char *origin; /* "model CHECKSUM", or the method without a network: "exact", "edt" ... */
     sdm_reason reason;  /* why the exact engine replaced the network */
     const sdm_check *check; /* errors of the network's map; NULL: not checked */
     sdm_exact *engine;      /* makes the same map on other grids; NULL: none */
 } cli_map;
+
+/* Sets what surfaces are compared with, to the values of the mesh of the shape: map->volume, and
+ * map->pieces where no parts grow together. Nothing for an open mesh, or one with parts that are
+ * inside out. */
+void cli_map_compare(const sdm_mesh *shape, cli_map *map);
+
+/* True if an output of the command line is a surface. */
+bool cli_writes_surface(const cli_args *args);
 
 /* Checks, before any work, that the ending of the name is a known type; meshes_only: a known type
  * of mesh files. SDM_E_ARG; SDM_E_UNSUPPORTED: .vdb in a build without OpenVDB. */

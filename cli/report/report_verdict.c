@@ -6,6 +6,11 @@
 
 #include "report_audit.h"
 
+/* From this share of a surface with edges, or thinner than two voxels, on, and below this number of
+   voxels across the thinnest part, volumes are told to be too small: a spanner with half of its
+   surface near edges lost 5 % of its volume with 3.6 voxels, 10 % with 1.9, 1 % with 7.3. */
+static const double EDGES_MANY = 0.1, VOXELS_MANY = 4;
+
 /* The part of the error with its share of the sum of all parts. */
 static void print_part(const sdm_verdict *v, sdm_cause cause, double sum, bool first)
 {
@@ -37,6 +42,12 @@ static void print_far(const sdm_verdict *v)
            v->largest_at_mm < 0 ? "inside" : "outside");
 }
 
+/* Are voxels so large beside parts with edges that surfaces enclose too little? */
+static bool is_coarse(const sdm_verdict *v)
+{
+    return v->thin >= EDGES_MANY && v->thickness_mm < VOXELS_MANY * v->coarse_mm;
+}
+
 void cli_print_verdict(const sdm_verdict *v)
 {
     const double voxel = v->voxel_mm;
@@ -55,6 +66,10 @@ void cli_print_verdict(const sdm_verdict *v)
         printf("; not for the %.2g %% of the shapes that the grid cuts", percent);
     if (sdm_verdict_errs_far(v))
         printf("; not for distances far from the surface: wrong by up to %.2g mm", v->largest_mm);
+    if (is_coarse(v))
+        printf("; not for volumes: voxels of %.3g mm cut the edges of its parts, the thinnest of "
+               "which is %.2g mm thick; grid.spacing %.2g keeps more of them",
+               v->coarse_mm, v->thickness_mm, 0.25 * v->thickness_mm);
     if (sdm_too_thin(v->thickness_mm, v->coarse_mm))
         printf("; not for its thinnest part, which is " CLI_THIN_PART, v->thickness_mm,
                v->coarse_mm, 0.5 * v->thickness_mm);

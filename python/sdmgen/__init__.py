@@ -39,7 +39,7 @@ from ._fit import Finding, FitProgress, FitResult, Tissue, close_labels, fit
 from ._grid import Grid, Pose
 from ._map import Band, Batch, Check, Image, Map, MapInfo, Segment, surface
 from ._mesh import Audit, ExactMap, Mesh, Points, Report, Surface, exact, exact_band, exact_points
-from ._model import Accuracy, Field, Jacobian, Model, Samples, Tangent
+from ._model import Accuracy, Field, Jacobian, Model, Quality, Samples, Tangent
 from ._phantom import Phantom, phantom, random_pose
 from ._shape import Measure, Param, Shape, shapes
 from ._train import Progress, TrainResult, train
@@ -79,6 +79,7 @@ __all__ = [
     "Points",
     "Pose",
     "Progress",
+    "Quality",
     "QualityError",
     "RangeError",
     "Report",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import warnings
 from ctypes import byref
 from dataclasses import dataclass
 from typing import Any, Mapping, Optional, Sequence, Union
@@ -42,6 +43,33 @@ class Accuracy:
 
 def accuracy_of(c: Any) -> Accuracy:
     return Accuracy(**{name: getattr(c, name) for name in Accuracy.__dataclass_fields__})
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What the training found: `grade` is "good", "usable" or "poor" ("": trained by an earlier
+    version), `cut` the share of the shapes that the grid cuts, `between_mm` how far exact maps miss
+    the surface between the voxels, `thickness_mm` the thickness of the thinnest part."""
+
+    grade: str
+    cut: float
+    between_mm: float
+    thickness_mm: float
+
+
+#: largest share of shapes that the grid of a good model cuts (docs/network.md)
+CUT_MAX = 0.05
+
+
+def _quality_of(c: Any, name: str) -> Quality:
+    """The quality of a model; warns, as the program does, of one that is poor or cuts its shapes."""
+    result = Quality(c.grade.decode(), c.cut, c.between_mm, c.thickness_mm)
+    if result.grade == "poor":
+        warnings.warn(f"{name}: the training graded this model poor (sdmgen info)", stacklevel=4)
+    if result.cut > CUT_MAX:
+        text = f"{name}: its grid cuts {100 * result.cut:.0f} % of the shapes, whose maps end open (train with grid: auto)"
+        warnings.warn(text, stacklevel=4)
+    return result
 
 
 @dataclass(frozen=True)
@@ -102,6 +130,8 @@ class Model:
         self.grid = Grid._of(info.grid)
         #: errors on shapes that the training did not use
         self.accuracy = accuracy_of(info.accuracy)
+        #: the grade of the training, and what its grid leaves out
+        self.quality = _quality_of(info.quality, "model" if self.path is None else str(self.path))
         #: name of the shape
         self.shape_name: str = info.shape.decode()
         #: kind of the network: "pod", "template", "deepsdf", "imnet" or "sdmnn"

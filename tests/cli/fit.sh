@@ -145,7 +145,7 @@ middle=$((voxels / plane / 2))
     tail -c +$((353 + plane * (middle + 1))) label.nii
 } >walled.nii
 whole=$(json voxels_reference)
-expect 4 "walled.nii: 1. % of the volume of the shape is empty in the labels" sdmgen fit $fit walled.nii --label 1 --rotation 0,0,0 --spacing 0.5 --json
+expect 4 "walled.nii: (9|1[0-9])[0-9.]* % of the volume of the shape is empty in the labels" sdmgen fit $fit walled.nii --label 1 --rotation 0,0,0 --spacing 0.5 --json
 expect 0 - sdmgen fit $fit walled.nii --label 1 --rotation 0,0,0 --spacing 0.5 --tolerance 0.2 --json
 awk -v n="$(json voxels_reference)" -v w="$whole" 'BEGIN { exit !(n < w - 100) }' || bad "wall of $(json voxels_reference) and $whole voxels"
 expect 0 - sdmgen fit $fit walled.nii --label 1 --label-close 0.4 --reference walled.nii --rotation 0,0,0 --spacing 0.5 --json

@@ -82,7 +82,7 @@ absent no.ply
 
 model=../files-of-train/run/model.sdm
 present $model
-expect 0 - host SdmgenGenerate model=$model param=a=4.2 surface=c.vtp distances=c.nrrd
+expect 0 'warning: c.vtp: the surface encloses .* less than the shape' host SdmgenGenerate model=$model param=a=4.2 surface=c.vtp distances=c.nrrd
 has '^parameters: *a=4\.2 '
 has '^file surface: [0-9]+ points'
 expect 5 'allowed' host SdmgenGenerate model=$model param=a=9 surface=no.ply

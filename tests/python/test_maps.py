@@ -126,6 +126,7 @@ def test_the_description_of_a_model(model, model_file):
     assert model.kind == "pod" and model.shape_name == "cochlea" and len(model.checksum) == 16
     assert model.accuracy.samples == 8 and "grid" in model.config and model.options["ear"] == "right"
     assert sdmgen.Model(model_file.read_bytes()).checksum == model.checksum
+    assert model.quality.grade in ("good", "usable", "poor") and 0 <= model.quality.cut <= 1 and model.quality.thickness_mm > 0
     again = pickle.loads(pickle.dumps(model))
     assert np.array_equal(again(P).values, model(P).values)
 

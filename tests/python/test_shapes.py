@@ -153,6 +153,11 @@ def test_training_and_fit(tmp_path):
     assert seen and seen[-1].phase == "evaluate" and result.maps >= 60 and result.grade in ("good", "usable", "poor")
     model = result.model
     assert model.shape is shape and model.accuracy == result.accuracy and model.accuracy.rmse_mm < 0.05
+    # a model whose grid cuts its shapes is loaded with a warning
+    small = {"grid": {"size": [8, 8, 8], "spacing": 0.2}, "train.steps": 5}
+    with pytest.warns(UserWarning, match=r"its grid cuts [0-9]+ % of the shapes"):
+        cut = sdmgen.train(config, small, out=tmp_path / "cut", shape=shape).model
+    assert cut.quality.cut > 0.05
     p = {"radius": 0.9, "stretch": 1.4}
     assert np.abs(model(p).values - sdmgen.exact(shape, model.grid, params=p).values).max() < 0.2
     # policy exact and checks call the function

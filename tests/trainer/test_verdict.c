@@ -213,6 +213,21 @@ static void inside_out_is_the_cause(void **state)
     }
 }
 
+// A model whose maps lack the thinnest part is not good, however small its error is.
+static void parts_too_thin_for_the_grid(void **state)
+{
+    (void)state;
+    const sdm_config c = config_of(NULL, 0);
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .budget = 1000};
+    for (int thick = 0; thick < 2; thick++) {
+        sdm_verdict v = figures();
+        v.coarse_mm = v.voxel_mm;
+        v.thickness_mm = (thick ? 1.5 : 1.3) * v.voxel_mm;
+        trainer_verdict_decide(&in, &v);
+        assert_int_equal(v.grade, thick ? SDM_GRADE_GOOD : SDM_GRADE_USABLE);
+    }
+}
+
 // Shapes that leave the grid come first in the sentence; what limits the others follows.
 static void grid_cuts(void **state)
 {
@@ -452,6 +467,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(grades),
         cmocka_unit_test(grid_cuts),
         cmocka_unit_test(inside_out_is_the_cause),
+        cmocka_unit_test(parts_too_thin_for_the_grid),
         cmocka_unit_test(error_falls_in_the_last_third),
         cmocka_unit_test(evaluations_are_due),
         cmocka_unit_test(surface_of_a_sphere),

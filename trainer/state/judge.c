@@ -9,6 +9,7 @@
 #include "data/surface_check.h"
 #include "history.h"
 #include "progress.h"
+#include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
 
 /* If the last third of the steps took away more of the error than this, more steps help. */
@@ -238,7 +239,8 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
     v->grade = grade_of(v);
     decide_limit(in, v);
     // the maps lack these parts: however exact the network is, it has learned another shape
-    if (v->inside_out > 0 && v->grade == SDM_GRADE_GOOD) v->grade = SDM_GRADE_USABLE;
+    const bool lacks = v->inside_out > 0 || sdm_too_thin(v->thickness_mm, v->coarse_mm);
+    if (lacks && v->grade == SDM_GRADE_GOOD) v->grade = SDM_GRADE_USABLE;
     if (v->inside_out > 0)
         tell_inside_out(v);
     else if (v->cut > 0)

@@ -223,19 +223,19 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
     const double most = fmax(p->opts->tolerance, biased ? VOLUME_MIN_BIASED : VOLUME_MIN),
                  beside = sdm_fit_is_image(p) ? fmax(p->opts->beside, most) : most;
     sdm_fit_judge_add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
-                      "%.0f %% of the volume of the shape is empty in the %s, allowed %.0f %% "
+                      "%.3g %% of the volume of the shape is empty in the %s, allowed %.0f %% "
                       "(sdm_fit_opts.tolerance)",
                       100 * m->empty, what, 100 * most);
     const double stray = fmax(p->opts->tolerance, STRAY_MAX);
     if (points && r->outliers > stray)
         sdm_fit_judge_add(v, SDM_FIT_CHECK_MISSING, false, SDM_FIT_FAILED, r->outliers, stray,
-                          "%.0f %% of the points lie on no surface of the shape, allowed %.0f %% "
+                          "%.3g %% of the points lie on no surface of the shape, allowed %.0f %% "
                           "(sdm_fit_opts.tolerance)",
                           100 * r->outliers, 100 * stray);
     else
         sdm_fit_judge_add(
             v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED, m->missing, beside,
-            "beside the shape the %s hold%s as much of its material as %.0f %% of its volume, "
+            "beside the shape the %s hold%s as much of its material as %.3g %% of its volume, "
             "allowed %.0f %% (%s)",
             what, sdm_fit_is_image(p) ? "s" : "", 100 * m->missing, 100 * beside,
             sdm_fit_is_image(p) ? "sdm_fit_opts.beside" : "sdm_fit_opts.tolerance");

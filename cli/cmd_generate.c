@@ -9,6 +9,7 @@
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "measure/measures.h"
+#include "report/files.h"
 #include "report/generate_files.h"
 #include "report/json_values.h"
 #include "report/output.h"
@@ -261,8 +262,11 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
                    .check = result->checked ? &result->check : NULL};
     if (result->source == SDM_SOURCE_NETWORK) map.trained_mm = sdm_grid_coarsest(&j->info->grid);
     if (j->solid) compare_shape(j, row, &map);
-    for (size_t i = 0; i < j->args->outputs.n && !s; i++)
-        s = cli_write_map(files->list.items[i], &map, j->args, err);
+    for (size_t i = 0; i < j->args->outputs.n && !s; i++) {
+        const char *path = files->list.items[i];
+        s = cli_write_map(path, &map, j->args, err);
+        if (cli_ends_with_any(path, CLI_MESH_ENDINGS)) map.volume = 0; // compared once
+    }
     sdm_text_dispose(&params);
     return s;
 }

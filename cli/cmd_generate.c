@@ -556,8 +556,7 @@ static void notice_between(const job *j, const char *measure)
                    rmse, 0.866 * own_voxel(j), measure);
     else
         cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
-                   "cubic splines between them add to it, mostly less than linear interpolation of "
-                   "exact maps, which misses the surface by %.2g mm RMS; %s",
+                   "between them the map errs more, at the surface by up to about %.2g mm RMS; %s",
                    rmse, between, measure);
 }
 

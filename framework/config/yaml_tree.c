@@ -395,6 +395,12 @@ sdm_status sdm_tree_read(const char *path, uint8_t **data, size_t *size, sdm_err
     if (s == SDM_E_IO && strchr(path, '='))
         return sdm_fail(err, s, "%s: the first argument is a configuration file, key=value follows",
                         why.text);
+    if (!s && *size > 2 && (*data)[0] == 0x1f && (*data)[1] == 0x8b) {
+        sdm_free(*data);
+        *data = NULL;
+        return sdm_fail(err, SDM_E_CONFIG, "%s:1:1: a file compressed by gzip, no configuration",
+                        path);
+    }
     if (s != SDM_E_FORMAT) return s ? sdm_fail(err, s, "%s", why.text) : s;
     return sdm_fail(err, SDM_E_CONFIG, "%s:1:1: more than %zu bytes; a configuration is smaller",
                     path, SDM_TREE_BYTES_MAX);

@@ -141,4 +141,7 @@ absent never
 sdmgen config all.yaml >out 2>err # the cochlea has other parameters with other options: those first
 [ "$?,$(wc -l <err)" = 2,3 ] || bad "three mistakes in options: $(cat err)"
 grep -Eq "^all\.yaml:5:[0-9]+: shape 'cochlea': option 'start' is 'square'" err || bad "no line for start: $(cat err)"
+# a file that is no text
+printf 'shape: {name: torus}\n' | gzip >image.nii.gz
+expect 2 'image.nii.gz:1:1: a file compressed by gzip, no configuration$' sdmgen config image.nii.gz
 finish

@@ -1,5 +1,5 @@
-/* A page reads and writes no files. The functions of this file take the place of the library's,
- * which would make every page 20 kB larger. */
+/* A page reads and writes no files, and asks for no products with transposed Jacobians. The functions
+ * of this file take the place of the library's, which would make every page 30 kB larger. */
 #include "model/model_kind.h"
 #include "pod/pod_internal.h"
 #include "point/point_internal.h"
@@ -54,4 +54,16 @@ sdm_onnx_value sdm_sdmnn_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x)
 sdm_onnx_value sdm_template_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x)
 {
     return sdm_point_onnx(m, g, x);
+}
+
+size_t sdm_template_vjp_scratch_bytes(const sdm_model *m)
+{
+    (void)m;
+    return 0;
+}
+
+void sdm_template_vjp(const sdm_model *m, const double *params, const float *adjoint,
+                      double *gradient, void *scratch)
+{
+    (void)m, (void)params, (void)adjoint, (void)gradient, (void)scratch;
 }

@@ -63,7 +63,7 @@ check() {
         parts("trainer", "core config geom nn io shape trainer")
         parts("cli", "core config geom nn io shape shapes runtime trainer cli")
         rooms("framework/geom/", "memory simd exactly mesh solid features map sign layers points methods .")
-        rooms("framework/nn/", "kernels onnx fine model pod template point sdmnn open")
+        rooms("framework/nn/", "kernels onnx fine model pod template template/onnx point sdmnn open")
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps field phantom fit/data fit/solver fit/start fit/trust fit/judge fit vdb")
         rooms("trainer/", "comm numerics ssm data shards state pod fine template direct .")

@@ -123,7 +123,7 @@ SDM_API size_t sdm_model_jvp_scratch_bytes(const sdm_model *m);
 
 /* Jacobian-vector product: values[nz][ny][nx] = the map, tangent[nz][ny][nx] = the sum over the
    parameters p of direction[p] * d values / d params[p]. Costs at most as much as the Jacobian, and
-   less for "pod" and "sdmnn". [any thread] */
+   less for "pod", "template" and "sdmnn". [any thread] */
 SDM_API void sdm_model_jvp(const sdm_model *m, const double *params, const double *direction,
                            float *values, float *tangent, void *scratch);
 
@@ -131,9 +131,9 @@ SDM_API void sdm_model_jvp(const sdm_model *m, const double *params, const doubl
 SDM_API size_t sdm_model_vjp_scratch_bytes(const sdm_model *m);
 
 /* Vector-Jacobian product: gradient[n_params], with gradient[p] = the sum over the voxels v of
-   adjoint[v] * d values[v] / d params[p]; adjoint[nz][ny][nx]. "pod" and "sdmnn" use reverse-mode
-   differentiation, which costs as much as a few maps for any number of parameters; the other kinds
-   form the Jacobian. [any thread] */
+   adjoint[v] * d values[v] / d params[p]; adjoint[nz][ny][nx]. "pod", "template" and "sdmnn" use
+   reverse-mode differentiation, which costs as much as a few maps for any number of parameters;
+   "deepsdf" and "imnet" form the Jacobian. [any thread] */
 SDM_API void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoint,
                            double *gradient, void *scratch);
 

@@ -1,5 +1,7 @@
-/* Derivatives of the distances at the corners of the blocks, for parts with a warp: the derivatives
-   of the formulas in template_corners.c. */
+/* Derivatives of the distances at the corners of the blocks, for parts with a warp, in forward and
+   in reverse mode: the derivatives of the formulas in template_corners.c. */
+#include <string.h>
+
 #include "template_derivative.h"
 
 // Sets the points of w->row to n stations of part c.
@@ -108,4 +110,81 @@ void sdm_template_corner_slopes(const template_work *w, size_t c, const point_sl
             for (size_t x = 0; x <= w->blocks[0]; x++, corner += 4)
                 corner_slope(w, c, at, m, sample, 1 + x + stride[1] * (1 + y) + stride[2] * (1 + z),
                              stride, corner);
+}
+
+/* Reverse mode. */
+
+// The transpose of corner_slope(): adds to the samples and points[stations][4].
+static void corner_back(const template_work *w, size_t c, const point_slope *at,
+                        const float *corner, size_t i, const size_t stride[3], float *sample,
+                        float *points)
+{
+    const template_samples *all = &w->warp[c].sample;
+    float *to = sample + SAMPLE_SIZE * i;
+    const float half = 0.5f, h = (float)w->k->parts[c].near.spacing, f = all->f[i], s = all->s[i];
+    to[SAMPLE_F] += corner[0] * s;
+    to[SAMPLE_S] += corner[0] * f;
+    to[SAMPLE_R] += corner[0];
+    for (size_t a = 0; a < 3; a++) {
+        const size_t above = i + stride[a], below = i - stride[a];
+        float *up = sample + SAMPLE_SIZE * above, *down = sample + SAMPLE_SIZE * below;
+        const float slope = half * corner[1 + a], by_change = slope * h * s;
+        float change = 0;
+        for (size_t e = 0; e < 3; e++) {
+            const float du = at[above].u[e] - at[below].u[e], moved = by_change * all->g[e][i];
+            change += all->g[e][i] * du;
+            to[SAMPLE_G + e] += by_change * du;
+            points[4 * above + e] += moved;
+            points[4 * below + e] -= moved;
+        }
+        to[SAMPLE_S] += slope * h * change;
+        to[SAMPLE_F] += slope * (all->s[above] - all->s[below]);
+        up[SAMPLE_S] += slope * f;
+        down[SAMPLE_S] -= slope * f;
+        up[SAMPLE_R] += slope;
+        down[SAMPLE_R] -= slope;
+    }
+}
+
+// The transpose of sample_slope(): adds to u[3] and metric[6].
+static void sample_back(const point_slope *p, const float *sample, float u[3], float metric[6])
+{
+    for (int a = 0; a < 3; a++) {
+        u[a] += sample[SAMPLE_F] * p->df[a] + sample[SAMPLE_S] * p->by_u[a] +
+                sample[SAMPLE_R] * p->dr[a];
+        for (int i = 0; i < 3; i++) u[a] += sample[SAMPLE_G + i] * p->dg[a][i];
+    }
+    for (int a = 0; a < 6; a++) metric[a] += sample[SAMPLE_S] * p->by_metric[a];
+}
+
+// The transpose of row_slopes().
+static void row_back(const template_work *w, const point_slope *at, const float *sample,
+                     size_t first, size_t n, const station_adjoint *adjoint)
+{
+    const template_row *r = &w->row;
+    for (size_t x = 0; x < n; x++) {
+        const size_t i = first + x;
+        const float *from = sample + SAMPLE_SIZE * i;
+        sample_back(&at[i], from, adjoint->points + 4 * i, adjoint->metric + 8 * i);
+        for (int a = 0; a < 3; a++) r->u[a][x] = at[i].u[a];
+        r->value[x] = from[SAMPLE_R];
+    }
+    if (adjoint->change)
+        sdm_template_kernels()->correct_back(&w->correction_at, n, (const float *const *)r->u,
+                                             r->value, adjoint->change);
+}
+
+void sdm_template_corner_slopes_back(const template_work *w, size_t c, const point_slope *at,
+                                     const float *corner, float *sample,
+                                     const station_adjoint *adjoint)
+{
+    const size_t *n = w->k->stations, stride[3] = {1, n[0], n[0] * n[1]};
+    memset(sample, 0, SAMPLE_SIZE * stride[2] * n[2] * sizeof *sample);
+    for (size_t z = 0; z <= w->blocks[2]; z++)
+        for (size_t y = 0; y <= w->blocks[1]; y++)
+            for (size_t x = 0; x <= w->blocks[0]; x++, corner += 4)
+                corner_back(w, c, at, corner, 1 + x + stride[1] * (1 + y) + stride[2] * (1 + z),
+                            stride, sample, adjoint->points);
+    for (size_t row = 0; row < n[1] * n[2]; row++)
+        row_back(w, at, sample, row * n[0], n[0], adjoint);
 }

@@ -15,6 +15,13 @@ void sdm_template_take_slope_rows(const template_network *k, void *memory, size_
 void sdm_template_slope_rows(const template_work *w, size_t c, size_t n, template_slope_rows *rows,
                              template_slope_rows *far);
 
+/* slope[9][64] = the derivatives of the distance to part c in the voxels of a block by the index u
+   and (not of rigid parts) by the metric, as far as it is computed exactly; w->row = part c.
+   valued: the distances are wanted, too, in w->row.value. *rows, *far: memory. */
+void sdm_template_block_slopes(template_work *w, size_t c, const template_block *b, bool valued,
+                               template_slope_rows *rows, template_slope_rows *far,
+                               float *const slope[9]);
+
 /* The derivatives at a station: elements of template_slope_rows, and its index u. */
 typedef struct point_slope {
     float u[3], f, g[3], factor;
@@ -37,3 +44,15 @@ void sdm_template_station_slopes(const template_work *w, size_t c, template_slop
    sample[stations][8]: memory for the derivatives of the samples. */
 void sdm_template_corner_slopes(const template_work *w, size_t c, const point_slope *at,
                                 const station_motion *m, float *sample, float *corner);
+
+/* Adjoints of what station_motion describes. */
+typedef struct station_adjoint {
+    float *points, *metric;
+    float *change; /* of the correction's map; NULL: none */
+} station_adjoint;
+
+/* The transpose of sdm_template_corner_slopes(): adds to *adjoint what follows from the adjoints
+   corner[corners][4]. sample[stations][8]: memory for the adjoints of the samples. */
+void sdm_template_corner_slopes_back(const template_work *w, size_t c, const point_slope *at,
+                                     const float *corner, float *sample,
+                                     const station_adjoint *adjoint);

@@ -66,3 +66,16 @@ void sdm_template_blend_slope(const template_work *w, float share, const float *
     for (size_t v = 0; v < VOXELS; v++)
         slope[v] += share * (far_slope[v] - slope[v]) + share_slope * (far[v] - exact[v]);
 }
+
+void sdm_template_blend_slope_back(const template_work *w, float share, const float *far,
+                                   const float *exact, float *adjoint, float *far_adjoint)
+{
+    const size_t least = least_voxel(far);
+    double by_share = 0;
+    for (size_t v = 0; v < VOXELS; v++) {
+        by_share += (double)(adjoint[v] * (far[v] - exact[v]));
+        far_adjoint[v] = share * adjoint[v];
+        adjoint[v] -= far_adjoint[v];
+    }
+    far_adjoint[least] += copysignf(voxels_per_mm(w), far[least]) * (float)by_share;
+}

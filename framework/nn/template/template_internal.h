@@ -59,6 +59,10 @@ void sdm_template_frames_slope(const template_network *k, const double *g, const
 /* control[nodes][4] = sum over the modes m of a[m] mode_m; the fourth element is 0. */
 void sdm_template_control(const sdm_template_part *part, const double *a, float *control);
 
+/* The transpose: a[M] = the adjoints of the amplitudes, from those of control[nodes][4], which is
+   changed. */
+void sdm_template_control_back(const sdm_template_part *part, float *control, double *a);
+
 /* u[3] = the displacement of a warp with `control` at y[3]; unless NULL, du[9] = its derivative,
    row-major, and ddu[3][9]: ddu[c] = derivative of du by y[c]. Beyond the lattice the displacement
    is that of the nearest point of the lattice. */
@@ -70,9 +74,18 @@ void sdm_template_displacement(const sdm_lattice *l, const float *control, const
 void sdm_template_metric(const double b[9], float metric[6]);
 void sdm_template_metric_slope(const double b[9], const double db[9], float slope[6]);
 
+/* The transpose: adds to db[9] what follows from the adjoint slope[6]. */
+void sdm_template_metric_slope_back(const double b[9], const double slope[6], double db[9]);
+
 /* out[9] = derivative of the inverse of the frame's matrix m when m has the derivative dm[9]:
    -m^-1 dm m^-1. */
 void sdm_template_inverse_slope(const part_pose *pose, const double dm[9], double out[9]);
+
+/* The warp of a part with these control displacements, [nodes][4]. */
+template_warp sdm_template_warp_of(const sdm_template_part *part, const float *control);
+
+/* out[3] = the position of the station x, y, z of the lattice of stations in the world. */
+void sdm_template_station_world(const sdm_grid *grid, size_t x, size_t y, size_t z, double out[3]);
 
 /* Scratch memory of a warp for one map. */
 typedef struct warp_scratch {
@@ -97,6 +110,11 @@ void sdm_template_spline(float *v, size_t n, size_t stride, size_t width);
 /* Turns points[stations][4] into the coefficients of the cubic B-splines that interpolate them. */
 void sdm_template_prefilter(const template_network *k, float *points);
 
+/* Its transpose: turns adjoints of the coefficients into adjoints of the points. */
+void sdm_template_prefilter_back(const template_network *k, float *points);
+
+/* template_warp_slopes.c: derivatives of the inverse of a warp. */
+
 /* A direction in which a part with a warp changes. */
 typedef struct warp_motion {
     double inverse[9];    /* derivative of the inverse of the frame's matrix; */
@@ -113,7 +131,20 @@ void sdm_template_invert_slopes(const template_network *k, const sdm_template_pa
                                 const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,
                                 size_t n, const warp_motion *motion);
 
-/* template_forward.c, template_slopes.c: entries of the function table sdm_model_kind. */
+/* Adjoints of the inputs of a part with a warp, see warp_motion. */
+typedef struct warp_adjoint {
+    double inverse[9], shift[3];
+    float *control; /* [nodes][4] */
+} warp_adjoint;
+
+/* The transpose of sdm_template_invert_slopes(): adds to *adjoint what follows from the adjoints
+   points[stations][4] (of the points, not of coefficients) and metric[stations][8]. */
+void sdm_template_invert_back(const template_network *k, const sdm_template_part *part,
+                              const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,
+                              const float *points, const float *metric, warp_adjoint *adjoint);
+
+/* template_forward.c, template_slopes.c, template_reverse.c: entries of the function table
+ * sdm_model_kind. */
 size_t sdm_template_scratch_bytes(const sdm_model *m, size_t n, int n_threads);
 void sdm_template_forward(const sdm_model *m, const double *params, size_t n, float *values,
                           void *scratch, int n_threads);
@@ -123,6 +154,9 @@ void sdm_template_jacobian(const sdm_model *m, const double *params, float *valu
 size_t sdm_template_jvp_scratch_bytes(const sdm_model *m, int n_threads);
 void sdm_template_jvp(const sdm_model *m, const double *params, const double *direction,
                       float *values, float *tangent, void *scratch, int n_threads);
+size_t sdm_template_vjp_scratch_bytes(const sdm_model *m);
+void sdm_template_vjp(const sdm_model *m, const double *params, const float *adjoint,
+                      double *gradient, void *scratch);
 
 /* template_onnx.c: entry of the function table. */
 sdm_onnx_value sdm_template_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value x);

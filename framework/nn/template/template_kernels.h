@@ -155,6 +155,20 @@ typedef struct template_table {
        order; that of the first one is y of the first one of the line before, moved. */
     void (*invert_line)(const template_warp *w, template_stations *s);
     void (*invert_in_turn)(const template_warp *w, template_stations *s);
+    /* Transposes of kernels: add to the adjoints of what a kernel reads those that follow from the
+       adjoints of what it writes.
+       expand_back: c[9][64] of `expand`, to points[4][4][4][4] and metric[2][2][2][8]; line, plane:
+       stations from one station to the next along y and z.
+       block_back: value[64] of `block`, to its corners.
+       correct_back: value[n], at the indices u[3][n], of `correct`, to the map of c,
+       map[nz][ny][nx]. displace_back: sum[4][4] of `displace`, to the control points. */
+    void (*expand_back)(const template_expansion *e, const float *const *c, size_t line,
+                        size_t plane, float *points, float *metric);
+    void (*block_back)(const float *value, size_t line, size_t plane, float *corner);
+    void (*correct_back)(const template_correction *c, size_t n, const float *const *u,
+                         const float *value, float *map);
+    void (*displace_back)(const template_warp *w, const template_place *place,
+                          const float (*sum)[4], float *control);
 } template_table;
 
 extern const template_table sdm_template_generic;

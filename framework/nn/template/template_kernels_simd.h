@@ -422,4 +422,8 @@ const template_table TABLE = {.expand = expand,
                               .find_place = find_place,
                               .displace = displace,
                               .invert_line = invert_line,
-                              .invert_in_turn = invert_in_turn};
+                              .invert_in_turn = invert_in_turn,
+                              .expand_back = expand_back,
+                              .block_back = block_back,
+                              .correct_back = correct_back,
+                              .displace_back = displace_back};

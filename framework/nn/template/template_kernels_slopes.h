@@ -1,5 +1,5 @@
-/* Inner loops for the derivatives of the `template` network; part of template_kernels_simd.h, whose
-   definitions they use. */
+/* Inner loops for the derivatives of the `template` network, in forward and in reverse mode; part
+   of template_kernels_simd.h, whose definitions they use. */
 
 typedef float quad __attribute__((vector_size(16), aligned(4)));
 
@@ -105,33 +105,39 @@ static void lookup_slopes(const template_level *l, size_t n, const float *const 
     }
 }
 
-// The compiler makes vectors of this loop, as of normalise().
+static inline vec root_of(vec v)
+{
+    vec root;
+    EACH(l, VW) root[l] = sqrtf(v[l]);
+    return root;
+}
+
 static void factor_slopes(size_t n, const float *const *metric, const template_slope_rows *r)
 {
-    const float e = 1e-3f;
-    for (size_t i = 0; i < n; i++) {
-        const float x = r->g[0][i], y = r->g[1][i], z = r->g[2][i];
-        const float xx = metric[0][i], yy = metric[1][i], zz = metric[2][i], yz = metric[3][i],
-                    xz = metric[4][i], xy = metric[5][i];
+    const vec e = splat(1e-3f), third = splat(1.0f / 3);
+    for (size_t v = 0; v < n; v += VW) {
+        const vec x = load(r->g[0] + v), y = load(r->g[1] + v), z = load(r->g[2] + v);
+        const vec xx = load(metric[0] + v), yy = load(metric[1] + v), zz = load(metric[2] + v),
+                  yz = load(metric[3] + v), xz = load(metric[4] + v), xy = load(metric[5] + v);
         // factor = sqrt(p / q), p = g^T g + e, q = g^T G g + e t
-        const float gx = xx * x + xy * y + xz * z, gy = xy * x + yy * y + yz * z,
-                    gz = xz * x + yz * y + zz * z;
-        const float p = x * x + y * y + z * z + e,
-                    q = x * gx + y * gy + z * gz + e * ((xx + yy + zz) * (1.0f / 3));
-        const float per_p = 1 / p, per_q = 1 / q, factor = sqrtf(p / q), h = -0.5f * factor * per_q;
+        const vec gx = xx * x + xy * y + xz * z, gy = xy * x + yy * y + yz * z,
+                  gz = xz * x + yz * y + zz * z;
+        const vec p = x * x + y * y + z * z + e,
+                  q = x * gx + y * gy + z * gz + e * ((xx + yy + zz) * third);
+        const vec per_p = 1 / p, per_q = 1 / q, factor = root_of(p / q), h = -0.5f * factor * per_q;
         // the derivative of the factor by g
-        const float fx = factor * (x * per_p - gx * per_q), fy = factor * (y * per_p - gy * per_q),
-                    fz = factor * (z * per_p - gz * per_q);
-        r->factor[i] = factor;
-        r->by_u[0][i] = fx * r->dg[0][0][i] + fy * r->dg[0][1][i] + fz * r->dg[0][2][i];
-        r->by_u[1][i] = fx * r->dg[1][0][i] + fy * r->dg[1][1][i] + fz * r->dg[1][2][i];
-        r->by_u[2][i] = fx * r->dg[2][0][i] + fy * r->dg[2][1][i] + fz * r->dg[2][2][i];
-        r->by_metric[0][i] = h * (x * x + e * (1.0f / 3));
-        r->by_metric[1][i] = h * (y * y + e * (1.0f / 3));
-        r->by_metric[2][i] = h * (z * z + e * (1.0f / 3));
-        r->by_metric[3][i] = 2 * h * (y * z);
-        r->by_metric[4][i] = 2 * h * (x * z);
-        r->by_metric[5][i] = 2 * h * (x * y);
+        const vec fx = factor * (x * per_p - gx * per_q), fy = factor * (y * per_p - gy * per_q),
+                  fz = factor * (z * per_p - gz * per_q);
+        store(r->factor + v, factor);
+        EACH(a, 3)
+        store(r->by_u[a] + v,
+              fx * load(r->dg[a][0] + v) + fy * load(r->dg[a][1] + v) + fz * load(r->dg[a][2] + v));
+        store(r->by_metric[0] + v, h * (x * x + e * third));
+        store(r->by_metric[1] + v, h * (y * y + e * third));
+        store(r->by_metric[2] + v, h * (z * z + e * third));
+        store(r->by_metric[3] + v, 2 * h * (y * z));
+        store(r->by_metric[4] + v, 2 * h * (x * z));
+        store(r->by_metric[5] + v, 2 * h * (x * y));
     }
 }
 
@@ -171,5 +177,175 @@ static void sum_products(size_t n, const float *const *a, const float *const *b,
         vec total = load(a[0] + i) * load(b[0] + i);
         for (size_t k = 1; k < n; k++) total += load(a[k] + i) * load(b[k] + i);
         store(sum + i, total);
+    }
+}
+
+/* Reverse mode: transposes of kernels. From the adjoints of the values that a kernel writes follow
+   those of the values that it reads. */
+
+// out[16] = the sum of w[z] planes[z][16] over four planes of a block.
+static inline void sum_planes(const float *planes, const float w[4], float *out)
+{
+    for (int i = 0; i < 16; i++)
+        out[i] = w[0] * planes[i] + w[1] * planes[16 + i] +
+                 (w[2] * planes[32 + i] + w[3] * planes[48 + i]);
+}
+
+// The same for four lines of four voxels each.
+static inline quad sum_lines(const float *lines, const float w[4])
+{
+    const quad *line = (const quad *)lines;
+    return w[0] * line[0] + w[1] * line[1] + (w[2] * line[2] + w[3] * line[3]);
+}
+
+static inline void add_quad(float *to, quad v) { *(quad *)to += v; }
+
+/* expand_back: along z, then y, then x. After two axes line[x][4] holds the four components of a
+   line of voxels, for each station along y and z. */
+
+static inline void expand_points_back(const float (*cubic)[4], const float *const *c,
+                                      ptrdiff_t line, ptrdiff_t plane, float *points)
+{
+    EACH(k, 4)
+    {
+        float planes[3][16];
+        EACH(a, 3) sum_planes(c[a], cubic[k], planes[a]);
+        EACH(j, 4)
+        {
+            quad row[3];
+            EACH(a, 3) row[a] = sum_lines(planes[a], cubic[j]);
+            float *to = points + 4 * (k * plane + j * line);
+            quad sum[4] = {{0}};
+            EACH(x, 4)
+            {
+                const quad v = {row[0][x], row[1][x], row[2][x], 0};
+                EACH(i, 4) sum[i] += cubic[i][x] * v;
+            }
+            EACH(i, 4) add_quad(to + 4 * i, sum[i]);
+        }
+    }
+}
+
+static inline void expand_metric_back(const float linear[4], const float *const *c, ptrdiff_t line,
+                                      ptrdiff_t plane, float *metric)
+{
+    float weight[2][4]; // of the two stations
+    EACH(x, 4) weight[0][x] = 1 - linear[x], weight[1][x] = linear[x];
+    EACH(k, 2)
+    {
+        float planes[6][16];
+        EACH(a, 6) sum_planes(c[a], weight[k], planes[a]);
+        EACH(j, 2)
+        {
+            quad row[6];
+            EACH(a, 6) row[a] = sum_lines(planes[a], weight[j]);
+            float *to = metric + 8 * (k * plane + j * line);
+            quad sum[4] = {{0}};
+            EACH(x, 4)
+            {
+                const quad low = {row[0][x], row[1][x], row[2][x], row[3][x]},
+                           high = {row[4][x], row[5][x], 0, 0};
+                EACH(i, 2)
+                {
+                    sum[2 * i] += weight[i][x] * low;
+                    sum[2 * i + 1] += weight[i][x] * high;
+                }
+            }
+            EACH(i, 4) add_quad(to + 4 * i, sum[i]);
+        }
+    }
+}
+
+static void expand_back(const template_expansion *e, const float *const *c, size_t line,
+                        size_t plane, float *points, float *metric)
+{
+    expand_points_back(e->cubic, c, (ptrdiff_t)line, (ptrdiff_t)plane, points);
+    expand_metric_back(e->linear, c + 3, (ptrdiff_t)line, (ptrdiff_t)plane, metric);
+}
+
+/* block_back. Along an axis the value at one of the two corners has the weights l of linear
+   interpolation and k of the cubic correction, the slope has the weights h. In the block the value
+   at a corner has the weight l l l + k l l + l k l + l l k, its slope along x the weight h l l. */
+enum { END_L, END_K, END_H, END_WEIGHTS };
+
+static const float END[2][END_WEIGHTS][4] = {
+    {{1, 0.75f, 0.5f, 0.25f}, {0, 0.09375f, 0, -0.09375f}, {0, 0.140625f, 0.125f, 0.046875f}},
+    {{0, 0.25f, 0.5f, 0.75f}, {0, -0.09375f, 0, 0.09375f}, {0, -0.046875f, -0.125f, -0.140625f}}};
+
+static inline float sum_line_with(quad v, const float w[4])
+{
+    return w[0] * v[0] + w[1] * v[1] + (w[2] * v[2] + w[3] * v[3]);
+}
+
+static void block_back(const float *value, size_t line, size_t plane, float *corner)
+{
+    EACH(k, 2)
+    {
+        float planes[END_WEIGHTS][16];
+        EACH(i, END_WEIGHTS) sum_planes(value, END[k][i], planes[i]);
+        EACH(j, 2)
+        {
+            const float(*w)[4] = END[j];
+            const quad l = sum_lines(planes[END_L], w[END_L]),
+                       cubic =
+                           sum_lines(planes[END_K], w[END_L]) + sum_lines(planes[END_L], w[END_K]),
+                       by_y = sum_lines(planes[END_L], w[END_H]),
+                       by_z = sum_lines(planes[END_H], w[END_L]);
+            EACH(i, 2)
+            {
+                const float(*x)[4] = END[i];
+                const quad sum = {sum_line_with(l, x[END_L]) +
+                                      (sum_line_with(l, x[END_K]) + sum_line_with(cubic, x[END_L])),
+                                  sum_line_with(l, x[END_H]), sum_line_with(by_y, x[END_L]),
+                                  sum_line_with(by_z, x[END_L])};
+                add_quad(corner + k * (ptrdiff_t)plane + j * (ptrdiff_t)line + 4 * i, sum);
+            }
+        }
+    }
+}
+
+static void correct_back(const template_correction *c, size_t n, const float *const *u,
+                         const float *value, float *map)
+{
+    const ptrdiff_t line = c->n[0], plane = line * c->n[1];
+    const cells all = cells_of(c->n, c->scale, c->offset);
+    for (size_t v = 0; v < n; v += VW) {
+        place p;
+        locate(&all, u, v, 1, &p);
+        const int count = n - v < VW ? (int)(n - v) : VW;
+        for (int i = 0; i < count; i++) {
+            const float value_here = value[v + (size_t)i], x = p.t[0][i], y = p.t[1][i],
+                        z = p.t[2][i], far = z * value_here, near = value_here - far;
+            if (value_here == 0) continue;
+            float *to = map + p.node[i];
+            const float ends[4] = {near - y * near, y * near, far - y * far, y * far};
+            EACH(e, 4)
+            {
+                float *edge = to + (e & 1) * line + (e >> 1) * plane;
+                edge[0] += ends[e] - x * ends[e];
+                edge[1] += x * ends[e];
+            }
+        }
+    }
+}
+
+static void displace_back(const template_warp *w, const template_place *p, const float (*sum)[4],
+                          float *control)
+{
+    const ptrdiff_t line = 4 * (ptrdiff_t)w->n[0], plane = line * w->n[1];
+    const float(*const weights)[2][4] = p->weights;
+    quad s[4];
+    EACH(i, 4) s[i] = *(const quad *)sum[i];
+    EACH(k, 4)
+    {
+        const float z = weights[2][0][k];
+        const quad plain = z * s[0] + weights[2][1][k] * s[3], by_x = z * s[1], by_y = z * s[2];
+        EACH(j, 4)
+        {
+            const float y = weights[1][0][j];
+            const quad f = y * plain + weights[1][1][j] * by_y, slope = y * by_x;
+            float *to = control + p->first + k * plane + j * line;
+            EACH(i, 4) add_quad(to + 4 * i, weights[0][0][i] * f + weights[0][1][i] * slope);
+        }
     }
 }

@@ -207,4 +207,6 @@ const sdm_model_kind sdm_kind_template = {.name = "template",
                                           .jacobian = sdm_template_jacobian,
                                           .jvp_scratch_bytes = sdm_template_jvp_scratch_bytes,
                                           .jvp = sdm_template_jvp,
+                                          .vjp_scratch_bytes = sdm_template_vjp_scratch_bytes,
+                                          .vjp = sdm_template_vjp,
                                           .onnx = sdm_template_onnx};

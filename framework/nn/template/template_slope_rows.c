@@ -69,3 +69,26 @@ void sdm_template_slope_rows(const template_work *w, size_t c, size_t n, templat
     else
         for (int a = 0; a < 3; a++) memset(rows->dr[a], 0, n * sizeof *rows->dr[a]);
 }
+
+void sdm_template_block_slopes(template_work *w, size_t c, const template_block *b, bool valued,
+                               template_slope_rows *rows, template_slope_rows *far,
+                               float *const slope[9])
+{
+    const template_slope_rows *r = rows;
+    const bool rigid = w->part[c].rigid;
+    if (w->loaded != c) {
+        if (valued)
+            sdm_template_run(w, c, b);
+        else
+            sdm_template_points(w, c, b);
+    }
+    sdm_template_slope_rows(w, c, SDM_TEMPLATE_BLOCK_VOXELS, rows, far);
+    for (int a = 0; a < 3; a++)
+        for (size_t v = 0; v < SDM_TEMPLATE_BLOCK_VOXELS; v++)
+            slope[a][v] = rigid
+                              ? r->df[a][v] + r->dr[a][v]
+                              : r->factor[v] * r->df[a][v] + r->f[v] * r->by_u[a][v] + r->dr[a][v];
+    for (int a = 0; a < 6 && !rigid; a++)
+        for (size_t v = 0; v < SDM_TEMPLATE_BLOCK_VOXELS; v++)
+            slope[3 + a][v] = r->f[v] * r->by_metric[a][v];
+}

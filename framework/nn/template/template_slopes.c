@@ -221,26 +221,11 @@ static void far_slope(const slopes_work *s, size_t c, size_t d, const template_b
 // w->row = part c. blended: the values are wanted, too.
 static void prepare_slopes(slopes_work *s, size_t c, const template_block *b, bool blended)
 {
-    template_work *w = &s->w;
-    const template_slope_rows *r = &s->rows;
-    if (w->loaded != c) {
-        if (blended)
-            sdm_template_run(w, c, b);
-        else
-            sdm_template_points(w, c, b);
-    }
-    sdm_template_slope_rows(w, c, VOXELS, &s->rows, &s->far);
-    const bool rigid = w->part[c].rigid;
-    for (int a = 0; a < 3; a++)
-        for (size_t v = 0; v < VOXELS; v++)
-            s->slope[a][v] =
-                rigid ? r->df[a][v] + r->dr[a][v]
-                      : r->factor[v] * r->df[a][v] + r->f[v] * r->by_u[a][v] + r->dr[a][v];
-    for (int a = 0; a < 6 && !rigid; a++)
-        for (size_t v = 0; v < VOXELS; v++) s->slope[3 + a][v] = r->f[v] * r->by_metric[a][v];
+    sdm_template_block_slopes(&s->w, c, b, blended, &s->rows, &s->far, s->slope);
+    const int n = s->w.part[c].rigid ? 3 : 9;
     for (size_t v = 0; v < VOXELS; v++)
         if (s->nearest[v] != c)
-            for (int a = 0; a < (rigid ? 3 : 9); a++) s->slope[a][v] = 0;
+            for (int a = 0; a < n; a++) s->slope[a][v] = 0;
 }
 
 // Is part c the nearest in all voxels of a block?

@@ -42,6 +42,23 @@ void sdm_template_control(const sdm_template_part *part, const double *a, float 
     }
 }
 
+void sdm_template_control_back(const sdm_template_part *part, float *control, double *a)
+{
+    enum { SUMS = 16 }; // side by side, so that the compiler vectorises
+    const size_t n = 3 * sdm_lattice_count(&part->warp);
+    for (size_t i = 0; i < n; i++) control[i] = control[4 * (i / 3) + i % 3]; // as in the modes
+    for (size_t m = 0; m < part->n_modes; m++) {
+        const float *mode = part->modes + n * m;
+        float sum[SUMS] = {0};
+        size_t i = 0;
+        for (; i + SUMS <= n; i += SUMS)
+            for (size_t l = 0; l < SUMS; l++) sum[l] += control[i + l] * mode[i + l];
+        a[m] = 0;
+        for (; i < n; i++) a[m] += (double)(control[i] * mode[i]);
+        for (size_t l = 0; l < SUMS; l++) a[m] += (double)sum[l];
+    }
+}
+
 // Weights of the four control points around a coordinate, and their first and second derivatives.
 // Returns the index of the first control point.
 static size_t spline_weights(double u, uint32_t n, double spacing, float w[4], float d[4],
@@ -106,7 +123,7 @@ void sdm_template_displacement(const sdm_lattice *l, const float *control, const
     }
 }
 
-static template_warp warp_of(const sdm_template_part *part, const float *control)
+template_warp sdm_template_warp_of(const sdm_template_part *part, const float *control)
 {
     const sdm_lattice *l = &part->warp;
     return (template_warp){.control = control,
@@ -115,8 +132,7 @@ static template_warp warp_of(const sdm_template_part *part, const float *control
                            .spacing = l->spacing};
 }
 
-// Position of a station in the world.
-static void station_world(const sdm_grid *grid, size_t x, size_t y, size_t z, double out[3])
+void sdm_template_station_world(const sdm_grid *grid, size_t x, size_t y, size_t z, double out[3])
 {
     const double step = SDM_TEMPLATE_STEP,
                  index[3] = {step * ((double)x - 1), step * ((double)y - 1),
@@ -142,6 +158,17 @@ void sdm_template_metric_slope(const double b[9], const double db[9], float slop
         double sum = 0;
         for (int e = 0; e < 3; e++) sum += db[i + e] * b[j + e] + b[i + e] * db[j + e];
         slope[c] = (float)sum;
+    }
+}
+
+void sdm_template_metric_slope_back(const double b[9], const double slope[6], double db[9])
+{
+    for (int c = 0; c < 6; c++) {
+        const int i = 3 * ROW[c], j = 3 * COLUMN[c];
+        for (int e = 0; e < 3; e++) {
+            db[i + e] += slope[c] * b[j + e];
+            db[j + e] += slope[c] * b[i + e];
+        }
     }
 }
 
@@ -196,12 +223,45 @@ void sdm_template_prefilter(const template_network *k, float *points)
     splines(points, nz, plane, plane, 1, 0);
 }
 
+// Both ends of n samples: v[0] += f v[1] and v[n-1] += f v[n-2], or the other way round (inwards).
+static void add_at_ends(float *v, size_t n, size_t stride, size_t width, bool inwards, float f)
+{
+    float *const end[2] = {v, v + (n - 1) * stride}, *const next[2] = {v + stride, end[1] - stride};
+    for (int e = 0; e < 2; e++)
+        for (size_t c = 0; c < width; c++)
+            if (inwards)
+                next[e][c] += f * end[e][c];
+            else
+                end[e][c] += f * next[e][c];
+}
+
+static void add_at_all_ends(const template_network *k, float *points, bool inwards, float f)
+{
+    const size_t nx = k->stations[0], ny = k->stations[1], nz = k->stations[2], line = 4 * nx,
+                 plane = line * ny;
+    for (size_t row = 0; row < ny * nz; row++)
+        add_at_ends(points + line * row, nx, 4, 4, inwards, f);
+    for (size_t z = 0; z < nz; z++) add_at_ends(points + plane * z, ny, line, line, inwards, f);
+    add_at_ends(points, nz, plane, plane, inwards, f);
+}
+
+void sdm_template_prefilter_back(const template_network *k, float *points)
+{
+    // Along an axis, with the symmetric matrix T of the inner samples, the coefficients are
+    // T^-1 (6 v - ends) within and v at the ends. The transpose is 6 T^-1 within; its values next
+    // to the ends, divided by 6, are subtracted from the ends. sdm_template_prefilter() computes 6
+    // T^-1 if it is given what it will subtract.
+    add_at_all_ends(k, points, true, 1.0f / 6);
+    sdm_template_prefilter(k, points);
+    add_at_all_ends(k, points, false, -1.0f / 6);
+}
+
 // q[3] = the point of the frame, without the warp, of a station.
 static void station_in_frame(const part_pose *pose, const sdm_grid *grid, size_t x, size_t y,
                              size_t z, double q[3])
 {
     double world[3];
-    station_world(grid, x, y, z, world);
+    sdm_template_station_world(grid, x, y, z, world);
     for (int c = 0; c < 3; c++) world[c] -= pose->b[c];
     m3_apply(pose->inverse, world, q);
 }
@@ -211,7 +271,7 @@ void sdm_template_invert(const template_network *k, const sdm_template_part *par
 {
     const size_t *n = k->stations;
     const template_table *kernels = sdm_template_kernels();
-    const template_warp warp = warp_of(part, w->control);
+    const template_warp warp = sdm_template_warp_of(part, w->control);
     const sdm_lattice *near = &part->near;
     template_stations s = {.n = n[0],
                            .origin = {near->origin[0], near->origin[1], near->origin[2]},
@@ -236,77 +296,4 @@ void sdm_template_invert(const template_network *k, const sdm_template_part *par
             s.station = w->station ? w->station + at : NULL;
             (in_turn ? kernels->invert_in_turn : kernels->invert_line)(&warp, &s);
         }
-}
-
-/* A station of which the derivatives are asked: the point x of the world, less the frame's b. */
-typedef struct moving_station {
-    double x[3], inverse[9], b[9], metric[9]; /* B and B B^T, see sdm_template_metric() */
-    double bend[3][9];                        /* second derivatives of the warp at y */
-    template_place place;
-} moving_station;
-
-static void prepare_station(const sdm_template_part *part, const part_pose *pose,
-                            const warp_scratch *w, const template_station *s, moving_station *out)
-{
-    double u[3], du[9], turned[9];
-    memcpy(out->inverse, s->inverse, sizeof s->inverse);
-    m3_product(s->inverse, pose->inverse, out->b);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) turned[3 * i + j] = out->b[3 * j + i];
-    m3_product(out->b, turned, out->metric);
-    sdm_template_displacement(&part->warp, w->control, s->y, u, du, out->bend);
-    const template_warp warp = warp_of(part, w->control);
-    sdm_template_kernels()->find_place(&warp, s->y, &out->place);
-}
-
-// The derivatives of a station.
-static void move_station(const sdm_template_part *part, const moving_station *s,
-                         const warp_motion *motion, float points[4], float metric[8])
-{
-    const template_warp warp = warp_of(part, motion->control);
-    double dq[3] = {0}, du[9], f[3], dy[3], a[9], am[9];
-    float sum[4][4];
-    // q = m^-1 (x - b): dq = d(m^-1) (x - b) - m^-1 db
-    if (motion->turns) m3_apply(motion->inverse, s->x, dq);
-    // y + U(y) = q: (I + U') dy = dq - dU(y)
-    sdm_template_kernels()->displace(&warp, &s->place, sum);
-    for (int c = 0; c < 3; c++) f[c] = dq[c] - motion->shift[c] - (double)sum[0][c];
-    m3_apply(s->inverse, f, dy);
-    for (int c = 0; c < 3; c++) points[c] = (float)(dy[c] * (1 / part->near.spacing));
-    points[3] = 0;
-    // B = J^-1 m^-1, J = I + U': dB = -J^-1 dJ B + J^-1 d(m^-1), dJ = dU' + U'' dy.
-    // The metric G = B B^T changes by H + H^T with H = dB B^T = -J^-1 dJ G + J^-1 d(m^-1) B^T.
-    for (int e = 0; e < 9; e++)
-        du[e] = (double)sum[1 + e % 3][e / 3] +
-                (s->bend[0][e] * dy[0] + s->bend[1][e] * dy[1] + s->bend[2][e] * dy[2]);
-    m3_product(s->inverse, du, a);
-    m3_product(a, s->metric, am);
-    if (motion->turns) {
-        m3_product(s->inverse, motion->inverse, a);
-        for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++)
-                am[3 * i + j] -= a[3 * i] * s->b[3 * j] + a[3 * i + 1] * s->b[3 * j + 1] +
-                                 a[3 * i + 2] * s->b[3 * j + 2];
-    }
-    for (int c = 0; c < 6; c++)
-        metric[c] = (float)-(am[3 * ROW[c] + COLUMN[c]] + am[3 * COLUMN[c] + ROW[c]]);
-    metric[6] = metric[7] = 0;
-}
-
-void sdm_template_invert_slopes(const template_network *k, const sdm_template_part *part,
-                                const part_pose *pose, const sdm_grid *grid, const warp_scratch *w,
-                                size_t n, const warp_motion *motion)
-{
-    size_t at = 0;
-    for (size_t z = 0; z < k->stations[2]; z++)
-        for (size_t y = 0; y < k->stations[1]; y++)
-            for (size_t x = 0; x < k->stations[0]; x++, at++) {
-                moving_station s;
-                station_world(grid, x, y, z, s.x);
-                for (int c = 0; c < 3; c++) s.x[c] -= pose->b[c];
-                prepare_station(part, pose, w, &w->station[at], &s);
-                for (size_t d = 0; d < n; d++)
-                    move_station(part, &s, &motion[d], motion[d].points + 4 * at,
-                                 motion[d].metric + 8 * at);
-            }
 }

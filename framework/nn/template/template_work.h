@@ -183,6 +183,11 @@ void sdm_template_blend(float share, const float *far, const float *exact, float
 void sdm_template_blend_slope(const template_work *w, float share, const float *far,
                               const float *exact, const float *far_slope, float *slope);
 
+/* The transpose: far_adjoint[64] = the adjoint of far_slope; adjoint[64], which holds that of the
+   derivative, becomes that of `slope` before the blend. */
+void sdm_template_blend_slope_back(const template_work *w, float share, const float *far,
+                                   const float *exact, float *adjoint, float *far_adjoint);
+
 /* template_blocks.c. The centres of all blocks for part c, and the bounds for the culling. After
    its corners. */
 void sdm_template_centres(template_work *w, size_t c);

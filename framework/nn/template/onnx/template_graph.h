@@ -6,7 +6,7 @@
    `near`. */
 #pragma once
 
-#include "template_work.h"
+#include "template/template_work.h"
 
 /* The values of a part that are computed before the loop. */
 typedef struct part_graph {

@@ -107,8 +107,9 @@ SDM_API sdm_status sdm_generate_jvp(const sdm_model *m, const double *params,
 
 /* gradient[n_params] = J^T adjoint[nz][ny][nx]: if `adjoint` is the derivative of a function of the
    map with respect to the voxels, this is its derivative with respect to the parameters. Costs as
-   much as a few maps, whatever the number of parameters. No map is computed, so `check` and
-   `max_error_mm` have no effect; otherwise as sdm_generate_jacobian(). [any thread] */
+   much as 4 to 6 maps, whatever the number of parameters; with "deepsdf" and "imnet" as much as
+   the Jacobian. No map is computed, so `check` and `max_error_mm` have no effect; otherwise as
+   sdm_generate_jacobian(). [any thread] */
 SDM_API sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, const float *adjoint,
                                     const sdm_generate_opts *opts, double *gradient,
                                     sdm_result *result, sdm_error *err);

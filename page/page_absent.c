@@ -1,5 +1,6 @@
-/* A page reads and writes no files, and asks for no products with transposed Jacobians. The functions
- * of this file take the place of the library's, which would make every page 30 kB larger. */
+/* A page reads and writes no files, and asks for no products with transposed Jacobians. The
+ * functions of this file take the place of the library's, which would make every page 30 kB larger.
+ */
 #include "model/model_kind.h"
 #include "pod/pod_internal.h"
 #include "point/point_internal.h"

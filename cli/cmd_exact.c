@@ -335,14 +335,8 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
                    .error_mm = j->report.union_error_mm + j->bound_mm,
                    .origin = j->args->method,
                    .engine = j->args->narrow > 0 ? NULL : j->engine};
-    sdm_status s = SDM_OK;
     if (cli_writes_surface(j->args)) cli_map_compare(&j->mesh, &map);
-    for (size_t i = 0; i < j->args->outputs.n && !s; i++) {
-        const char *path = j->args->outputs.items[i];
-        s = cli_write_map(path, &map, j->args, err);
-        if (cli_ends_with_any(path, CLI_MESH_ENDINGS)) map.volume = 0; // compared once
-    }
-    return s;
+    return cli_write_maps(j->args->outputs.items, j->args->outputs.n, &map, j->args, err);
 }
 
 static sdm_status print_json(const job *j, sdm_error *err)

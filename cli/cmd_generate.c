@@ -9,7 +9,6 @@
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "measure/measures.h"
-#include "report/files.h"
 #include "report/generate_files.h"
 #include "report/json_values.h"
 #include "report/output.h"
@@ -32,8 +31,9 @@
 typedef struct job {
     const cli_args *args;
     sdm_registry *registry;
-    sdm_instance *shape; /* for the exact engine and checks; NULL: not needed */
-    sdm_instance *solid; /* to compare surfaces with; NULL: none is written, or it is not known */
+    /* for the exact engine and checks, and to compare surfaces with; NULL: not needed, or only to
+       compare and not known */
+    sdm_instance *shape;
     sdm_model *model;
     const sdm_model_info *info;
     sdm_param *params;
@@ -80,7 +80,6 @@ static void job_dispose(job *j)
     sdm_free(j->params);
     sdm_model_free(j->model);
     sdm_instance_free(j->shape);
-    sdm_instance_free(j->solid);
     sdm_registry_free(j->registry);
 }
 
@@ -143,16 +142,17 @@ static sdm_status open_shape(job *j, sdm_error *err)
     const bool checks = args->check || args->max_error > 0 || args->measure;
     const bool exact =
         cli_policy(args) == SDM_RANGE_EXACT || cli_outside(args) == SDM_OUTSIDE_EXACT;
-    if (cli_writes_surface(args) && !cli_open_registry(args, &j->registry, NULL))
-        (void)sdm_runtime_instance(j->model, j->registry, &j->solid, NULL);
-    if (!checks && !exact) return SDM_OK;
-    sdm_status s = j->registry ? SDM_OK : cli_open_registry(args, &j->registry, err);
-    if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, err);
-    return s && checks ? sdm_fail_in(err, s, "--%s needs the exact shape",
-                                     args->check           ? "check"
-                                     : args->max_error > 0 ? "max-error"
-                                                           : "measure")
-                       : s;
+    if (!checks && !exact && !cli_writes_surface(args)) return SDM_OK;
+    sdm_error why = {0};
+    sdm_status s = cli_open_registry(args, &j->registry, &why);
+    if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, &why);
+    if (!s || (!checks && !exact)) return SDM_OK;
+    if (err) *err = why;
+    return checks ? sdm_fail_in(err, s, "--%s needs the exact shape",
+                                args->check           ? "check"
+                                : args->max_error > 0 ? "max-error"
+                                                      : "measure")
+                  : s;
 }
 
 /* Chooses the grid. On another grid than the model's, level sets alone need no whole maps. */
@@ -235,7 +235,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
 static void compare_shape(const job *j, size_t row, cli_map *map)
 {
     sdm_mesh mesh = {0};
-    if (!sdm_instance_mesh(j->solid, j->rows + row * j->info->n_params, &mesh, NULL))
+    if (!sdm_instance_mesh(j->shape, j->rows + row * j->info->n_params, &mesh, NULL))
         cli_map_compare(&mesh, map);
     sdm_mesh_dispose(&mesh);
 }
@@ -261,12 +261,8 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
                    .reason = result->reason,
                    .check = result->checked ? &result->check : NULL};
     if (result->source == SDM_SOURCE_NETWORK) map.trained_mm = sdm_grid_coarsest(&j->info->grid);
-    if (j->solid) compare_shape(j, row, &map);
-    for (size_t i = 0; i < j->args->outputs.n && !s; i++) {
-        const char *path = files->list.items[i];
-        s = cli_write_map(path, &map, j->args, err);
-        if (cli_ends_with_any(path, CLI_MESH_ENDINGS)) map.volume = 0; // compared once
-    }
+    if (j->shape && cli_writes_surface(j->args)) compare_shape(j, row, &map);
+    if (!s) s = cli_write_maps(files->list.items, j->args->outputs.n, &map, j->args, err);
     sdm_text_dispose(&params);
     return s;
 }

@@ -343,3 +343,14 @@ sdm_status cli_number_path(const char *path, size_t row, char *buf, size_t size,
         return sdm_fail(err, SDM_E_ARG, "output '%.100s...': the name is too long", path);
     return SDM_OK;
 }
+
+sdm_status cli_write_maps(const char *const *paths, size_t n, cli_map *map, const cli_args *args,
+                          sdm_error *err)
+{
+    sdm_status s = SDM_OK;
+    for (size_t i = 0; i < n && !s; i++) {
+        s = cli_write_map(paths[i], map, args, err);
+        if (cli_ends_with_any(paths[i], CLI_MESH_ENDINGS)) map->volume = 0; // compared once
+    }
+    return s;
+}

@@ -32,6 +32,11 @@ typedef struct cli_map {
     sdm_exact *engine;      /* makes the same map on other grids; NULL: none */
 } cli_map;
 
+/* Writes the map to the n files in paths[]; compares only the first surface with the shape. Errors
+ * as cli_write_map(). */
+sdm_status cli_write_maps(const char *const *paths, size_t n, cli_map *map, const cli_args *args,
+                          sdm_error *err);
+
 /* Sets what surfaces are compared with, to the values of the mesh of the shape: map->volume, and
  * map->pieces where no parts grow together. Nothing for an open mesh, or one with parts that are
  * inside out. */

@@ -137,23 +137,46 @@ sdm_status sdm_config_read(const char *path, const char *const *overrides, size_
     return s;
 }
 
+/* Bytes of the value of a plain field. */
+static size_t value_bytes(const sdm_field *f)
+{
+    static const size_t bytes[] = {[SDM_FIELD_INT] = sizeof(int),
+                                   [SDM_FIELD_INT64] = sizeof(int64_t),
+                                   [SDM_FIELD_UINT64] = sizeof(uint64_t),
+                                   [SDM_FIELD_REAL] = sizeof(double),
+                                   [SDM_FIELD_CHOICE] = sizeof(int)};
+    return bytes[f->type];
+}
+
+/* A reader that sets the fields of *plain, a copy of a configuration, to their defaults. */
+static sdm_reader defaults_reader(sdm_config *plain, sdm_mistakes *mistakes)
+{
+    sdm_reader r = {.target = plain, .config = plain, .mistakes = mistakes};
+    r.sections = sdm_config_sections(&r.n_sections);
+    return r;
+}
+
+/* Is the value of a plain field the default of this kind of network? plain: reads defaults. */
+static bool has_default(const sdm_config *c, sdm_reader *plain, const sdm_field *f, int kind)
+{
+    sdm_field_set_default(plain, f, f->kind_defs ? f->kind_defs[kind] : f->def);
+    return !memcmp((const char *)c + f->offset, (const char *)plain->config + f->offset,
+                   value_bytes(f));
+}
+
 /* Gives a key the default of `kind` if it has that of `auto`. plain: reads defaults. */
 static void choose_default(sdm_config *c, sdm_reader *plain, const sdm_field *f, int kind)
 {
-    const size_t size = f->type == SDM_FIELD_REAL ? sizeof(double) : sizeof(int);
-    char *value = (char *)c + f->offset, *other = (char *)plain->config + f->offset;
-    sdm_field_set_default(plain, f, f->kind_defs[SDM_NETWORK_AUTO]);
-    if (memcmp(value, other, size) != 0) return;
+    if (!has_default(c, plain, f, SDM_NETWORK_AUTO)) return;
     sdm_field_set_default(plain, f, f->kind_defs[kind]);
-    memcpy(value, other, size);
+    memcpy((char *)c + f->offset, (const char *)plain->config + f->offset, value_bytes(f));
 }
 
 void sdm_config_choose_kind(sdm_config *c, sdm_network_kind kind)
 {
     sdm_config plain = *c;
     sdm_mistakes mistakes = {.file = ""};
-    sdm_reader r = {.target = &plain, .config = &plain, .mistakes = &mistakes};
-    r.sections = sdm_config_sections(&r.n_sections);
+    sdm_reader r = defaults_reader(&plain, &mistakes);
     for (size_t s = 0; s < r.n_sections; s++)
         for (size_t k = 0; k < r.sections[s].n_fields; k++)
             if (r.sections[s].fields[k].kind_defs)
@@ -162,26 +185,12 @@ void sdm_config_choose_kind(sdm_config *c, sdm_network_kind kind)
     if (kind != SDM_NETWORK_POD) c->data.sampling = SDM_SAMPLING_UNIFORM;
 }
 
-/* Is the value of a plain field the default of the kind of network? plain: reads defaults. */
-static bool has_default(const sdm_config *c, sdm_reader *plain, const sdm_field *f)
-{
-    static const size_t bytes[] = {[SDM_FIELD_INT] = sizeof(int),
-                                   [SDM_FIELD_INT64] = sizeof(int64_t),
-                                   [SDM_FIELD_UINT64] = sizeof(uint64_t),
-                                   [SDM_FIELD_REAL] = sizeof(double),
-                                   [SDM_FIELD_CHOICE] = sizeof(int)};
-    sdm_field_set_default(plain, f, f->kind_defs ? f->kind_defs[c->network.kind] : f->def);
-    return !memcmp((const char *)c + f->offset, (const char *)plain->config + f->offset,
-                   bytes[f->type]);
-}
-
 void sdm_config_changed_keys(const sdm_config *c, const char *section, const char *but,
                              sdm_text *out)
 {
     sdm_config plain = *c;
     sdm_mistakes mistakes = {.file = ""};
-    sdm_reader r = {.target = &plain, .config = &plain, .mistakes = &mistakes};
-    r.sections = sdm_config_sections(&r.n_sections);
+    sdm_reader r = defaults_reader(&plain, &mistakes);
     for (size_t s = 0; s < r.n_sections; s++)
         for (size_t k = 0; k < r.sections[s].n_fields; k++) {
             const sdm_field *f = &r.sections[s].fields[k];
@@ -189,7 +198,8 @@ void sdm_config_changed_keys(const sdm_config *c, const char *section, const cha
             snprintf(word, sizeof word, " %s ", f->key);
             if (strcmp(r.sections[s].name, section) || strstr(but, word) ||
                 f->type == SDM_FIELD_SPECIAL || f->type == SDM_FIELD_TEXT ||
-                !sdm_kind_has(f, (int)c->network.kind) || has_default(c, &r, f))
+                !sdm_kind_has(f, (int)c->network.kind) ||
+                has_default(c, &r, f, (int)c->network.kind))
                 continue;
             sdm_text_add(out, "%s%s.%s", out->size ? ", " : "", section, f->key);
         }

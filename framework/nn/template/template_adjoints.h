@@ -1,6 +1,7 @@
 /* The product of an adjoint with the Jacobian of a template network, in reverse mode: scratch
-   memory of the files template_reverse*.c. Words as in template_work.h; adjoint of x   the
-   derivative of sum over the voxels of (given adjoint) * map by x */
+   memory of the files template_reverse*.c. The caller gives a number a[v] for each voxel v; the
+   adjoint of a quantity x is the derivative of the sum over v of a[v] * map[v] by x. Other words as
+   in template_work.h. */
 #pragma once
 
 #include "template_derivative.h"
@@ -11,16 +12,16 @@ typedef struct part_adjoint {
        and of the metric. */
     double from[3], by[3][3], metric[6];
     /* With a warp, of the stations and of the corners of the blocks. */
-    float *points;  /* [stations][4], of the coefficients of the B-splines */
-    float *station; /* [stations][8], of their metric */
-    float *corner;  /* [corners][4] */
+    float *points;  /* [stations][4] adjoints of the B-spline coefficients of the carried points */
+    float *station; /* [stations][8] adjoints of the metric at the stations */
+    float *corner;  /* [corners][4] adjoints of distance and slopes at the corners */
     warp_adjoint warp;
 } part_adjoint;
 
 /* Scratch memory of the product. */
 typedef struct reverse_work {
     template_work w;
-    const float *adjoint; /* [nz][ny][nx], of the map */
+    const float *adjoint; /* [nz][ny][nx] a[v], given by the caller */
     part_adjoint *part;   /* [n_parts] */
     size_t stations, corners;
     float *control;                /* adjoint of the control points of one part */

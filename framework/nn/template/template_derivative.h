@@ -45,7 +45,7 @@ void sdm_template_station_slopes(const template_work *w, size_t c, template_slop
 void sdm_template_corner_slopes(const template_work *w, size_t c, const point_slope *at,
                                 const station_motion *m, float *sample, float *corner);
 
-/* Adjoints of what station_motion describes. */
+/* Adjoints of the quantities whose derivatives station_motion holds. */
 typedef struct station_adjoint {
     float *points, *metric;
     float *change; /* of the correction's map; NULL: none */

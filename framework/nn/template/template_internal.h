@@ -81,7 +81,7 @@ void sdm_template_metric_slope_back(const double b[9], const double slope[6], do
    -m^-1 dm m^-1. */
 void sdm_template_inverse_slope(const part_pose *pose, const double dm[9], double out[9]);
 
-/* The warp of a part with these control displacements, [nodes][4]. */
+/* Returns the warp of a part whose control displacements are control[nodes][4]. */
 template_warp sdm_template_warp_of(const sdm_template_part *part, const float *control);
 
 /* out[3] = the position of the station x, y, z of the lattice of stations in the world. */

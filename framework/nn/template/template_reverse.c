@@ -120,7 +120,7 @@ static void warp_back(reverse_work *s, size_t c)
                              part->station, &part->warp);
 }
 
-/* Parameters. */
+/* From the adjoints of frames, warps and correction to the gradient by the parameters. */
 
 static double dot(const double *a, const double *b, size_t n)
 {

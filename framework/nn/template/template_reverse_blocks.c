@@ -105,7 +105,7 @@ static void add_interpolated(const reverse_work *s, size_t c, const template_blo
 // s->exact = the adjoint of the map in the voxels in which part c is the nearest, else 0.
 static void mask_block(const reverse_work *s, size_t c)
 {
-    uint8_t nearest[VOXELS]; // a copy: no store changes it, so the compiler vectorises
+    uint8_t nearest[VOXELS]; // local: stores to other arrays cannot change it, so loops vectorise
     float kept[VOXELS];
     memcpy(nearest, s->nearest, sizeof nearest);
     for (size_t v = 0; v < VOXELS; v++) kept[v] = nearest[v] == (uint8_t)c ? s->given[v] : 0;
@@ -132,7 +132,7 @@ static void block_back(reverse_work *s, size_t c, const template_block *b)
     add_exact(s, c, b);
 }
 
-// s->nearest = the part with the smallest value in each voxel of a block.
+// s->nearest[64] = for each voxel of the block, the number of the part whose distance is smallest.
 static void find_nearest(reverse_work *s, const template_block *b)
 {
     if (s->w.k->n_parts > 1) {

@@ -99,7 +99,7 @@ static void apply_transpose(const double m[9], const double x[3], double out[3])
     for (int i = 0; i < 3; i++) out[i] = m[i] * x[0] + m[3 + i] * x[1] + m[6 + i] * x[2];
 }
 
-// out = a^T b
+// out = a^T b, the product of the transpose of a with b
 static void product_of_transpose(const double a[9], const double b[9], double out[9])
 {
     for (int i = 0; i < 3; i++)

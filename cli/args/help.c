@@ -70,23 +70,62 @@ static void add_cell(sdm_text *out, const char *text)
     for (; *text; text++) sdm_text_add(out, *text == '|' ? "\\|" : "%c", *text);
 }
 
+/* From so many commands on, an option has its row once, above all commands. */
+enum { SHARED_FROM = 6 };
+
+static bool is_shared(const cli_option *o)
+{
+    int n = 0;
+    for (size_t command = 0; command < CLI_N_COMMANDS; command++) n += cli_option_fits(o, command);
+    return n >= SHARED_FROM;
+}
+
+static void add_row(sdm_text *out, const cli_option *o)
+{
+    char form[128];
+    sdm_text_add(out, "| `");
+    add_cell(out, cli_option_form(o, form));
+    sdm_text_add(out, "` | ");
+    add_cell(out, o->help);
+    sdm_text_add(out, " |\n");
+}
+
+static void add_shared(sdm_text *out)
+{
+    sdm_text_add(out, "## Options of many commands\n\nEach command below names those that it "
+                      "has.\n\n| option | meaning |\n|---|---|\n");
+    for (size_t i = 0; i < cli_n_options; i++)
+        if (is_shared(&cli_options[i])) add_row(out, &cli_options[i]);
+    sdm_text_add(out, "\n");
+}
+
+/* The options of one command: a table of its own, and the names of those of add_shared(). */
+static void add_options(sdm_text *out, size_t command)
+{
+    size_t own = 0, shared = 0;
+    for (size_t i = 0; i < cli_n_options; i++) {
+        const cli_option *o = &cli_options[i];
+        if (!cli_option_fits(o, command) || is_shared(o)) continue;
+        if (!own++) sdm_text_add(out, "\n| option | meaning |\n|---|---|\n");
+        add_row(out, o);
+    }
+    for (size_t i = 0; i < cli_n_options; i++) {
+        const cli_option *o = &cli_options[i];
+        if (!cli_option_fits(o, command) || !is_shared(o)) continue;
+        sdm_text_add(out, shared++ ? ", `--%s`" : "\nOptions of many commands: `--%s`", o->name);
+    }
+    if (shared) sdm_text_add(out, ".\n");
+}
+
 void cli_help_markdown(sdm_text *out)
 {
+    add_shared(out);
     for (size_t command = 0; command < CLI_N_COMMANDS; command++) {
         const cli_command *c = &cli_commands[command];
         sdm_text_add(out, "## %s\n\n```\nsdmgen %s %s\n```\n\n%c%s.\n", c->name, c->name,
                      c->synopsis, c->summary[0] - 'a' + 'A', c->summary + 1);
         if (c->details) sdm_text_add(out, "%s\n", c->details);
-        sdm_text_add(out, "\n| option | meaning |\n|---|---|\n");
-        for (size_t i = 0; i < cli_n_options; i++) {
-            if (!cli_option_fits(&cli_options[i], command)) continue;
-            char form[128];
-            sdm_text_add(out, "| `");
-            add_cell(out, cli_option_form(&cli_options[i], form));
-            sdm_text_add(out, "` | ");
-            add_cell(out, cli_options[i].help);
-            sdm_text_add(out, " |\n");
-        }
+        add_options(out, command);
         if (c->example) sdm_text_add(out, "\n```\n%s\n```\n", c->example);
         if (command + 1 < CLI_N_COMMANDS) sdm_text_add(out, "\n");
     }

@@ -139,10 +139,11 @@ sdm_status cli_fit_label_mask(const char *path, const sdm_volume *v, const cli_l
  * there are more than `most` or one is no whole number. NaN does not count. */
 size_t cli_fit_distinct(const sdm_volume *v, size_t most, float *found);
 
-/* Prints a warning if the file `path`, read as v, has more different values than labels have, or
- * fractions, and sets *warned. mend: the end of the warning, what to do. SDM_E_NOMEM. */
-sdm_status cli_fit_warn_many_values(const char *path, const sdm_volume *v, const char *mend,
-                                    bool *warned, sdm_error *err);
+/* *many = the volume has more different values than labels have, or fractions. SDM_E_NOMEM. */
+sdm_status cli_fit_many_values(const sdm_volume *v, bool *many, sdm_error *err);
+
+/* Prints a warning that this is so in the file `path`. mend: the end of it, what to do. */
+void cli_fit_warn_many_values(const char *path, const char *mend);
 
 /* With --label-close: morphological closing of values[grid] (1 and 0) by a ball of that radius. */
 sdm_status cli_fit_close_labels(const cli_fit *f, const sdm_grid *grid, float *values,

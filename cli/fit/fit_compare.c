@@ -31,10 +31,10 @@ sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err)
     }
     f->reference_grid = v.grid;
     if (!s) s = SDM_ALLOC(&f->reference, sdm_grid_count(&v.grid), "labels", err);
-    bool many;
-    if (!s)
-        s = cli_fit_warn_many_values(a->reference, &v,
-                                     "--reference needs labels, not an image or a map", &many, err);
+    bool many = false;
+    if (!s) s = cli_fit_many_values(&v, &many, err);
+    if (many)
+        cli_fit_warn_many_values(a->reference, "--reference needs labels, not an image or a map");
     if (!s) s = cli_fit_label_mask(a->reference, &v, &a->reference_labels, f->reference, err);
     if (!s) s = cli_fit_close_labels(f, &v.grid, f->reference, err);
     sdm_volume_dispose(&v);

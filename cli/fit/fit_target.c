@@ -7,6 +7,7 @@
 #include "inputs/setup.h"
 #include "report/files.h"
 #include "report/report_audit.h"
+#include "report/report_image.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
 
@@ -41,16 +42,18 @@ static void notice_few_values(cli_fit *f)
     f->suspicion = "; if the file is a label map, give --label";
 }
 
-sdm_status cli_fit_warn_many_values(const char *path, const sdm_volume *v, const char *mend,
-                                    bool *warned, sdm_error *err)
+sdm_status cli_fit_many_values(const sdm_volume *v, bool *many, sdm_error *err)
 {
     float *found = NULL;
     const sdm_status s = SDM_ALLOC(&found, MANY_VALUES, "labels", err);
-    *warned = !s && cli_fit_distinct(v, MANY_VALUES, found) > MANY_VALUES;
-    if (*warned)
-        cli_warn("%s holds over %d different values, or fractions: %s", path, MANY_VALUES, mend);
+    *many = !s && cli_fit_distinct(v, MANY_VALUES, found) > MANY_VALUES;
     sdm_free(found);
     return s;
+}
+
+void cli_fit_warn_many_values(const char *path, const char *mend)
+{
+    cli_warn("%s holds over %d different values, or fractions: %s", path, MANY_VALUES, mend);
 }
 
 static sdm_status use_image(cli_fit *f, sdm_error *err)
@@ -64,10 +67,38 @@ static sdm_status use_image(cli_fit *f, sdm_error *err)
     if (v->n_layers > 1)
         return sdm_fail(err, SDM_E_FORMAT, "%s has %zu layers, need one image", f->path,
                         v->n_layers);
+    if (cli_is_distance_map(v) && !f->args->force)
+        return sdm_fail(err, SDM_E_ARG,
+                        "%s is a signed distance map, no image: fit the surface that it describes "
+                        "(written with -o FILE.stl in place of this file); --force fits to the "
+                        "distances as grey values",
+                        f->path);
     notice_few_values(f);
     f->target.kind = SDM_FIT_IMAGE;
     f->target.values = v->values;
     return SDM_OK;
+}
+
+/* Do most voxels of the mask lie alone, without another one beside them? No label of an organ is
+ * like this; a value of an image is. */
+static bool is_scattered(const sdm_grid *g, const float *mask)
+{
+    const size_t step[3] = {1, (size_t)g->n[0], (size_t)(g->n[0] * g->n[1])};
+    size_t n = 0, alone = 0;
+    for (int64_t k = 0; k < g->n[2]; k++)
+        for (int64_t j = 0; j < g->n[1]; j++)
+            for (int64_t i = 0; i < g->n[0]; i++) {
+                const size_t at = sdm_grid_voxel(g, i, j, k);
+                const int64_t place[3] = {i, j, k};
+                bool beside = false;
+                if (!(mask[at] > 0)) continue;
+                for (int a = 0; a < 3; a++) {
+                    beside |= place[a] > 0 && mask[at - step[a]] > 0;
+                    beside |= place[a] + 1 < g->n[a] && mask[at + step[a]] > 0;
+                }
+                n++, alone += !beside;
+            }
+    return 2 * alone > n;
 }
 
 static sdm_status use_labels(cli_fit *f, sdm_error *err)
@@ -75,10 +106,13 @@ static sdm_status use_labels(cli_fit *f, sdm_error *err)
     sdm_status s = SDM_ALLOC(&f->mask, sdm_grid_count(&f->image.grid), "labels", err);
     if (!s) s = cli_fit_label_mask(f->path, &f->image, &f->args->fit.labels, f->mask, err);
     bool many = false;
-    if (!s && !f->image.n_segments)
-        s = cli_fit_warn_many_values(f->path, &f->image, "if it is an image, leave --label out",
-                                     &many, err);
-    if (many) f->suspicion = "; if the file is an image, leave --label out";
+    if (!s && !f->image.n_segments) s = cli_fit_many_values(&f->image, &many, err);
+    if (many && is_scattered(&f->image.grid, f->mask))
+        return sdm_fail(err, SDM_E_ARG,
+                        "%s: the voxels with this label lie scattered, and the file holds over %d "
+                        "different values, or fractions: it is an image; leave --label out",
+                        f->path, MANY_VALUES);
+    if (many) cli_fit_warn_many_values(f->path, "if it is an image, leave --label out");
     if (!s) s = cli_fit_close_labels(f, &f->image.grid, f->mask, err);
     f->target.kind = SDM_FIT_LABEL;
     f->target.values = f->mask;

@@ -77,12 +77,27 @@ static sdm_status split_word(const char *word, const char *option, char buf[SDM_
     return SDM_OK;
 }
 
+/* The value of SDMGEN_PLUGIN_PATH if it is set and no shape comes from a file; NULL otherwise. */
+static const char *path_without_shapes(const sdm_registry *r)
+{
+    const char *path = getenv("SDMGEN_PLUGIN_PATH");
+    if (!path || !*path) return NULL;
+    for (size_t i = 0; i < sdm_registry_count(r); i++)
+        if (strchr(sdm_registry_origin(r, i), '/')) return NULL;
+    return path;
+}
+
 const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_error *err)
 {
-    const char *near = NULL, *skipped = find_skipped(r, name);
+    const char *near = NULL, *skipped = find_skipped(r, name), *empty = path_without_shapes(r);
     const sdm_shape *shape = sdm_registry_find(r, name, &near);
     if (!shape && skipped)
         sdm_fail(err, SDM_E_ARG, "unknown shape '%s'; %s", name, skipped);
+    else if (!shape && empty && !near)
+        sdm_fail(err, SDM_E_ARG,
+                 "unknown shape '%s'; SDMGEN_PLUGIN_PATH=%.300s holds no plug-in: name the folder "
+                 "in which the .so file lies (folders in it are not searched)",
+                 name, empty);
     else if (!shape)
         sdm_fail(err, SDM_E_ARG, "unknown shape '%s'%s%s%s", name,
                  near ? "; did you mean '"

@@ -65,8 +65,11 @@ void cli_print_audit(const sdm_part_audit *audit)
     printf("parts                %zu\n", audit->n);
     printf("closed               %s\n", a->closed ? "yes" : "no");
     printf("manifold             %s\n", a->manifold ? "yes" : "no");
-    printf("inside out           %s\n", a->inverted ? "yes" : "no");
-    printf("parts inside out     %zu\n", count_inside_out(audit));
+    const size_t inside_out = count_inside_out(audit);
+    if (inside_out > 0 && audit->n > 1)
+        printf("inside out           %zu of %zu parts\n", inside_out, audit->n);
+    else
+        printf("inside out           %s\n", a->inverted ? "yes" : "no");
     printf("boundary edges       %zu\n", a->boundary_edges);
     printf("non-manifold edges   %zu\n", a->nonmanifold_edges);
     printf("misoriented edges    %zu\n", a->misoriented_edges);

@@ -24,12 +24,18 @@ static void print_grid(const sdm_grid *g)
                g->dir[3 + a], g->dir[6 + a]);
 }
 
+bool cli_is_distance_map(const sdm_volume *v)
+{
+    return strstr(v->text, ": " SDM_MAP_TEXT) && v->n_layers == 1 && !v->n_nan;
+}
+
 /* Volume inside the zero level set, mm^3; NaN: the file is no distance map of this program. */
 static double map_volume(const sdm_volume *v)
 {
     double volume = NAN;
-    const bool map = strstr(v->text, ": " SDM_MAP_TEXT) && v->n_layers == 1 && !v->n_nan;
-    return !map || sdm_map_volume(&v->grid, v->values, 0, &volume, NULL) ? NAN : volume;
+    return !cli_is_distance_map(v) || sdm_map_volume(&v->grid, v->values, 0, &volume, NULL)
+               ? NAN
+               : volume;
 }
 
 void cli_print_volume(const char *path, const sdm_volume *v)

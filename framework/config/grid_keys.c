@@ -77,6 +77,7 @@ void sdm_config_set_grid(sdm_config *c, const sdm_grid *grid)
 {
     c->grid = *grid;
     c->grid_voxels = 0;
+    c->grid_auto = false;
     derive_lengths(c);
 }
 
@@ -102,6 +103,7 @@ void sdm_config_finish_grid(sdm_reader *r, sdm_mark section)
         if (!(has >> ORIGIN & 1) || !(has >> SIZE & 1)) g->origin[i] = 0;
     }
     if (!fits) return;
+    c->grid_auto = !has;
     if (!(has >> VOXELS & 1)) c->grid_voxels = has ? 0 : SDM_GRID_VOXELS;
     if (!(has >> SIZE & 1)) return;
     for (int i = 0; i < 3 && !(has >> ORIGIN & 1); i++)

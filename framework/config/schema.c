@@ -349,19 +349,32 @@ static void budgets(sdm_reader *r, sdm_given *given[3], bool positive[3])
     positive[2] = r->config->train.samples > 0;
 }
 
+/* Was the value given by an argument of the command line? (Overrides in files have a line.) */
+static bool is_argument(const sdm_given *given)
+{
+    return given->mark.override > 0 && given->mark.line == 0;
+}
+
 void sdm_config_settle_override(sdm_reader *r, int override)
 {
     sdm_given *given[3];
-    bool positive[3], replaces = false;
+    bool positive[3], replaces = false, argument = false;
     sdm_config_settle_grid(r, override);
 
     // a positive budget given by this override replaces the others
     budgets(r, given, positive);
-    for (int i = 0; i < 3; i++) replaces |= positive[i] && sdm_given_by(given[i], override);
-    if (!replaces) return;
-    if (given[0]->mark.override != override) r->config->train.minutes = 0;
-    if (given[1]->mark.override != override) r->config->train.steps = 0;
-    if (given[2]->mark.override != override) r->config->train.samples = 0;
+    for (int i = 0; i < 3; i++) {
+        if (!positive[i] || !sdm_given_by(given[i], override)) continue;
+        replaces = true;
+        argument |= is_argument(given[i]);
+    }
+    for (int i = 0; i < 3 && replaces; i++) {
+        // two arguments that contradict each other both stay, so that check_budget() tells it
+        if (given[i]->mark.override == override || (argument && is_argument(given[i]))) continue;
+        if (i == 0) r->config->train.minutes = 0;
+        if (i == 1) r->config->train.steps = 0;
+        if (i == 2) r->config->train.samples = 0;
+    }
 }
 
 /* Records a mistake unless exactly one budget is positive. */

@@ -256,6 +256,20 @@ static sdm_status priors_reweight(fit_problem *p, double *change, sdm_error *err
     return SDM_OK;
 }
 
+static sdm_status left_image(const fit_problem *p, sdm_error *err)
+{
+    const sdm_grid *g = &p->target->grid;
+    const double *at = p->state.translation;
+    double index[3], middle[3];
+    for (int a = 0; a < 3; a++) index[a] = 0.5 * (double)(g->n[a] - 1);
+    sdm_grid_world(g, index, middle);
+    return sdm_fail(err, SDM_E_QUALITY,
+                    "the shape has left the image: no voxel near it is left; the origin of its "
+                    "frame is at %.4g, %.4g, %.4g mm, the middle of the image at %.4g, %.4g, %.4g "
+                    "mm (LPS)",
+                    at[0], at[1], at[2], middle[0], middle[1], middle[2]);
+}
+
 // repeats Newton's method until state, region and prior weights agree; end->converged is false if
 // the iterations are used up before
 static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_newton_end *end,
@@ -273,9 +287,7 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
         double change = 0;
         s = sdm_fit_evaluate(p, err); // makes the maps by which samples_follow() selects voxels
         if (!s) s = samples_follow(p, &changed, err);
-        if (!s && !p->samples.n)
-            return sdm_fail(err, SDM_E_QUALITY,
-                            "the shape has left the image: no voxel near it is left");
+        if (!s && !p->samples.n) return left_image(p, err);
         if (!s && changed) s = sdm_fit_evaluate(p, err); // evaluate the new samples
         if (!s && changed) s = sdm_fit_tissue_field_update(p, err);
         if (!s) sdm_fit_open_motions_find(p);

@@ -67,11 +67,13 @@ sdm_status sdm_generate_check_options(const sdm_model *m, const sdm_generate_opt
 
 static sdm_status refuse_param(const sdm_model_param *p, double value, sdm_error *err)
 {
-    sdm_fail_range(p->name, value, p->min, p->max, p->unit, err);
-    if (!isfinite(value)) return SDM_E_RANGE; // no policy accepts it
-    return sdm_fail_in(err, SDM_E_RANGE,
-                       "outside the trained range; sdm_generate_opts.policy clamp moves it into "
-                       "the range, exact computes exact maps where the shape allows them");
+    sdm_error range = {0};
+    sdm_fail_range(p->name, value, p->min, p->max, p->unit, &range);
+    if (!isfinite(value)) return sdm_fail(err, SDM_E_RANGE, "%s", range.text); // for all policies
+    return sdm_fail(err, SDM_E_RANGE,
+                    "%s, the trained range; sdm_generate_opts.policy clamp moves it into the "
+                    "range, exact computes exact maps where the shape allows them",
+                    range.text);
 }
 
 sdm_status sdm_generate_check_params(const sdm_model *m, const double *params,

@@ -79,6 +79,8 @@ expect 2 "unknown shape 'cube'; sdmgen shapes lists" sdmgen shapes cube --quiet
 printf '        ' >>path/copy.so # another file; --plugin comes before the path
 SDMGEN_PLUGIN_PATH=$good expect 0 "octahedron\.so: shape 'octahedron' is there already \(.*/copy\.so\)" sdmgen shapes octahedron --plugin path/copy.so
 SDMGEN_PLUGIN_PATH=$PWD/none expect 3 'plug-in folder .*/none: No such file' sdmgen shapes
+# one folder too high
+SDMGEN_PLUGIN_PATH=$(dirname "$good") expect 2 "unknown shape 'octahedron'; SDMGEN_PLUGIN_PATH=.* holds no plug-in: name the folder in which the \.so file lies" sdmgen shapes octahedron
 unset SDMGEN_PLUGIN_PATH
 expect 2 "no subcommand 'chek'; did you mean 'shapes check'" sdmgen shapes chek
 expect 2 "no subcommand 'chek'; did you mean 'shapes check'" sdmgen shapes chek torus

@@ -33,7 +33,7 @@ faulty handle 4 "^warning +$inside_out.*\(in all 21 shapes\); reverse the vertic
 faulty body 4 '^warning +part 2 of 2 .* is subtracted from what it overlaps, because maps turn the whole mesh: part 1 of 2 .* is inside out and larger than the rest'
 if grep -q 'the exact engine turns' out; then bad "the parts that maps turn are told beside those that they lose: $(cat out)"; fi
 expect 4 'is inside out and larger' sdmgen mesh --shape faulty -O fault=body --plugin "$plugin" --audit
-has '^parts inside out +1$'
+has '^inside out +1 of 2 parts$'
 has '^  1 .* inside out '
 has '^  2 .* subtracted '
 faulty jump 4 '^warning +vertex (8|9|1[0-5]) jumps by 0\.125 mm at size=2, with reach='
@@ -79,7 +79,7 @@ has '^units: the mesh measures 0\.0[0-9]* mm across: is it in m\? lengths are mm
 expect 0 "warning: $inside_out" sdmgen mesh --shape faulty -O fault=handle -o x.ply --plugin "$plugin" -q
 expect 4 "error: $inside_out" sdmgen mesh --shape faulty -O fault=handle --audit -o y.ply --plugin "$plugin"
 present y.ply
-has '^parts inside out +1$'
+has '^inside out +1 of 2 parts$'
 has '^volume of the union +124\.875 mm\^3$'
 has '^  2 +12 +8 \.\. 15 +inside out +no +yes +-0\.5 '
 expect 0 - sdmgen mesh --shape faulty --audit --plugin "$plugin"

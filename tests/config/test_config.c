@@ -167,10 +167,12 @@ static void test_overrides(void **state)
     assert_int_equal(config.shape.n_options, 2);
     assert_string_equal(config.shape.options[0].value, "2");
 
-    // An override of one budget (steps, minutes, samples) removes the others, and the last override
-    // wins. The same holds for origin and centre.
-    assert_int_equal(parse(BASE, BUDGET, 2), SDM_OK);
-    assert_true(config.train.minutes == 0 && config.train.steps == 0 && config.train.samples == 64);
+    // An override of one budget (steps, minutes, samples) removes that of the file; two overrides
+    // contradict each other. Of origin and centre the last override wins.
+    assert_int_equal(parse(BASE, BUDGET, 2), SDM_E_CONFIG);
+    assert_string_equal(err.text,
+                        "argument 'train.samples=64': only one of train.minutes, train.steps and "
+                        "train.samples may be positive, got 2");
     assert_int_equal(parse(BASE, BUDGET, 1), SDM_OK);
     assert_true(config.train.minutes == 2 && config.train.steps == 0);
     assert_int_equal(parse(BASE, PLACE, 1), SDM_OK);

@@ -1,5 +1,5 @@
 /* Grids that are fitted to the shapes of a configuration.
- * Tests: fitted_grid.c shape_grid.c shape_box.c */
+ * Tests: fitted_grid.c shape_grid.c shape_box.c shape_thickness.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -102,6 +102,64 @@ static void test_capsule(void **state)
     run_files_remove();
 }
 
+static const sdm_param PLATE[] = {{"thick", "mm", 0.4, 0.5, 0.45, "thickness"}};
+
+/* A plate of 10 mm x 10 mm. */
+static int plate_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                      const double *p, sdm_mesh_out *out)
+{
+    static const uint32_t TRI[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                     2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    (void)self, (void)options;
+    const int failed = host->reserve(host, out, 8, 12);
+    if (failed) return failed;
+    for (int i = 0; i < 8; i++) {
+        out->vert[3 * i] = i & 1 ? 5 : -5;
+        out->vert[3 * i + 1] = i & 2 ? 5 : -5;
+        out->vert[3 * i + 2] = i & 4 ? p[0] : 0;
+    }
+    memcpy(out->tri, TRI, sizeof TRI);
+    return 0;
+}
+
+static const sdm_shape plate_shape = {.abi = SDM_SHAPE_ABI,
+                                      .size = sizeof(sdm_shape),
+                                      .name = "plate",
+                                      .summary = "plate",
+                                      .params = PLATE,
+                                      .n_params = 1,
+                                      .mesh = plate_mesh};
+
+// Thin parts get smaller voxels, three across them where 96 voxels along the longest edge and the
+// memory for the maps allow it; a number of voxels that is given stays.
+static void test_thin(void **state)
+{
+    (void)state;
+    static const char *const KEYS[] = {"", "grid: {voxels: 60}\n",
+                                       "data: {start: 9000, memory_gb: 1.2}\n"};
+    sdm_config c[3];
+    sdm_text line = {0};
+    sdm_error e = {0};
+    sdm_instance *plate = NULL;
+    if (sdm_registry_add(registry, &plate_shape, "test", &e) ||
+        sdm_instance_create(&plate_shape, NULL, 0, NULL, &plate, &e))
+        fail_msg("%s", e.text);
+    for (int k = 0; k < 3; k++) {
+        char text[256];
+        snprintf(text, sizeof text, "shape: {name: plate}\n%strain: {steps: 1}\n", KEYS[k]);
+        if (sdm_config_parse("test.yaml", text, strlen(text), NULL, 0, &c[k], &e) ||
+            sdm_train_complete(&c[k], plate, k ? NULL : &line, &e))
+            fail_msg("%s", e.text);
+    }
+    const double fine = c[0].grid.spacing[0], usual = c[1].grid.spacing[0];
+    assert_true(c[1].grid.n[0] <= 60 && 3 * usual > 0.5);
+    assert_true(c[0].grid.n[0] <= 96 && 3 * fine < 0.42);
+    assert_non_null(strstr(line.data, "because the thinnest part is 0.4"));
+    assert_true(c[2].grid.spacing[0] > fine && c[2].grid.spacing[0] < usual);
+    sdm_text_dispose(&line);
+    sdm_instance_free(plate);
+}
+
 // A proposal keeps the spacing of the configuration and reads as the keys that it names; where the
 // spacing makes too many voxels, it says so.
 static void test_proposal(void **state)
@@ -141,6 +199,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_around),
         cmocka_unit_test(test_capsule),
+        cmocka_unit_test(test_thin),
         cmocka_unit_test(test_proposal),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -5,22 +5,71 @@
 #include "sdm/internal/text.h"
 #include "sdm/internal/train.h"
 
-enum { BOX_SAMPLES = 256, BOX_SEED = 1 };
+enum { BOX_SAMPLES = 256, THIN_SAMPLES = 8, BOX_SEED = 1 };
+
+/* `grid: auto` makes so many voxels across the thinnest part of the shapes, as long as the longest
+ * edge has at most VOXELS_MOST of them and the grid at most COUNT_MOST: maps and training cost as
+ * much as there are voxels. */
+enum { THIN_VOXELS = 3, VOXELS_MOST = 96 };
+static const double COUNT_MOST = 4e5;
 
 /* Most voxels of a grid that is proposed with the spacing of the configuration. */
 static const double PROPOSED_MAX = 2.5e6;
+
+/* range[n_params] of the training. */
+static sdm_status find_ranges(const sdm_config *config, const sdm_instance *shape,
+                              double range[SDM_MAX_PARAMS][2], sdm_error *err)
+{
+    double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
+    size_t n;
+    sdm_instance_params(shape, &n);
+    const sdm_status s = sdm_train_ranges(config, shape, min, max, err);
+    for (size_t i = 0; i < n && !s; i++) range[i][0] = min[i], range[i][1] = max[i];
+    return s;
+}
 
 /* The box low[3] .. high[3] of the shapes of a configuration. */
 static sdm_status find_box(const sdm_config *config, const sdm_instance *shape, double low[3],
                            double high[3], sdm_error *err)
 {
-    double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS], range[SDM_MAX_PARAMS][2];
-    size_t n;
-    sdm_instance_params(shape, &n);
-    const sdm_status s = sdm_train_ranges(config, shape, min, max, err);
+    double range[SDM_MAX_PARAMS][2];
+    const sdm_status s = find_ranges(config, shape, range, err);
     if (s) return s;
-    for (size_t i = 0; i < n; i++) range[i][0] = min[i], range[i][1] = max[i];
     return sdm_shape_box(shape, (const double(*)[2])range, BOX_SAMPLES, BOX_SEED, low, high, err);
+}
+
+/* Do the maps that are kept while training starts fit into the memory for them? */
+static bool maps_fit(const sdm_config *c, size_t n_params, const sdm_grid *g)
+{
+    double fixed = 1;
+    for (size_t i = 0; i < n_params; i++) fixed *= (double)sdm_config_static_count(c, n_params, i);
+    const double maps = fixed + (double)c->data.start + 2 * (double)c->data.holdout;
+    return 2e-9 * maps * (double)sdm_grid_count(g) <= c->data.memory_gb;
+}
+
+/* *grid = the grid of `grid: auto` around the box, whose voxels the thinnest part, *thick mm, makes
+ * smaller where it needs it. */
+static sdm_status auto_grid(const sdm_config *config, const sdm_instance *shape,
+                            const double low[3], const double high[3], double *thick,
+                            sdm_grid *grid, sdm_error *err)
+{
+    double range[SDM_MAX_PARAMS][2];
+    size_t n_params;
+    sdm_instance_params(shape, &n_params);
+    sdm_status s = find_ranges(config, shape, range, err);
+    if (!s)
+        s = sdm_shape_thickness(shape, (const double(*)[2])range, THIN_SAMPLES, BOX_SEED, thick,
+                                err);
+    if (!s) s = sdm_grid_around(low, high, SDM_GRID_VOXELS, NULL, grid, err);
+    for (int n = SDM_GRID_VOXELS + 4; n <= VOXELS_MOST && !s; n += 4) {
+        sdm_grid finer;
+        if (isnan(*thick) || THIN_VOXELS * sdm_grid_coarsest(grid) <= *thick) break;
+        s = sdm_grid_around(low, high, n, NULL, &finer, err);
+        if (s || (double)sdm_grid_count(&finer) > COUNT_MOST || !maps_fit(config, n_params, &finer))
+            break;
+        *grid = finer;
+    }
+    return s;
 }
 
 static void add_three(sdm_text *out, const double v[3])
@@ -55,12 +104,16 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
     sdm_config_set_static(config, n_params);
     if (config->grid.n[0] > 0) return SDM_OK;
     const double *spacing = config->grid.spacing[0] > 0 ? config->grid.spacing : NULL;
-    double low[3], high[3];
+    double low[3], high[3], thick = NAN;
     sdm_grid grid;
     sdm_status s = find_box(config, shape, low, high, err);
     if (s) return s;
     s = sdm_grid_around(low, high, config->grid_voxels, spacing, &grid, err);
     if (s) return sdm_fail_in(err, SDM_E_CONFIG, "%s: grid", config->file);
+    const double usual = grid.spacing[0];
+    if (config->grid_auto) s = auto_grid(config, shape, low, high, &thick, &grid, err);
+    if (s) return s;
+    const bool finer = grid.spacing[0] < usual;
     sdm_config_set_grid(config, &grid);
     if (!line) return SDM_OK;
     sdm_text_add(line, "grid: ");
@@ -69,6 +122,11 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
                  "; over the ranges the shape reaches from %.2f to %.2f mm in x, %.2f to %.2f in "
                  "y, %.2f to %.2f in z",
                  low[0], high[0], low[1], high[1], low[2], high[2]);
+    if (finer)
+        sdm_text_add(line,
+                     "; voxels of %.3g mm in place of %.3g, because the thinnest part is %.2g mm "
+                     "thick (grid.voxels: %d for the coarser grid)",
+                     grid.spacing[0], usual, thick, SDM_GRID_VOXELS);
     return line->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
 }
 
@@ -87,7 +145,8 @@ sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance 
         add_spacing(out, &grid);
         sdm_text_add(out, "} (");
     } else {
-        s = sdm_grid_around(low, high, SDM_GRID_VOXELS, NULL, &grid, err);
+        double thick;
+        s = auto_grid(config, shape, low, high, &thick, &grid, err);
         if (s) return s;
         sdm_text_add(out, "grid: auto (");
     }

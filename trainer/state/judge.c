@@ -145,6 +145,11 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
     if (*limit == SDM_CAUSE_MAPS && in->config->network.depth && unfinished &&
         part[SDM_CAUSE_NETWORK] > 0.5 * part[SDM_CAUSE_MAPS])
         *limit = SDM_CAUSE_NETWORK;
+    // a run that ended before its first step says nothing about the grid
+    if (in->config->network.depth && in->steps < 1 && part[SDM_CAUSE_NETWORK] > 0) {
+        *limit = SDM_CAUSE_NETWORK;
+        return true;
+    }
     const double grid = sqrt(v->part_mm2[SDM_CAUSE_GRID]);
     if (grid > fmax(GRID_SHARE * v->rmse_voxel_mm, GRID_ERROR * v->voxel_mm))
         *limit = SDM_CAUSE_GRID;

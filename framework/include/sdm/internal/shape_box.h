@@ -1,4 +1,4 @@
-/* How far a shape reaches over the ranges of its parameters, and a grid around that. */
+/* How far a shape reaches over the ranges of its parameters, how thin it is, and a grid for it. */
 #pragma once
 
 #include "sdm/grid.h"
@@ -21,6 +21,12 @@ extern "C" {
  * errors of sdm_instance_mesh(). [any thread] */
 sdm_status sdm_shape_box(const sdm_instance *shape, const double (*range)[2], size_t samples,
                          uint64_t seed, double low[3], double high[3], sdm_error *err);
+
+/* *mm = thickness of the thinnest part (sdm_part.thick of part_audit.h) of `samples` random shapes
+ * (Sobol' points, as above); NaN: none is known. range as above. SDM_E_ARG, SDM_E_RANGE, and the
+ * errors of sdm_instance_mesh() and sdm_mesh_audit(). [any thread] */
+sdm_status sdm_shape_thickness(const sdm_instance *shape, const double (*range)[2], size_t samples,
+                               uint64_t seed, double *mm, sdm_error *err);
 
 /* Returns how far the point x (mm) lies beyond the outer voxel centres of the grid along the axis
  * where it is farthest, in mm; 0: within them. beyond[axis][side], unless NULL, is raised to the

@@ -248,8 +248,9 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
 static sdm_status write_picture(const char *path, const cli_map *map, sdm_error *err)
 {
     const float levels[] = {0.0f, sdm_grid_contour(map->grid)};
-    char title[80];
-    describe_method(map, title);
+    char made[80], title[160];
+    describe_method(map, made);
+    snprintf(title, sizeof title, "%.64s: %s", map->shape, made);
     const sdm_picture_map column = {title, map->values, false};
     return sdm_picture_slices(path, map->grid, &column, 1, levels, 2, err);
 }

@@ -169,15 +169,25 @@ static void break_line(sdm_canvas *c, sdm_type type, double width, bool last, co
     *text += strspn(*text, " ");
 }
 
-void sdm_panel_title(sdm_canvas *c, sdm_box box, const char *title)
+static sdm_type title_type(void)
+{
+    return (sdm_type){.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
+}
+
+bool sdm_panel_title_fits(sdm_canvas *c, sdm_box box, const char *title)
+{
+    const sdm_type type = title_type();
+    return sdm_canvas_text_width(c, type.size, type.bold, title) <= box.w;
+}
+
+void sdm_panel_title(sdm_canvas *c, sdm_box box, bool large, const char *title)
 {
     const double middle = box.x + box.w / 2.0;
-    sdm_type type = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
-    if (sdm_canvas_text_width(c, type.size, type.bold, title) <= box.w) {
-        sdm_canvas_text(c, middle, box.y - 18, type, title);
+    if (large) {
+        sdm_canvas_text(c, middle, box.y - 18, title_type(), title);
         return;
     }
-    type = (sdm_type){.size = 9, .align = SDM_CENTRE, .colour = SDM_INK};
+    const sdm_type type = {.size = 9, .align = SDM_CENTRE, .colour = SDM_INK};
     for (int i = 0; i < 2 && *title; i++) {
         char line[LINE_MAX];
         break_line(c, type, box.w, i == 1, &title, line);

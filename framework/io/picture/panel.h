@@ -21,10 +21,12 @@ void sdm_panel_colours(sdm_canvas *c, sdm_box box, const sdm_slice *s, sdm_colou
 void sdm_panel_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level, double width,
                        sdm_colour colour, sdm_colour rim);
 
-/* Writes the title above the box: one bold line, or, if that is wider than the box, at most two
-   lines of smaller type, broken between words; what does not fit becomes "...". It needs 36 pixels
-   above the box. */
-void sdm_panel_title(sdm_canvas *c, sdm_box box, const char *title);
+/* Is the title, as one large line, at most as wide as the box? */
+bool sdm_panel_title_fits(sdm_canvas *c, sdm_box box, const char *title);
+
+/* Writes the title above the box: one bold line if `large`, else at most two lines of smaller type,
+   broken between words; what does not fit becomes "...". It needs 36 pixels above the box. */
+void sdm_panel_title(sdm_canvas *c, sdm_box box, bool large, const char *title);
 
 /* Draws a bar that is a round number of mm long in the lower left corner; none if the box is too
    narrow. */

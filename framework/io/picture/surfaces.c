@@ -110,17 +110,25 @@ static void scene_place(scene *sc)
         sc->shade[i] = sdm_map_colour(SDM_MAP_SIGNED, -1, 1, (double)(i - MIDDLE) / MIDDLE);
 }
 
-/* Adds to normal[n_vert][3], for each vertex, the cross products of two edges of each triangle at
-   the vertex; the sums are normal to the surface, but not of unit length. */
+/* cross[3] = the cross product of two edges of triangle t. */
+static void triangle_cross(const sdm_mesh *m, size_t t, double cross[3])
+{
+    const double *a = m->vert + 3 * m->tri[3 * t], *b = m->vert + 3 * m->tri[3 * t + 1],
+                 *c = m->vert + 3 * m->tri[3 * t + 2];
+    const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]},
+                 w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    cross[0] = u[1] * w[2] - u[2] * w[1];
+    cross[1] = u[2] * w[0] - u[0] * w[2];
+    cross[2] = u[0] * w[1] - u[1] * w[0];
+}
+
+/* Adds to normal[n_vert][3], for each vertex, the cross product of each triangle at the vertex; the
+   sums are normal to the surface, but not of unit length. */
 static void add_normals(const sdm_mesh *m, double *normal)
 {
     for (size_t t = 0; t < m->n_tri; t++) {
-        const double *a = m->vert + 3 * m->tri[3 * t], *b = m->vert + 3 * m->tri[3 * t + 1],
-                     *c = m->vert + 3 * m->tri[3 * t + 2];
-        const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]},
-                     w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-        const double cross[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2],
-                                 u[0] * w[1] - u[1] * w[0]};
+        double cross[3];
+        triangle_cross(m, t, cross);
         for (int k = 0; k < 3; k++)
             for (int d = 0; d < 3; d++)
                 normal[3 * m->tri[3 * t + (size_t)k] + (size_t)d] += cross[d];
@@ -188,6 +196,17 @@ static void draw_triangle(const scene *sc, raster *r, const view *v, const corne
         }
 }
 
+/* n[3] = unit normal for the shading of a triangle at one of its vertices: the mean normal of the
+ * surface there, or, at an edge of the shape, the triangle's own normal cross[3]. */
+static void corner_normal(const double mean[3], const double cross[3], double n[3])
+{
+    const double EDGE = 0.82; // cosine of 35 degrees
+    const double a = sqrt(dot(mean, mean)), b = sqrt(dot(cross, cross));
+    const bool smooth = !(dot(mean, cross) < EDGE * a * b);
+    const double length = smooth ? a : b;
+    for (int d = 0; d < 3; d++) n[d] = length > 0 ? (smooth ? mean : cross)[d] / length : 0;
+}
+
 /* Renders a surface in one view. */
 static void draw_surface(const scene *sc, raster *r, int view_index, const sdm_picture_surface *p,
                          const double *normal)
@@ -198,6 +217,8 @@ static void draw_surface(const scene *sc, raster *r, int view_index, const sdm_p
                               0.5 * (sc->low[view_index][1] + sc->high[view_index][1])};
     for (size_t t = 0; t < p->mesh->n_tri; t++) {
         corner c[3];
+        double cross[3];
+        triangle_cross(p->mesh, t, cross);
         for (size_t k = 0; k < 3; k++) {
             const size_t i = p->mesh->tri[3 * t + k];
             const double *x = p->mesh->vert + 3 * i;
@@ -205,7 +226,7 @@ static void draw_surface(const scene *sc, raster *r, int view_index, const sdm_p
             c[k].y = 0.5 * r->h - scale * (dot(x, v->axis[1]) - middle[1]);
             c[k].z = dot(x, v->axis[2]);
             c[k].value = p->values ? p->values[i] : 0;
-            memcpy(c[k].normal, normal + 3 * i, sizeof c[k].normal);
+            corner_normal(normal + 3 * i, cross, c[k].normal);
         }
         draw_triangle(sc, r, v, c, !p->values);
     }
@@ -249,6 +270,18 @@ static sdm_status draw_panel(const scene *sc, sdm_canvas *c, size_t column, int 
     return s;
 }
 
+static const char *title_of(const scene *sc, size_t k)
+{
+    return sc->surfaces[k].title ? sc->surfaces[k].title : "";
+}
+
+static bool has_values(const scene *sc)
+{
+    for (size_t k = 0; k < sc->n; k++)
+        if (sc->surfaces[k].values) return true;
+    return false;
+}
+
 /* Height of a row of surfaces with its titles. */
 static int row_height(const scene *sc)
 {
@@ -263,16 +296,20 @@ static sdm_status draw_scene(const scene *sc, sdm_canvas *c, int bar_top, const 
     const double unit = sc->limit < 0.1 ? 1000 : 1;
     char text[160];
     sdm_status s = SDM_OK;
+    bool large = true; // all titles alike
+    for (size_t k = 0; k < sc->n; k++)
+        large &= sdm_panel_title_fits(c, (sdm_box){.w = sc->width}, title_of(sc, k));
     for (size_t k = 0; k < sc->n && !s; k++) {
         const int left = SIDE + (int)(k % sc->columns) * (sc->width + GAP);
         int top = TOP + (int)(k / sc->columns) * row_height(sc);
         const sdm_box first = {left, top, sc->width, sc->height[sc->first_view]};
-        sdm_panel_title(c, first, sc->surfaces[k].title ? sc->surfaces[k].title : "");
+        sdm_panel_title(c, first, large, title_of(sc, k));
         for (int v = sc->first_view; v < N_VIEWS && !s; v++) {
             const sdm_box box = {left, top, sc->width, sc->height[v]};
             s = draw_panel(sc, c, k, v, box, err);
-            sdm_canvas_text(c, left + 6, top + 14, (sdm_type){.size = 9, .colour = SDM_INK_LIGHT},
-                            VIEWS[v].name);
+            if (sc->first_view + 1 < N_VIEWS) // several views, with their names
+                sdm_canvas_text(c, left + 6, top + 14,
+                                (sdm_type){.size = 9, .colour = SDM_INK_LIGHT}, VIEWS[v].name);
             if (k == 0 && v == sc->first_view) sdm_panel_scale_bar(c, box, sc->pixels);
             top += sc->height[v] + GAP;
         }
@@ -304,11 +341,12 @@ static sdm_status draw_surfaces(const char *path, const sdm_picture_surface *sur
     sdm_canvas *c = NULL;
     scene_measure(&sc);
     scene_place(&sc);
-    const int rows = (int)((n + columns - 1) / columns), h = rows * row_height(&sc) + GAP + FOOT;
+    const int rows = (int)((n + columns - 1) / columns), foot = has_values(&sc) ? FOOT : 0,
+              h = rows * row_height(&sc) + GAP + foot;
     sdm_status s =
         sdm_canvas_create(path, 2 * SIDE + (int)columns * (sc.width + GAP) - GAP, h, &c, err);
     if (s || !c) return s;
-    s = draw_scene(&sc, c, h - FOOT, caption, err);
+    s = draw_scene(&sc, c, h - foot, caption, err);
     if (!s) return sdm_canvas_finish(c, err);
     sdm_canvas_discard(c);
     return s;

@@ -16,8 +16,9 @@
  * where 2 W, 2 H and the tilt are parabolas of f through their values at the base, in the middle
  * and at the apex; flare exp(-theta / 0.35) is added to W and H; over the last half turn both
  * shrink to the share `tip`. The area is pi W H (1 - 3/4 waist); above a waist of 1/3 the outline
- * has two lobes. Half-ellipsoids over the end sections close the tube; they are as long as the
- * geometric mean of W and H, at the base times `cap`.
+ * has two lobes. The basal end is slanted: a point of a section at (x, y) lies u (slant_out x +
+ * slant_up y) further along the centreline. Half-ellipsoids over the end sections close the tube;
+ * they are as long as the geometric mean of W and H, at the base times `cap`.
  *
  * Sections are cut off at the centre of curvature as those of the cochlea. */
 #include <math.h>
@@ -66,7 +67,11 @@
     UNKNOWN(DUCT_WAIST, "waist", "", -0.2, 0.5, 0.0,                                               \
             "how much narrower the section is at half its height; above 1/3 it has two lobes")     \
     UNKNOWN(DUCT_EGG, "egg", "", -0.4, 0.4, 0.0,                                                   \
-            "how much wider its upper part is, and narrower its lower part")
+            "how much wider its upper part is, and narrower its lower part")                       \
+    UNKNOWN(DUCT_SLANT_OUT, "slant_out", "", -1.2, 1.2, 0.0,                                       \
+            "slope of the basal end face: how far its outer side lies back from its inner side")   \
+    UNKNOWN(DUCT_SLANT_UP, "slant_up", "", -1.2, 1.2, 0.0,                                         \
+            "the same for its upper side and its lower side")
 
 #define PARAM(index, name, unit, min, max, def, help) [index] = {name, unit, min, max, def, help},
 static const sdm_param PARAMS[DUCT_UNKNOWNS] = {
@@ -90,7 +95,7 @@ static const sdm_option OPTIONS[N_OPTIONS] = {
     [SECTION] =
         {"section", SDM_OPTION_CHOICE, "", 0, 0, 0, "ellipse|circle|lobes",
          "ellipse: widths, heights and tilts; circle: widths are diameters; lobes: ellipses with a "
-         "waist and an egg"},
+         "waist and an egg, and a slanted basal end"},
     [FREE] = {"free", SDM_OPTION_CHOICE, "", 0, 0, 0, "all|paper|centreline|section",
               "which parameters there are: all, the four published ones, or these and those of "
               "the centreline (c .. dip) or of the section (width_base ..); the others are "
@@ -196,13 +201,16 @@ static double *ring_write(const duct *d, const double *x, const cochlea_ring *r,
     duct_section s;
     sdm_duct_section_at(d->form, x, r->fraction, &s);
     const double ahead = r->ahead * sdm_duct_mean_radius(&s) * (r->ahead < 0 ? x[DUCT_CAP] : 1);
+    double slant[2]; // per mm along e1 and e2
+    sdm_duct_slant_at(x, r->fraction, slant);
     for (size_t j = 0; j < n; j++, vert += 3) {
         double at[2];
         sdm_duct_outline_at(&s, direction[2 * j], direction[2 * j + 1], at);
         if (!r->whole && at[0] * s.bend[0] + at[1] * s.bend[1] > COCHLEA_CUT_FROM)
             vertex_cut(&s, at);
+        const double along = ahead + r->shrink * (at[0] * slant[0] + at[1] * slant[1]);
         for (int k = 0; k < 3; k++)
-            vert[k] = s.centre[k] + ahead * s.tangent[k] +
+            vert[k] = s.centre[k] + along * s.tangent[k] +
                       r->shrink * (at[0] * s.e1[k] + at[1] * s.e2[k]);
         if (d->left) vert[1] = -vert[1];
     }
@@ -260,7 +268,11 @@ static double height_at(const void *owner, double fraction, double up, int end)
     const measured *o = owner;
     duct_section s;
     sdm_duct_section_at(o->form, o->x, fraction, &s);
-    const double upward[2] = {0, -up}, across = sdm_duct_reach(&s, upward) * -s.e2[2],
+    double slant[2];
+    sdm_duct_slant_at(o->x, fraction, slant);
+    const double upward[2] = {up * slant[0] * s.tangent[2],
+                              up * (s.e2[2] + slant[1] * s.tangent[2])}, // e1 is horizontal
+        across = sdm_duct_reach(&s, upward),
                  length = sdm_duct_mean_radius(&s) * (end < 0 ? o->x[DUCT_CAP] : 1),
                  along = up * end * length * s.tangent[2];
     return up * s.centre[2] + (along > 0 ? hypot(across, along) : across);

@@ -94,6 +94,14 @@ void sdm_duct_section_at(duct_form form, const double *x, double fraction, duct_
     if (form == DUCT_LOBES) out->waist = x[DUCT_WAIST], out->egg = -x[DUCT_EGG];
 }
 
+void sdm_duct_slant_at(const double *x, double fraction, double slant[2])
+{
+    double u[3] = {0, 0, 0};
+    hook_add(1, fraction * x[DUCT_THETA], u);
+    slant[0] = u[0] * x[DUCT_SLANT_OUT];
+    slant[1] = -u[0] * x[DUCT_SLANT_UP]; // e2 points down
+}
+
 void sdm_duct_outline_at(const duct_section *s, double co, double si, double at[2])
 {
     const double across = s->wide * co * (1 - s->waist * co * co) * (1 + s->egg * si),

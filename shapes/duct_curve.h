@@ -3,7 +3,7 @@
 #pragma once
 
 /* Indices of the unknowns x[DUCT_UNKNOWNS]: the four published parameters, then those of the
- * centreline, then those of the section. */
+ * centreline, then those of the section, of which the last four exist for lobes only. */
 enum {
     DUCT_A,
     DUCT_ALPHA,
@@ -28,6 +28,8 @@ enum {
     DUCT_TILT_APEX,
     DUCT_WAIST,
     DUCT_EGG,
+    DUCT_SLANT_OUT, /* slope of the basal end face outwards, mm along the centreline per mm */
+    DUCT_SLANT_UP,  /* the same upwards */
     DUCT_UNKNOWNS
 };
 
@@ -49,11 +51,15 @@ typedef struct duct_section {
 /* The cross-section at theta = fraction * (apical angle), 0 <= fraction <= 1. */
 void sdm_duct_section_at(duct_form form, const double *x, double fraction, duct_section *out);
 
+/* slant[2] = how far, in mm per mm along e1 and e2, the points of a section lie ahead of it along
+ * its tangent. */
+void sdm_duct_slant_at(const double *x, double fraction, double slant[2]);
+
 /* at[2] = point of the outline of a section in (e1, e2), mm, given cosine and sine of its angle. */
 void sdm_duct_outline_at(const duct_section *s, double co, double si, double at[2]);
 
-/* How far the outline reaches from the centre along the unit vector `along` of (e1, e2), mm; right
- * to 1e-4. */
+/* The largest product of a point of the outline (e1, e2) with `along`: for a unit vector how far
+ * the outline reaches from the centre along it, mm; right to 1e-4. */
 double sdm_duct_reach(const duct_section *s, const double along[2]);
 
 /* Mean radius of a section, mm: the unit of the lengths of the caps. */

@@ -17,6 +17,11 @@
 #define ALIGNMENT 64u
 #define HUGE_PAGE ((size_t)2 << 20)
 
+/* glibc keeps freed blocks below this size for later requests, unless they are aligned to more than
+ * small blocks: then it hands their pages back, and the next request waits for pages that the
+ * kernel clears (a fifth of the time of a band). */
+#define KEPT_MAX ((size_t)32 << 20)
+
 /* The number of allocations until one fails, that one included; 0: none fails. Set by tests only.
  */
 static atomic_ulong fail_after;
@@ -54,9 +59,13 @@ static sdm_status block_allocate(void **out, size_t count, size_t size, size_t *
     // large pages cut the time of the first access to a big block by a third
     const bool large = bytes >= 2 * HUGE_PAGE && bytes <= SIZE_MAX - HUGE_PAGE;
     if (large) bytes = (bytes + HUGE_PAGE - 1) / HUGE_PAGE * HUGE_PAGE;
-    if (!failure_due()) block = aligned_alloc(large ? HUGE_PAGE : ALIGNMENT, bytes);
+    const size_t align = large && bytes >= KEPT_MAX ? HUGE_PAGE : ALIGNMENT;
+    if (!failure_due()) block = aligned_alloc(align, bytes);
 #ifdef MADV_HUGEPAGE
-    if (block && large) (void)madvise(block, bytes, MADV_HUGEPAGE);
+    if (block && large) {
+        const size_t skip = (HUGE_PAGE - (uintptr_t)block % HUGE_PAGE) % HUGE_PAGE;
+        (void)madvise((char *)block + skip, (bytes - skip) / HUGE_PAGE * HUGE_PAGE, MADV_HUGEPAGE);
+    }
 #endif
     if (!block) return sdm_fail(err, SDM_E_NOMEM, "%s: no memory for %zu bytes", what, bytes);
     *out = block;

@@ -117,9 +117,9 @@ static void test_volume(void **state)
     const double a = 5, b = 0.06, c = 0.3, end = 12.3, dome = 0.2, hook = 0.7, dip = -0.4;
     const double W[3] = {1.5, 1.2, 0.8}, H[3] = {1.7, 1.1, 0.9}, flare = 0.1, cap = 1.5, tip = 0.7,
                  waist = 0.4;
-    const double p[DUCT_UNKNOWNS] = {a,    0,    b,    0,    c,     end,   dome, hook,
-                                     dip,  W[0], W[1], W[2], flare, cap,   tip,  H[0],
-                                     H[1], H[2], -0.6, 0.1,  0.3,   waist, 0};
+    const double p[DUCT_UNKNOWNS] = {a,    0,    b,    0,     c,   end, dome, hook, dip,
+                                     W[0], W[1], W[2], flare, cap, tip, H[0], H[1], H[2],
+                                     -0.6, 0.1,  0.3,  waist, 0,   0.8, -0.7};
     enum { STEPS = 20000 };
     double volume = 0, area[2] = {0}, mean[2] = {0};
     for (int i = 0; i <= STEPS; i++) {
@@ -154,10 +154,10 @@ static void test_parameters(void **state)
         size_t n;
     } CASES[] = {{"section=circle", "tip", 15},
                  {"", "tilt_apex", 21},
-                 {"section=lobes", "egg", 23},
+                 {"section=lobes", "slant_up", 25},
                  {"section=lobes free=paper", "phi", 4},
                  {"section=lobes free=centreline", "dip", 9},
-                 {"section=lobes free=section", "egg", 18},
+                 {"section=lobes free=section", "slant_up", 20},
                  {"section=circle free=section", "tip", 10}};
     for (size_t i = 0; i < sizeof CASES / sizeof *CASES; i++) {
         sdm_instance *s = shape_make("duct", CASES[i].options);
@@ -184,6 +184,51 @@ static void test_parameters(void **state)
     sdm_instance_free(fixed);
 }
 
+static double along(const double *x, const double *from, const double axis[3])
+{
+    return (x[0] - from[0]) * axis[0] + (x[1] - from[1]) * axis[1] + (x[2] - from[2]) * axis[2];
+}
+
+/* A slanted duct: the vertices of the first section move along the tangent as the slopes state, and
+ * those beyond the first quarter of a turn stay where they are. */
+static void test_slant(void **state)
+{
+    (void)state;
+    sdm_instance *s = shape_make("duct", "edge=0.3 section=lobes");
+    double p[DUCT_UNKNOWNS] = {0};
+    sdm_mesh plain = {0}, slanted = {0};
+    duct_section base, quarter;
+    defaults_of(s, p);
+    mesh_at(s, p, &plain);
+    sdm_duct_section_at(DUCT_LOBES, p, 0, &base);
+    sdm_duct_section_at(DUCT_LOBES, p, 0.5 * PI / p[DUCT_THETA], &quarter);
+    p[DUCT_SLANT_OUT] = 0.5, p[DUCT_SLANT_UP] = -0.8;
+    mesh_at(s, p, &slanted);
+    assert_int_equal(plain.n_vert, slanted.n_vert);
+    size_t moved = 0, still = 0;
+    for (size_t i = 0; i < plain.n_vert; i++) {
+        const double *x = plain.vert + 3 * i, *y = slanted.vert + 3 * i;
+        if (fabs(along(x, base.centre, base.tangent)) < 1e-9) {
+            const double out = along(x, base.centre, base.e1), up = -along(x, base.centre, base.e2);
+            if (hypot(out, up) > 2) continue; // a section of another turn
+            near_to("the way along the tangent", along(y, x, base.tangent), 0.5 * out - 0.8 * up,
+                    1e-9);
+            near_to("the way outwards", along(y, x, base.e1), 0, 1e-9);
+            moved++;
+        }
+        // in the plane of the quarter or just behind it
+        const double behind = along(x, quarter.centre, quarter.tangent);
+        if (behind > -1e-9 && behind < 1 && x[1] > 2) {
+            near_to("the rest", along(y, x, base.tangent), 0, 0);
+            still++;
+        }
+    }
+    assert_true(moved > 10 && still > 10);
+    sdm_mesh_dispose(&plain);
+    sdm_mesh_dispose(&slanted);
+    sdm_instance_free(s);
+}
+
 /* Inscribed meshes reach as high as the duct, and a little less, all over the ranges. */
 static void test_height(void **state)
 {
@@ -204,7 +249,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_is_the_cochlea), cmocka_unit_test(test_sections),
         cmocka_unit_test(test_volume),         cmocka_unit_test(test_parameters),
-        cmocka_unit_test(test_height),
+        cmocka_unit_test(test_slant),          cmocka_unit_test(test_height),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

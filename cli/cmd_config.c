@@ -24,6 +24,7 @@ sdm_status cmd_config(const cli_args *args, sdm_error *err)
     sdm_instance *shape = NULL;
     sdm_status s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && !args->dump) cli_notice_survey(config, shape);
+    if (!s && !args->dump) s = cli_check_memory(config, shape, err);
     if (!s && args->dump) {
         sdm_config_dump(config, &text);
         s = cli_print_text(&text, err);

@@ -33,6 +33,7 @@
 typedef struct job {
     const cli_args *args;
     sdm_text params;
+    cli_shape shape; /* of --shape; owns the names of its measures */
     sdm_mesh mesh;
     double ms_mesh;
     sdm_grid grid;
@@ -48,29 +49,28 @@ typedef struct job {
     double bound_mm;                  /* bound on the error of the distances; 0: exact */
 } job;
 
-static sdm_status measure_shape(job *j, const cli_shape *shape, sdm_error *err)
+static sdm_status measure_shape(job *j, sdm_error *err)
 {
     cli_depths depths;
-    const sdm_status s = cli_read_depths(j->args, shape->instance, &depths, err);
+    const sdm_status s = cli_read_depths(j->args, j->shape.instance, &depths, err);
     if (s || !j->args->measure) return s;
-    return sdm_shape_measure(shape->instance, shape->values, depths.mm, depths.n, &j->measures,
+    return sdm_shape_measure(j->shape.instance, j->shape.values, depths.mm, depths.n, &j->measures,
                              err);
 }
 
 static sdm_status make_shape_mesh(job *j, sdm_error *err)
 {
-    cli_shape shape = {0};
-    sdm_status s = cli_shape_open(j->args, j->args->shape, &j->args->options, &shape, err);
-    if (!s) s = measure_shape(j, &shape, err);
+    const cli_shape *shape = &j->shape;
+    sdm_status s = cli_shape_open(j->args, j->args->shape, &j->args->options, &j->shape, err);
+    if (!s) s = measure_shape(j, err);
     const double start = sdm_clock();
-    if (!s) s = sdm_instance_mesh(shape.instance, shape.values, &j->mesh, err);
+    if (!s) s = sdm_instance_mesh(shape->instance, shape->values, &j->mesh, err);
     j->ms_mesh = 1e3 * (sdm_clock() - start);
     if (!s)
-        s = cli_layers_velocity(&j->layers, j->args, shape.instance, shape.values, j->mesh.n_vert,
+        s = cli_layers_velocity(&j->layers, j->args, shape->instance, shape->values, j->mesh.n_vert,
                                 err);
-    if (!s) cli_add_params(shape.params, shape.n_params, shape.values, &j->params);
+    if (!s) cli_add_params(shape->params, shape->n_params, shape->values, &j->params);
     if (!s && j->params.failed) s = sdm_fail(err, SDM_E_NOMEM, "out of memory for the metadata");
-    cli_shape_dispose(&shape);
     return s;
 }
 
@@ -433,5 +433,6 @@ sdm_status cmd_exact(const cli_args *args, sdm_error *err)
     cli_points_dispose(&j.points);
     sdm_mesh_dispose(&j.mesh);
     sdm_text_dispose(&j.params);
+    cli_shape_dispose(&j.shape);
     return s;
 }

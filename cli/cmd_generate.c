@@ -146,7 +146,12 @@ static sdm_status open_shape(job *j, sdm_error *err)
     sdm_error why = {0};
     sdm_status s = cli_open_registry(args, &j->registry, &why);
     if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, &why);
-    if (!s || (!checks && !exact)) return SDM_OK;
+    if (!s) return SDM_OK;
+    if (!checks && !exact) { // not needed: but a shape that is another one is told
+        if (j->registry && sdm_registry_find(j->registry, j->info->shape, NULL))
+            cli_warn("%s: %s", args->files.items[0], why.text);
+        return SDM_OK;
+    }
     if (err) *err = why;
     return checks ? sdm_fail_in(err, s, "--%s needs the exact shape",
                                 args->check           ? "check"

@@ -545,8 +545,8 @@ const cli_option cli_options[] = {
      "the fit ends when no unknown changes by more than this fraction of its range (default 1e-4; "
      "exact maps 3e-6)"},
     {"max-iterations", 0, CLI_INT, "N", NULL, 1, 100000, ON(CLI_FIT), AT(fit.max_iterations),
-     "largest number of iterations (default 60); the steps at the end of a fit with exact maps, "
-     "which average derivatives, have as many again"},
+     "largest number of iterations of a phase (default 60). A fit with exact maps has a second "
+     "phase, which averages derivatives; a fit to points is made twice"},
     {"least-inside", 0, CLI_REAL, "F", NULL, 0, 1, ON(CLI_FIT), AT(fit.least_inside),
      "exit code 4 when less than this fraction of the fitted shape lies in the image (default "
      "0.5)"},

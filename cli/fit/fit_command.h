@@ -126,6 +126,9 @@ sdm_status cli_fit_check_size(const cli_fit *f, sdm_error *err);
  * them, unless the shape is the one for which they are made; sets f->suspicion. */
 void cli_fit_notice_tissues(cli_fit *f);
 
+/* A notice where --keep parameters keeps the defaults, as no -p is given. */
+void cli_fit_notice_kept(const cli_fit *f);
+
 /* Sets the start pose and the rotations to try. SDM_E_ARG; SDM_E_FORMAT: a bad file of points. */
 sdm_status cli_fit_read_start(cli_fit *f, sdm_error *err);
 

@@ -50,6 +50,12 @@ void cli_fit_notice_tissues(cli_fit *f)
         f->suspicion = "; values of CT were taken, as --inside and --outside are not both given";
 }
 
+void cli_fit_notice_kept(const cli_fit *f)
+{
+    if (f->opts.keep_params && !f->args->params.n && !f->args->cohort.cases)
+        cli_notice("--keep parameters without -p: the parameters keep their default values");
+}
+
 static sdm_status read_keep(const cli_list *words, sdm_fit_opts *o, sdm_error *err)
 {
     const struct {

@@ -88,7 +88,12 @@ static void print_target(const cli_fit *f)
         printf(r->appearance.n_outside > 1 ? ", share %.2g\n" : "\n",
                r->appearance.outside[i].weight);
     }
-    if (r->blur > 0) printf("  point spread %.3g mm\n", r->blur);
+    const double voxel = cli_fit_map_voxel(f);
+    if (r->blur > 0) printf("  point spread %.3g mm", r->blur);
+    if (r->blur > 0 && !f->opts.keep_blur && r->blur <= 0.5 * voxel * (1 + 1e-6))
+        printf(", the least with voxels of the maps of %.3g mm: that of the image may be less",
+               voxel);
+    if (r->blur > 0) printf("\n");
     if (!isnan(r->evidence))
         printf("  evidence     %.4g (log-likelihood relative to an image without the shape)\n",
                r->evidence);

@@ -63,6 +63,18 @@ sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance *
     return s ? s : fit_grid(c, *out, err);
 }
 
+sdm_status cli_check_memory(const sdm_config *c, const sdm_instance *shape, sdm_error *err)
+{
+    size_t n;
+    sdm_error why = {0};
+    sdm_instance_params(shape, &n);
+    const sdm_status s = sdm_train_check_memory(c, n, &c->grid, &why);
+    const bool fewer =
+        c->network.kind == SDM_NETWORK_AUTO || c->network.kind == SDM_NETWORK_TEMPLATE;
+    if (s && fewer) cli_warn("%s (network.kind: template needs less)", why.text);
+    return s && !fewer ? sdm_fail(err, s, "%s", why.text) : SDM_OK;
+}
+
 static void add_lines(sdm_error *err, const char *lines)
 {
     const size_t used = strlen(err->text);

@@ -16,6 +16,10 @@
 sdm_status cli_open_config(const cli_args *args, sdm_config **config, sdm_registry **registry,
                            sdm_instance **shape, sdm_error *err);
 
+/* Refuses a training whose maps do not fit into data.memory_gb (SDM_E_CONFIG). With network.kind
+ * auto or template it is a warning: a template needs fewer maps. */
+sdm_status cli_check_memory(const sdm_config *c, const sdm_instance *shape, sdm_error *err);
+
 /* Creates the configured shape with its options and checks the ranges and distributions; *out is
  * freed with sdm_instance_free(). Relative paths start from the folder of the configuration; in c
  * they become absolute, so that a copy of the configuration elsewhere names the same files. A grid

@@ -20,7 +20,7 @@
 #include "terminal.h"
 
 /* Largest part by which the volume of a surface may differ from that of the shape in silence. */
-#define VOLUME_OFF_MAX 0.05
+#define VOLUME_OFF_MAX 0.02
 
 typedef enum file_kind {
     KIND_NONE = 0,
@@ -248,11 +248,15 @@ static sdm_status write_surface(const char *path, const cli_map *map, sdm_error 
 static sdm_status write_picture(const char *path, const cli_map *map, sdm_error *err)
 {
     const float levels[] = {0.0f, sdm_grid_contour(map->grid)};
-    char made[80], title[160];
+    char made[80];
+    sdm_text title = {0};
     describe_method(map, made);
-    snprintf(title, sizeof title, "%.64s: %s", map->shape, made);
-    const sdm_picture_map column = {title, map->values, false};
-    return sdm_picture_slices(path, map->grid, &column, 1, levels, 2, err);
+    sdm_text_add(&title, "%.64s: %s%s%s", map->shape, made, map->params && *map->params ? "\n" : "",
+                 map->params ? map->params : "");
+    const sdm_picture_map column = {title.failed ? made : title.data, map->values, false};
+    const sdm_status s = sdm_picture_slices(path, map->grid, &column, 1, levels, 2, err);
+    sdm_text_dispose(&title);
+    return s;
 }
 
 sdm_status cli_write_labels(const char *path, const sdm_grid *grid, const uint8_t *labels,

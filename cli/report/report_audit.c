@@ -205,17 +205,18 @@ void cli_describe_open(const sdm_part_audit *a, sdm_text *text)
 void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
 {
     const sdm_part *p = &a->part[index];
-    cli_name_part(a, index, text);
     if (p->volume > 0) {
         size_t largest = 0;
         for (size_t i = 1; i < a->n; i++)
             if (a->part[i].volume < a->part[largest].volume) largest = i;
-        sdm_text_add(text,
-                     "is subtracted from what it overlaps, because maps turn the whole mesh: ");
         cli_name_part(a, largest, text);
-        sdm_text_add(text, "is inside out and larger than the rest");
+        sdm_text_add(text,
+                     "is inside out and larger than the rest: maps turn the whole mesh for it, and "
+                     "subtract part %zu of %zu from what that overlaps",
+                     index + 1, a->n);
         return;
     }
+    cli_name_part(a, index, text);
     sdm_text_add(text,
                  "is inside out%s: it is subtracted from what it overlaps and is not solid itself",
                  p->met ? " and overlaps another" : "");

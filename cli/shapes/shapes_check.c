@@ -53,6 +53,7 @@ static sdm_status open_config(check *c, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG,
                         "shapes check: -O belongs to NAME; a configuration has shape.options");
     sdm_status s = cli_open_config(&args, &c->config, &c->registry, &c->shape, err);
+    if (!s) s = cli_check_memory(c->config, c->shape, err);
     if (!s) sdm_instance_params(c->shape, &n);
     if (!s) s = sdm_train_ranges(c->config, c->shape, min, max, err);
     if (!s) s = sdm_train_distributions(c->config, c->shape, min, max, c->distribution, err);

@@ -2,9 +2,11 @@
 #include "evaluate.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "inputs/setup.h"
 #include "report/terminal.h"
 #include "sdm/field.h"
 #include "sdm/internal/near.h"
@@ -323,10 +325,23 @@ sdm_status cli_picture_compare(const sdm_model *m, const sdm_instance *shape, ui
     if (s) return s;
     if (!p) cli_maker_params(&maker, seed, index, sampled);
     s = make_maps(&maker, p ? p : sampled, maps + n, maps, err);
-    for (size_t i = 0; i < n && !s; i++) maps[2 * n + i] = maps[n + i] - maps[i];
-    const sdm_picture_map columns[] = {
-        {"exact", maps, false}, {"network", maps + n, false}, {"error", maps + 2 * n, true}};
+    double square = 0;
+    for (size_t i = 0; i < n && !s; i++) {
+        const float e = maps[2 * n + i] = maps[n + i] - maps[i];
+        square += (double)e * (double)e;
+    }
+    size_t n_params;
+    const sdm_param *params = sdm_instance_params(shape, &n_params);
+    sdm_text exact = {0};
+    char error[64];
+    sdm_text_add(&exact, "exact\n");
+    cli_add_params(params, n_params, p ? p : sampled, &exact);
+    snprintf(error, sizeof error, "error\nroot mean square %.3g mm", sqrt(square / (double)n));
+    const sdm_picture_map columns[] = {{exact.failed ? "exact" : exact.data, maps, false},
+                                       {"network", maps + n, false},
+                                       {error, maps + 2 * n, true}};
     if (!s) s = sdm_picture_slices(path, g, columns, 3, levels, 2, err);
+    sdm_text_dispose(&exact);
     sdm_free(maps);
     return s;
 }

@@ -69,6 +69,18 @@ static int octahedron_distance(const void *self, const sdm_host *host,
     return 0;
 }
 
+/* Optional: what users want to know of the shape, printed by --measure. */
+static const sdm_measure MEASURES[] = {{.name = "edge", .unit = "mm", .help = "length of an edge"}};
+
+static int octahedron_measure(const void *self, const sdm_host *host,
+                              const sdm_option_value *options, const double *p, uint32_t index,
+                              double depth, double *value)
+{
+    (void)self, (void)host, (void)options, (void)index, (void)depth;
+    *value = sqrt(2) * p[RADIUS];
+    return 0;
+}
+
 static const sdm_shape OCTAHEDRON = {
     .abi = SDM_SHAPE_ABI,
     .size = sizeof(sdm_shape),
@@ -78,6 +90,9 @@ static const sdm_shape OCTAHEDRON = {
     .n_params = N_PARAMS,
     .mesh = octahedron_mesh,
     .distance = octahedron_distance,
+    .measures = MEASURES,
+    .n_measures = 1,
+    .measure = octahedron_measure,
 };
 
 /* The only exported symbol: returns shape 0, 1, ... of this file, NULL after the last. */

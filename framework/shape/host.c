@@ -44,7 +44,11 @@ static int host_reserve(const sdm_host *host, sdm_mesh_out *out, size_t n_vert, 
         m = &b->mesh;
     }
     const sdm_status s = sdm_mesh_reserve(m, n_vert, n_tri, &c->err);
-    return s ? (int)s : mesh_out_set(m, out);
+    if (s) return (int)s;
+    // NaN and vertices that do not exist: what the callback forgets to write is refused
+    memset(m->vert, 0xff, 3 * n_vert * sizeof *m->vert);
+    memset(m->tri, 0xff, 3 * n_tri * sizeof *m->tri);
+    return mesh_out_set(m, out);
 }
 
 static int host_fail(const sdm_host *host, const char *text)

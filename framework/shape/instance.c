@@ -193,13 +193,17 @@ static sdm_status mesh_check(const sdm_mesh *m, const sdm_mesh_out *out, sdm_err
     if (s) return s;
     if (m->n_tri == 0) return sdm_fail(err, SDM_E_PLUGIN, "the mesh has no triangle");
     for (size_t i = 0; i < 3 * m->n_tri; i++)
-        if (m->tri[i] >= m->n_vert)
+        if (m->tri[i] == UINT32_MAX) // from host->reserve()
+            return sdm_fail(err, SDM_E_PLUGIN,
+                            "triangle %zu of %zu was reserved, but never written", i / 3, m->n_tri);
+        else if (m->tri[i] >= m->n_vert)
             return sdm_fail(err, SDM_E_PLUGIN,
                             "triangle %zu has vertex %lu, but there are %zu vertices", i / 3,
                             (unsigned long)m->tri[i], m->n_vert);
     for (size_t i = 0; i < 3 * m->n_vert; i++)
         if (!isfinite(m->vert[i]))
-            return sdm_fail(err, SDM_E_PLUGIN, "vertex %zu has a coordinate that is not finite",
+            return sdm_fail(err, SDM_E_PLUGIN,
+                            "vertex %zu has a coordinate that is not finite, or was never written",
                             i / 3);
     return SDM_OK;
 }

@@ -72,7 +72,7 @@ typedef struct sdm_shape { uint32_t abi; uint32_t size; const char *name; const 
 enum { SDM_MODEL_NAME_MAX = 64 };
 typedef struct sdm_model_param { char name[SDM_MODEL_NAME_MAX], unit[16]; double min, max, def; sdm_distribution distribution; } sdm_model_param;
 typedef struct sdm_accuracy { int64_t samples; double mse_mm2, rmse_mm, mae_mm, max_abs_mm; double rmse_near_mm; double q50_mm, q90_mm, q99_mm; double near_mm; } sdm_accuracy;
-typedef struct sdm_model_quality { char grade[16]; double cut; double between_mm; double thickness_mm; } sdm_model_quality;
+typedef struct sdm_model_quality { char grade[16]; double cut; double between_mm; double thickness_mm; double mesh_volume_mm3, mesh_area_mm2; } sdm_model_quality;
 typedef struct sdm_model_info { char shape[SDM_MODEL_NAME_MAX]; char kind[16]; char version[16]; size_t n_params; const sdm_model_param *params; size_t n_options; const char *const *option_names, *const *option_values; sdm_grid grid; sdm_accuracy accuracy; uint64_t seed; double train_seconds; int64_t train_samples; uint64_t checksum; size_t file_bytes, weight_bytes; double macs; const char *config; const char *folder; size_t fine_width; sdm_model_quality quality; } sdm_model_info;
 typedef struct sdm_model sdm_model;
 sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
@@ -214,6 +214,7 @@ typedef struct sdm_fit_candidate { size_t source; sdm_pose pose; double score; }
 sdm_status sdm_fit_find(const sdm_fit_source *sources, size_t n_sources, const sdm_fit_target *target, const sdm_fit_opts *opts, size_t most, sdm_fit_candidate *out, size_t *n, sdm_error *err);
 sdm_status sdm_map_gradient(const sdm_grid *grid, const float *values, int n_threads, float *gradient, sdm_error *err);
 sdm_status sdm_map_volume(const sdm_grid *grid, const float *values, int n_threads, double *volume, sdm_error *err);
+sdm_status sdm_map_volume_adjoint(const sdm_grid *grid, const float *values, int n_threads, float *adjoint, sdm_error *err);
 typedef struct sdm_tissue { double mean, sd; } sdm_tissue;
 typedef struct sdm_phantom_opts { sdm_tissue inside, outside; sdm_tissue air; double air_share; double air_mm; double air_clear_mm; double blur[3]; double texture_mm; double noise; bool noise_is_blurred; int supersampling; uint64_t seed; int n_threads; bool (*cancelled)(void *user); void *user; } sdm_phantom_opts;
 sdm_phantom_opts sdm_phantom_defaults(void);

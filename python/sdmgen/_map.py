@@ -193,6 +193,13 @@ class Map(Image):
         call("sdm_map_volume", self.grid, address(self.values), 0, byref(result))
         return result.value
 
+    def volume_adjoint(self) -> Float32:
+        """derivatives of `volume` by the values, mm^3 per mm, [z, y, x]: `model.vjp(...)` of them are
+        the derivatives of the volume by the parameters"""
+        result = np.empty_like(self.values)
+        call("sdm_map_volume_adjoint", self.grid, address(self.values), 0, address(result))
+        return result
+
 
 def surface(map: Image, level: float = 0.0) -> Surface:
     """The surface on which a map has the value `level` (mm), by marching cubes (Lorensen and Cline

@@ -18,19 +18,54 @@ static double inside(double r)
     return 0.5 - 105.0 / 64 * r * (1 + s * (-5.0 / 3 + s * (7.0 / 5 - s * 3.0 / 7)));
 }
 
-sdm_status sdm_map_volume(const sdm_grid *grid, const float *values, int n_threads, double *volume,
-                          sdm_error *err)
+/* The derivative of inside(r). */
+static double inside_slope(double r)
 {
-    if (!grid || !values || !volume)
+    if (!(fabs(r) < 1)) return 0;
+    const double s = r * r;
+    return -105.0 / 64 * (1 + s * (-5 + s * (7 - s * 3)));
+}
+
+static sdm_status check(const sdm_grid *grid, const float *values, const void *result,
+                        int n_threads, sdm_error *err)
+{
+    if (!grid || !values || !result)
         return sdm_fail(err, SDM_E_ARG,
                         "volume: a grid, a map and a place for the result are needed");
     if (n_threads < 0)
         return sdm_fail(err, SDM_E_ARG, "%d threads, need 0 (all) or more", n_threads);
+    return sdm_grid_check(grid, err);
+}
+
+/* Distances in half widths, per mm. */
+static double scale_of(const sdm_grid *grid)
+{
+    const double *h = grid->spacing;
+    return 1 / (HALF_WIDTH * fmax(h[0], fmax(h[1], h[2])));
+}
+
+sdm_status sdm_map_volume_adjoint(const sdm_grid *grid, const float *values, int n_threads,
+                                  float *adjoint, sdm_error *err)
+{
+    const sdm_status s = check(grid, values, adjoint, n_threads, err);
+    if (s) return s;
+    const double *h = grid->spacing, scale = scale_of(grid), unit = scale * h[0] * h[1] * h[2];
+    const int64_t n = (int64_t)sdm_grid_count(grid);
+    n_threads = sdm_threads(n_threads);
+#pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)
+    for (int64_t i = 0; i < n; i++)
+        adjoint[i] = (float)(unit * inside_slope((double)values[i] * scale));
+    return SDM_OK;
+}
+
+sdm_status sdm_map_volume(const sdm_grid *grid, const float *values, int n_threads, double *volume,
+                          sdm_error *err)
+{
     double *layer = NULL; // [nz] sums over the voxels of a layer
-    sdm_status s = sdm_grid_check(grid, err);
+    sdm_status s = check(grid, values, volume, n_threads, err);
     if (!s) s = SDM_ALLOC(&layer, (size_t)grid->n[2], "volume", err);
     if (s) return s;
-    const double *h = grid->spacing, scale = 1 / (HALF_WIDTH * fmax(h[0], fmax(h[1], h[2])));
+    const double *h = grid->spacing, scale = scale_of(grid);
     const int64_t n = grid->n[0] * grid->n[1];
     n_threads = sdm_threads(n_threads);
 #pragma omp parallel for schedule(static) num_threads(n_threads) if (n_threads > 1)

@@ -83,7 +83,7 @@ expect 0 'warning: o.ply: the surface encloses 51 mm\^3, 20 % less than the shap
     -o o.off -o o.png -o o.svg -o o.PDF
 present o.nii o.nii.gz o.nrrd o.mha o.ply o.stl o.obj o.off o.png o.svg o.PDF
 [ "$(head -c 4 o.PDF)" = %PDF ] || bad 'o.PDF is no PDF'
-grep -q '>exact</text>' o.svg || bad 'o.svg has no title'
+grep -q '>cube.off: exact</text>' o.svg || bad 'o.svg has no title'
 expect 0 - sdmgen info o.ply
 has '^closed +yes'
 expect 0 - sdmgen info o.off --json

@@ -24,6 +24,12 @@ near "$(measure extent_x value)" 8.6 0.02
 [ -z "$(measure volume sd)" ] || bad 'no standard deviation without a fit'
 expect 0 - sdmgen exact --shape torus --json
 [ -z "$(measure volume value)" ] || bad 'no measures without --measure'
+# of a plug-in, whose file holds the names
+plugin=../../plugins/good/octahedron.so
+for command in exact 'exact --json' 'exact --isolate'; do
+    expect 0 - sdmgen $command --shape octahedron --plugin $plugin -p radius=2 --measure -q
+    if [ "$command" = 'exact --json' ]; then near "$(measure edge value)" 2.828427 1e-5; else has '^  edge +2\.8284 mm$'; fi
+done
 expect 0 - sdmgen exact --shape cochlea --measure --depth 0,10,90 -q
 has '^  diameter_a +8\.2'
 has '^  frequency +20677 Hz at 0 mm$'

@@ -30,7 +30,7 @@ faulty() {
 }
 inside_out='part 2 of 2 \(12 triangles, vertices 8 \.\. 15, box 2 -0\.25 -0\.25 \.\. 4 0\.25 0\.25 mm\) is inside out and overlaps another'
 faulty handle 4 "^warning +$inside_out.*\(in all 21 shapes\); reverse the vertices"
-faulty body 4 '^warning +part 2 of 2 .* is subtracted from what it overlaps, because maps turn the whole mesh: part 1 of 2 .* is inside out and larger than the rest'
+faulty body 4 '^warning +part 1 of 2 .* is inside out and larger than the rest: maps turn the whole mesh for it, and subtract part 2 of 2 from what that overlaps'
 if grep -q 'the exact engine turns' out; then bad "the parts that maps turn are told beside those that they lose: $(cat out)"; fi
 expect 4 'is inside out and larger' sdmgen mesh --shape faulty -O fault=body --plugin "$plugin" --audit
 has '^inside out +1 of 2 parts$'
@@ -69,6 +69,11 @@ expect 4 mend sdmgen shapes check good.yaml grid.spacing=0.5 --plugin "$plugin" 
 has "^warning +$thin \(at size=.*; parts are too thin in all 21 shapes\)$"
 expect 0 "^sdmgen: warning: $thin" sdmgen config good.yaml grid.spacing=0.5 --plugin "$plugin" -q
 expect 0 "^sdmgen: warning: $thin$" sdmgen exact --shape faulty --plugin "$plugin" --spacing 0.5 -o thin.nrrd -q
+
+# More maps than the memory for them holds: refused, or a warning where a template may do with fewer.
+expect 2 'good.yaml: data.static .* need [0-9.]+ GB, data.memory_gb is 0.002' sdmgen config good.yaml network.kind=pod data.memory_gb=0.002 --plugin "$plugin"
+expect 2 'need [0-9.]+ GB, data.memory_gb is 0.002' sdmgen shapes check good.yaml network.kind=pod data.memory_gb=0.002 --plugin "$plugin" --samples 16
+expect 0 'warning: good.yaml: data.static .* need [0-9.]+ GB, .*\(network.kind: template needs less\)$' sdmgen config good.yaml network.kind=auto data.memory_gb=0.002 --plugin "$plugin" -q
 
 # A mesh file in metres: a question about its units.
 printf 'OFF\n4 4 0\n0 0 0\n0.02 0 0\n0 0.02 0\n0 0 0.02\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n' >metres.off

@@ -70,6 +70,9 @@ def test_derivatives(run, model, model_file, tmp_path):
     same(both.map.gradient(), tmp_path / "gradient.npy")
     counted = (both.map.values < 0).sum() * both.map.spacing.prod()
     assert 0.8 * counted < both.map.volume < 1.2 * counted
+    slope = both.map.volume_adjoint()  # the volume of a map that grows by 0.01 mm everywhere
+    grown = type(both.map)(both.map.values - np.float32(0.01), both.map.grid)
+    assert grown.volume - both.map.volume == pytest.approx(-0.01 * slope.sum(), rel=0.02)
     rng = np.random.default_rng(1)
     v, w = rng.normal(size=4), rng.normal(size=model.grid.shape).astype(np.float32)
     along = np.tensordot(v, both.values.astype(float), 1)

@@ -72,6 +72,9 @@ static const sdm_shape ball_shape = {.abi = SDM_SHAPE_ABI,
 
 enum { BALL_VOXELS = 17 * 17 * 17 };
 
+// Volume and area of the mesh at the default parameters that the model states; NaN: none.
+static double ball_mesh_volume = NAN, ball_mesh_area = NAN;
+
 static void ball_model_bytes(const char *second_name, const sdm_grid *grid,
                              double (*mode)(const double x[3]), uint8_t **bytes, size_t *size)
 {
@@ -88,7 +91,11 @@ static void ball_model_bytes(const char *second_name, const sdm_grid *grid,
                            .option_values = option_values,
                            .grid = *grid,
                            .accuracy = {.samples = 10, .rmse_mm = 0.0125},
+                           .quality = {.cut = NAN, .between_mm = NAN, .thickness_mm = NAN},
                            .config = "shape: ball\n"};
+    if (!isnan(ball_mesh_volume)) strcpy(info.quality.grade, "good");
+    info.quality.mesh_volume_mm3 = ball_mesh_volume;
+    info.quality.mesh_area_mm2 = ball_mesh_area;
     static sdm_pod_block blocks[BALL_VOXELS];
     sdm_pod_spec spec = {.info = &info, .blocks = blocks};
     spec.arch = (sdm_pod_arch){.n_params = 2,

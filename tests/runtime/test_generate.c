@@ -16,6 +16,7 @@
 #include "runtime/ball_model.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/shape_sums.h"
 
 enum { N = 17, VOXELS = N * N * N };
 
@@ -502,6 +503,29 @@ static void test_instance_of_model(void **state)
     sdm_model_free(other);
 }
 
+// The shape must have the mesh of the training, to rounding.
+static void test_changed_shape_is_refused(void **state)
+{
+    const scene *s = *state;
+    const double p[] = {1.2, 0};
+    sdm_error err;
+    double volume, area;
+    assert_int_equal(sdm_shape_sums(s->shape, p, &volume, &area, &err), SDM_OK);
+    assert_true(fabs(area / (16 * atan(1) * 1.44) - 1) < 0.2);
+    for (int k = 0; k < 3; k++) {
+        sdm_instance *made = NULL;
+        ball_mesh_volume = volume * (k == 1 ? 1 + 3e-5 : 1 + 1e-9);
+        ball_mesh_area = area * (k == 2 ? 1 + 3e-5 : 1 - 1e-9);
+        sdm_model *m = model_of("bulge");
+        ball_mesh_volume = ball_mesh_area = NAN;
+        const sdm_status status = sdm_runtime_instance(m, s->registry, &made, &err);
+        assert_int_equal(status, k ? SDM_E_PLUGIN : SDM_OK);
+        if (k) assert_non_null(strstr(err.text, "shape 'ball' was changed after the training"));
+        sdm_instance_free(made);
+        sdm_model_free(m);
+    }
+}
+
 static void test_exact_shape_map(void **state)
 {
     const scene *s = *state;
@@ -570,6 +594,7 @@ int main(void)
         cmocka_unit_test(test_each_allocation_may_fail),
         cmocka_unit_test(test_concurrent_callers),
         cmocka_unit_test(test_instance_of_model),
+        cmocka_unit_test(test_changed_shape_is_refused),
         cmocka_unit_test(test_exact_shape_map),
         cmocka_unit_test(test_wrong_arguments_are_refused),
         cmocka_unit_test(test_just_outside_the_range),

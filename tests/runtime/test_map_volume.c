@@ -77,6 +77,35 @@ static void known_volumes(void **state)
         }
 }
 
+// The adjoint is the derivative of the volume along a change of the map, here a growing solid,
+// whose volume grows by its area; and along a change of one voxel.
+static void adjoint(void **state)
+{
+    (void)state;
+    static float slope[N * N * N], again[N * N * N];
+    const sdm_grid g = grid_of(0.4);
+    const double pi = acos(-1);
+    double sum = 0, low = 0, high = 0;
+    fill(&g, ball);
+    assert_int_equal(sdm_map_volume_adjoint(&g, map, 1, slope, NULL), SDM_OK);
+    assert_int_equal(sdm_map_volume_adjoint(&g, map, 3, again, NULL), SDM_OK);
+    assert_memory_equal(slope, again, sizeof slope);
+    int64_t at = 0;
+    for (int64_t v = 0; v < N * N * N; v++) {
+        sum -= (double)slope[v];
+        if (fabs((double)map[v] - 0.2) < fabs((double)map[at] - 0.2)) at = v;
+    }
+    if (fabs(sum / (100 * pi) - 1) > 2e-3) fail_msg("area %.8g, not %.8g", sum, 100 * pi);
+    const float here = map[at];
+    map[at] = here - 0.01f;
+    assert_int_equal(sdm_map_volume(&g, map, 1, &low, NULL), SDM_OK);
+    map[at] = here + 0.01f;
+    assert_int_equal(sdm_map_volume(&g, map, 1, &high, NULL), SDM_OK);
+    const double wanted = (high - low) / 0.02;
+    if (!(wanted < -0.05) || fabs((double)slope[at] - wanted) > 2e-3 * fabs(wanted))
+        fail_msg("slope %.8g, by differences %.8g", (double)slope[at], wanted);
+}
+
 static void bad_arguments(void **state)
 {
     (void)state;
@@ -87,6 +116,8 @@ static void bad_arguments(void **state)
     assert_int_equal(sdm_map_volume(&g, NULL, 0, &volume, NULL), SDM_E_ARG);
     assert_int_equal(sdm_map_volume(&g, map, 0, NULL, NULL), SDM_E_ARG);
     assert_int_equal(sdm_map_volume(&g, map, -1, &volume, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_map_volume_adjoint(NULL, map, 0, map, NULL), SDM_E_ARG);
+    assert_int_equal(sdm_map_volume_adjoint(&g, map, 0, NULL, NULL), SDM_E_ARG);
     map[7] = NAN;
     assert_int_equal(sdm_map_volume(&g, map, 0, &volume, NULL), SDM_E_ARG);
     g.n[0] = 0;
@@ -98,6 +129,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(known_volumes),
+        cmocka_unit_test(adjoint),
         cmocka_unit_test(bad_arguments),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

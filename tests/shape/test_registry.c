@@ -31,7 +31,8 @@ enum { MODE, LEVEL, COUNT, DATA, N_OPTIONS };
 
 static const sdm_option OPTIONS[N_OPTIONS] = {
     [MODE] = {"mode", SDM_OPTION_CHOICE, "", 0, 0, 0,
-              "good|nan|infinite|index|empty|error|mute|resize|swap|skip|memory|file|huge", "x"},
+              "good|nan|infinite|index|empty|error|mute|resize|swap|skip|memory|file|huge|lazy",
+              "x"},
     [LEVEL] = {"level", SDM_OPTION_REAL, "mm", -1, 1.5, 0.25, NULL, "x"},
     [COUNT] = {"count", SDM_OPTION_INT, "", 1, 10, 4, NULL, "x"},
     [DATA] = {"data", SDM_OPTION_FILE, "", 0, 0, 0, NULL, "x"},
@@ -60,7 +61,7 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
     for (int i = 0; i < 12; i++) out->vert[i] = 0;
     for (int k = 0; k < 3; k++) out->vert[3 * (k + 1) + k] = p[0];
     for (int i = 0; i < 4; i++) out->vert[3 * i] += p[1] * p[1];
-    if (out->n_tri) memcpy(out->tri, TRI, sizeof TRI);
+    if (out->n_tri) memcpy(out->tri, TRI, strcmp(mode, "lazy") ? sizeof TRI : sizeof TRI / 2);
     if (!strcmp(mode, "nan")) out->vert[7] = NAN;
     if (!strcmp(mode, "infinite")) out->vert[3] = INFINITY;
     if (!strcmp(mode, "index")) out->tri[10] = 4;
@@ -449,6 +450,7 @@ static void test_bad_meshes_are_refused(void **state)
          "shape 'tetra' at size=2.5 shift=-0.25: vertex 2 has a coordinate that is not finite"},
         {"infinite", SDM_E_PLUGIN, "vertex 1 has a coordinate that is not finite"},
         {"index", SDM_E_PLUGIN, "triangle 3 has vertex 4, but there are 4 vertices"},
+        {"lazy", SDM_E_PLUGIN, "triangle 2 of 4 was reserved, but never written"},
         {"empty", SDM_E_PLUGIN, "the mesh has no triangle"},
         {"error", SDM_E_PLUGIN, "shape 'tetra' at size=2.5 shift=-0.25: the size is unlucky"},
         {"mute", SDM_E_PLUGIN, "mesh() returned 7 without a reason"},

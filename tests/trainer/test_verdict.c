@@ -84,7 +84,7 @@ static void largest_part_limits(void **state)
         {"network.weights=f16", SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f32"},
         {NULL, SDM_CAUSE_FAR, 0, 0, "set network.kind to pod, which may be worse near the surface"},
         {NULL, SDM_CAUSE_TEMPLATE, 0, 0,
-         "lower grid.spacing from 0.8 to 0.4 (and double grid.size, if it is given)"},
+         "lower grid.spacing from 0.8 to 0.4 (and raise grid.size in proportion, if it is given)"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const sdm_verdict v =

@@ -38,15 +38,6 @@ static sdm_status find_box(const sdm_config *config, const sdm_instance *shape, 
     return sdm_shape_box(shape, (const double(*)[2])range, BOX_SAMPLES, BOX_SEED, low, high, err);
 }
 
-/* Do the maps that are kept while training starts fit into the memory for them? */
-static bool maps_fit(const sdm_config *c, size_t n_params, const sdm_grid *g)
-{
-    double fixed = 1;
-    for (size_t i = 0; i < n_params; i++) fixed *= (double)sdm_config_static_count(c, n_params, i);
-    const double maps = fixed + (double)c->data.start + 2 * (double)c->data.holdout;
-    return 2e-9 * maps * (double)sdm_grid_count(g) <= c->data.memory_gb;
-}
-
 /* *grid = the grid of `grid: auto` around the box, whose voxels the thinnest part, *thick mm, makes
  * smaller where it needs it. */
 static sdm_status auto_grid(const sdm_config *config, const sdm_instance *shape,
@@ -65,7 +56,8 @@ static sdm_status auto_grid(const sdm_config *config, const sdm_instance *shape,
         sdm_grid finer;
         if (isnan(*thick) || THIN_VOXELS * sdm_grid_coarsest(grid) <= *thick) break;
         s = sdm_grid_around(low, high, n, NULL, &finer, err);
-        if (s || (double)sdm_grid_count(&finer) > COUNT_MOST || !maps_fit(config, n_params, &finer))
+        if (s || (double)sdm_grid_count(&finer) > COUNT_MOST ||
+            sdm_train_check_memory(config, n_params, &finer, NULL))
             break;
         *grid = finer;
     }

@@ -16,6 +16,7 @@
 #include "sdm/internal/file.h"
 #include "sdm/internal/model_threads.h"
 #include "sdm/internal/near.h"
+#include "sdm/internal/shape_sums.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
 #include "shards/option_texts.h"
@@ -327,10 +328,15 @@ void trainer_export_path(const trainer *t, char path[SDM_PATH_TEXT_MAX])
 }
 
 /* What the model file keeps of the verdict. */
-static void set_quality(const sdm_verdict *v, sdm_model_quality *q)
+static sdm_status set_quality(const sdm_verdict *v, const trainer *t, const sdm_model_info *info,
+                              sdm_model_quality *q, sdm_error *err)
 {
-    *q = (sdm_model_quality){"", v->cut, sqrt(v->part_mm2[SDM_CAUSE_GRID]), v->thickness_mm};
+    double p[SDM_MAX_PARAMS];
+    *q = (sdm_model_quality){"",  v->cut, sqrt(v->part_mm2[SDM_CAUSE_GRID]), v->thickness_mm,
+                             NAN, NAN};
     snprintf(q->grade, sizeof q->grade, "%s", sdm_grade_name(v->grade));
+    for (size_t i = 0; i < info->n_params; i++) p[i] = info->params[i].def;
+    return sdm_shape_sums(t->data.shape, p, &q->mesh_volume_mm3, &q->mesh_area_mm2, err);
 }
 
 sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error *err)
@@ -354,7 +360,7 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
         s = trainer_metric(t, 0, err);
         if (!s) s = trainer_verdict_make(t, &more, &report->verdict, err);
         if (!s) s = trainer_metric_verdict(t, &report->verdict, err);
-        if (!s) set_quality(&report->verdict, &t->quality);
+        if (!s) s = set_quality(&report->verdict, t, &d->info, &t->quality, err);
         report->accuracy = t->accuracy;
         report->steps = t->step;
         report->samples = d->info.train_samples;

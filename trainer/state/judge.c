@@ -23,6 +23,9 @@ static const double FEW_STEPS = 500;
    eight times as many voxels, take away most of the error of the surface. */
 static const double GRID_SHARE = 2, GRID_ERROR = 0.05;
 
+/* A part thinner than this multiple of a voxel is missing in most places. */
+static const double MISSING = 0.7;
+
 /* Sets the key to change and its values. */
 static void advise(sdm_verdict *v, const char *key, double from, double to)
 {
@@ -97,6 +100,13 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
     return "The number of maps limits it";
 }
 
+/* The spacing, with two digits, at which a part of this thickness has two voxels across it. */
+static double spacing_for(double thick)
+{
+    const double unit = pow(10, floor(log10(0.5 * thick)) - 1);
+    return floor(0.5 * thick / unit) * unit;
+}
+
 /* Sets the key for the part that limits; returns the first half of the sentence. */
 static const char *advise_part(const verdict_input *in, sdm_verdict *v)
 {
@@ -119,6 +129,11 @@ static const char *advise_part(const verdict_input *in, sdm_verdict *v)
         advise(v, "grid.spacing", v->voxel_mm, v->voxel_mm / 2);
         return "The lattices of the template limit it, which are as fine as the grid";
     default:
+        if (sdm_too_thin(v->thickness_mm, v->coarse_mm)) {
+            advise(v, "grid.spacing", v->coarse_mm, spacing_for(v->thickness_mm));
+            return "The grid is too coarse for the thinnest part, which surfaces lack or show "
+                   "broken";
+        }
         advise(v, "grid.spacing", v->voxel_mm, v->voxel_mm / 2);
         return "The grid limits the surface, more than the network does";
     }
@@ -145,6 +160,11 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
     if (*limit == SDM_CAUSE_MAPS && in->config->network.depth && unfinished &&
         part[SDM_CAUSE_NETWORK] > 0.5 * part[SDM_CAUSE_MAPS])
         *limit = SDM_CAUSE_NETWORK;
+    // no network shows a part that its grid does not
+    if (sdm_too_thin(v->thickness_mm, v->coarse_mm)) {
+        *limit = SDM_CAUSE_GRID;
+        return true;
+    }
     // a run that ended before its first step says nothing about the grid
     if (in->config->network.depth && in->steps < 1 && part[SDM_CAUSE_NETWORK] > 0) {
         *limit = SDM_CAUSE_NETWORK;
@@ -172,7 +192,7 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
                  ": where such distances matter, set network.kind to pod, which may be worse near "
                  "the surface; a finer grid does not change them");
     if (!strcmp(v->key, "grid.spacing"))
-        snprintf(also, sizeof also, " (and double grid.size, if it is given)");
+        snprintf(also, sizeof also, " (and raise grid.size in proportion, if it is given)");
     // with `auto`, a value that is the default of `auto` would become that of the kind
     if (c->network.kind == SDM_NETWORK_TEMPLATE && !strncmp(v->key, "network.", 8))
         snprintf(also, sizeof also, " with network.kind: template");
@@ -182,6 +202,8 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
         snprintf(also, sizeof also, " and data.memory_gb to %.0f", ceil(gb));
     if (v->limit == SDM_CAUSE_MAPS && !in->cut && c->train.minutes > 0)
         snprintf(time, sizeof time, ", and train.minutes by the time that they take");
+    if (v->limit == SDM_CAUSE_NETWORK && !strncmp(v->key, "network.", 8) && c->train.minutes > 0)
+        snprintf(time, sizeof time, ", and train.minutes: a larger network trains more slowly");
     if (v->limit == SDM_CAUSE_GRID)
         snprintf(result, sizeof result,
                  "; between its voxels exact maps miss the surface by %.2g mm",
@@ -246,6 +268,7 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
     // the maps lack these parts: however exact the network is, it has learned another shape
     const bool lacks = v->inside_out > 0 || sdm_too_thin(v->thickness_mm, v->coarse_mm);
     if (lacks && v->grade == SDM_GRADE_GOOD) v->grade = SDM_GRADE_USABLE;
+    if (v->thickness_mm < MISSING * v->coarse_mm) v->grade = SDM_GRADE_POOR;
     if (v->inside_out > 0)
         tell_inside_out(v);
     else if (v->cut > 0)

@@ -44,6 +44,9 @@ typedef struct sdm_model_quality {
     /* thickness of the thinnest part of a few held-out shapes, mm; NaN: not known. Surfaces on
        voxels larger than about 0.7 of it lack such a part, or show it broken. */
     double thickness_mm;
+    /* of the mesh at the default parameters, the sum over its triangles; NaN: not known. A shape
+       with others is not the one of the training (sdm_runtime_instance()). */
+    double mesh_volume_mm3, mesh_area_mm2;
 } sdm_model_quality;
 
 /* Description of a model. All pointers stay valid until sdm_model_free(); texts are

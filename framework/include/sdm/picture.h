@@ -24,7 +24,7 @@ SDM_API sdm_status sdm_picture_check(const char *path, sdm_error *err);
 
 /* One column of a picture of maps. */
 typedef struct sdm_picture_map {
-    const char *title; /* may be NULL */
+    const char *title; /* may be NULL; what follows a line break is written small below it */
     /* [nz][ny][nx], mm */
     const float *values;
     /* true: an error map, which has another colour scale than the distances */

@@ -84,9 +84,10 @@ typedef struct sdm_mesh_out {
 typedef struct sdm_host {
     uint32_t abi, size;
     void *ctx;
-    /* Allocates the arrays of *out and sets its sizes. Arrays reserved in create() are valid until
-     * create() returns. Returns 0, or non-zero if memory is short; the callback must then return
-     * this value. */
+    /* Allocates the arrays of *out and sets its sizes. What is not written afterwards is refused:
+     * the arrays hold NaN and vertices that do not exist. Arrays reserved in create() are valid
+     * until create() returns. Returns 0, or non-zero if memory is short; the callback must then
+     * return this value. */
     int (*reserve)(const struct sdm_host *host, sdm_mesh_out *out, size_t n_vert, size_t n_tri);
     /* Sets the error message and returns a non-zero value, which the callback must return. `text`
      * is copied. */

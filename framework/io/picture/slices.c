@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "sections.h"
 
@@ -13,6 +14,7 @@
 #define LEFT SDM_SECTION_LEFT
 #define RIGHT 22
 #define TOP 46
+#define NOTE 32 /* two lines below the title */
 #define GAP 24
 #define BELOW SDM_SECTION_BELOW
 #define BAR 14
@@ -27,7 +29,7 @@ typedef struct layout {
     size_t n_levels;
     sdm_sections sections;
     sdm_box row[3];         /* panels of the first column; row r is normal to axis r */
-    int column;             /* width of a column */
+    int top, column;        /* of the first row; width of a column */
     double low[2], high[2]; /* colour scales: [0] distances, [1] errors, mm */
     double unit[2];         /* printed number per mm: 1, or 1000 for micrometres */
 } layout;
@@ -60,10 +62,20 @@ static void layout_range(layout *l, bool error)
     l->unit[error] = error && high < 0.1 ? 1000 : 1;
 }
 
+/* What the title holds behind its first line; NULL: nothing. */
+static const char *note_of(const sdm_picture_map *map)
+{
+    const char *end = map->title ? strchr(map->title, '\n') : NULL;
+    return end ? end + 1 : NULL;
+}
+
 /* The boxes of the first column and the size of the canvas. */
 static void layout_place(layout *l, int *width, int *height)
 {
-    int y = TOP;
+    l->top = TOP;
+    for (size_t m = 0; m < l->n_maps; m++)
+        if (note_of(&l->maps[m])) l->top = TOP + NOTE;
+    int y = l->top;
     sdm_sections_place(&l->sections, l->g, l->maps[0].values);
     l->column = l->sections.widest;
     for (int r = 0; r < 3; r++) {
@@ -144,7 +156,12 @@ static void draw_column(sdm_canvas *c, const layout *l, size_t column, int foot)
     const sdm_picture_map *map = &l->maps[column];
     const int x = LEFT + (int)column * (l->column + GAP), e = map->error;
     const sdm_type title = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
-    sdm_canvas_text(c, x + l->column / 2.0, TOP - 16, title, map->title ? map->title : "");
+    const char *note = note_of(map);
+    char first[160];
+    snprintf(first, sizeof first, "%.*s", map->title ? (int)strcspn(map->title, "\n") : 0,
+             map->title ? map->title : "");
+    sdm_canvas_text(c, x + l->column / 2.0, TOP - 16, title, first);
+    if (note) sdm_panel_title(c, (sdm_box){x, l->top, l->column, 0}, false, note);
     for (int axis = 0; axis < 3; axis++) draw_panel(c, l, column, axis);
     const sdm_box bar = {x + l->column / 10, foot, l->column - 2 * (l->column / 10), BAR};
     const char *caption = !e               ? "signed distance (mm)"

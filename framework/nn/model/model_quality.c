@@ -12,12 +12,15 @@ void sdm_quality_describe(const sdm_model_quality *q, sdm_text *t)
     if (!isnan(q->cut)) sdm_text_add_real(t, "cut", q->cut);
     if (!isnan(q->between_mm)) sdm_text_add_real(t, "between_mm", q->between_mm);
     if (!isnan(q->thickness_mm)) sdm_text_add_real(t, "thickness_mm", q->thickness_mm);
+    if (isnan(q->mesh_volume_mm3) || isnan(q->mesh_area_mm2)) return;
+    sdm_text_add_real(t, "mesh_volume_mm3", q->mesh_volume_mm3);
+    sdm_text_add_real(t, "mesh_area_mm2", q->mesh_area_mm2);
 }
 
 sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sdm_error *err)
 {
     static const char *const grades[] = {"good", "usable", "poor"};
-    *q = (sdm_model_quality){"", NAN, NAN, NAN};
+    *q = (sdm_model_quality){"", NAN, NAN, NAN, NAN, NAN};
     if (!section) return SDM_OK;
     sdm_lines r = {.at = section->data};
     r.end = r.at + section->size;
@@ -25,10 +28,15 @@ sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sd
     if (sdm_lines_next_is(&r, "cut")) q->cut = sdm_lines_real(&r, "cut");
     if (sdm_lines_next_is(&r, "between_mm")) q->between_mm = sdm_lines_real(&r, "between_mm");
     if (sdm_lines_next_is(&r, "thickness_mm")) q->thickness_mm = sdm_lines_real(&r, "thickness_mm");
+    if (sdm_lines_next_is(&r, "mesh_volume_mm3")) {
+        q->mesh_volume_mm3 = sdm_lines_real(&r, "mesh_volume_mm3");
+        q->mesh_area_mm2 = sdm_lines_real(&r, "mesh_area_mm2");
+    }
     bool known = false;
     for (size_t i = 0; i < sizeof grades / sizeof *grades; i++)
         known = known || !strcmp(q->grade, grades[i]);
-    if (!known || q->cut < 0 || q->cut > 1 || q->between_mm < 0 || q->thickness_mm < 0)
+    if (!known || q->cut < 0 || q->cut > 1 || q->between_mm < 0 || q->thickness_mm < 0 ||
+        q->mesh_area_mm2 < 0)
         r.failed = true;
     return sdm_lines_check(&r, err);
 }

@@ -141,9 +141,14 @@ static void check_bounds(const fit_problem *p, const fit_misfit *m, const fit_at
         sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, !b->n, grade, (double)b->n, 0,
                           "%zu of %zu parameters at an end of their range (%s)%s%s%s", b->n,
                           p->n_params, b->names, b->n_wanted ? ": " : "", b->text,
-                          refused ? ", and do not match the shape as it is: a wider range, or "
-                                    "another shape (sdm_fit_opts.tolerance accepts a difference)"
-                                  : "");
+                          !refused ? ""
+                          : b->n > 1
+                              ? ", and do not match the shape as it is: the fit is likely to "
+                                "have run away from a wrong start; or a wider range, or "
+                                "another shape (sdm_fit_opts.tolerance accepts a difference)"
+                              : ", and do not match the shape as it is: a wrong start, a "
+                                "wider range, or another shape (sdm_fit_opts.tolerance "
+                                "accepts a difference)");
 }
 
 // The residuals on both sides of the surface. The older observation model is biased in blurred

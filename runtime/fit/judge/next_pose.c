@@ -16,10 +16,20 @@
 #include "rival.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
+#include "sdm/internal/rotation.h"
 #include "sdm/internal/vec3.h"
 
 // a surface that has this Dice coefficient with that of the fit is no rival
 #define ALIKE 0.9
+// a surface with a higher one is the same, up to the voxels of the map: the shape is symmetric
+#define SAME 0.975
+// turns by less than this, rad, are no symmetries
+#define SYMMETRIC_MIN 0.7
+// in such a pose mean square residuals are lower than those of the fit by at least this factor
+#define BETTER 1.2
+// turns to a surface between the two, from which the fit may end at a better maximum: an
+// upside-down bone
+#define ALIKE_TRIED 2
 // voxels of the shape by which surfaces are compared
 #define VOXELS_ALIKE 1000
 // samples on which fit and rivals are compared, and on which all rotations are
@@ -51,7 +61,8 @@ typedef struct start {
 /* The rival with the least gain of the fit over it; NaN: there is none. */
 typedef struct nearest {
     double gain;
-    size_t param; /* as start.param */
+    size_t param;       /* as start.param */
+    char symmetry[160]; /* how the surface may be turned and stays the same; "": not at all */
 } nearest;
 
 /* The fit, with which its rivals are compared. */
@@ -193,18 +204,50 @@ static void start_insert(start *list, size_t *n, size_t most, const start *one)
     list[at] = *one;
 }
 
-// list[N_CUBE + N_EVEN] = the turns that are no symmetries, the best first; returns their number
-static size_t turns_rank(const own_fit *own, start *list)
+/* The turns from which rivals start, the best first. */
+typedef struct turns {
+    start other[N_CUBE + N_EVEN]; // to other surfaces, with the parameters of the fit
+    start alike[ALIKE_TRIED];     // to surfaces that are nearly that of the fit, all free
+    size_t n_other, n_alike;
+    // the turn by at least SYMMETRIC_MIN to the most similar surface, if it is the same; same.dice
+    // 0: there is none
+    struct {
+        double dice, rotation[3]; // rotation vector in the world, rad
+    } same;
+} turns;
+
+// keeps the turn of the fit to the same surface, if it is a large one
+static void same_take(const own_fit *own, const fit_state *to, double dice, turns *t)
 {
-    size_t n = 0;
+    double back[9], turn[9], v[3];
+    const double *r = own->state.rotation;
+    for (int i = 0; i < 9; i++) back[i] = r[3 * (i % 3) + i / 3];
+    m3_product(to->rotation, back, turn);
+    sdm_rotation_vector(turn, v);
+    if (!(v3_norm(v) >= SYMMETRIC_MIN) || !(dice > t->same.dice)) return;
+    t->same.dice = dice;
+    memcpy(t->same.rotation, v, sizeof v);
+}
+
+static void turns_rank(const own_fit *own, turns *t)
+{
+    t->n_other = t->n_alike = 0;
+    t->same.dice = 0;
     for (size_t i = 0; i < N_CUBE + N_EVEN; i++) {
-        start one = {.keep_params = true};
+        start one = {0};
         turned(own, i, &one.state);
-        if (likeness(own, own->distance, own->volume, &one.state) > ALIKE) continue;
+        const double dice = likeness(own, own->distance, own->volume, &one.state);
+        if (dice > 0.5 * (1 + SAME)) {
+            same_take(own, &one.state, dice, t);
+            continue;
+        }
         one.log_likelihood = rank(own->p, &one.state);
-        start_insert(list, &n, N_CUBE + N_EVEN, &one);
+        one.keep_params = dice <= ALIKE;
+        if (one.keep_params)
+            start_insert(t->other, &t->n_other, N_CUBE + N_EVEN, &one);
+        else
+            start_insert(t->alike, &t->n_alike, ALIKE_TRIED, &one);
     }
-    return n;
 }
 
 // from the state of *p to the nearest maximum, for some iterations
@@ -220,15 +263,15 @@ static sdm_status climb(fit_problem *p, bool keep_params, size_t steps, sdm_erro
     return sdm_fit_newton(p, &newton, &end, err);
 }
 
-// how well the state of *p explains the samples after some iterations; the surface is another one
-// than that of the fit, or *other is false
-static sdm_status challenge(fit_problem *p, const own_fit *own, const start *from, bool *other,
-                            fit_standing *standing, sdm_error *err)
+// how well the state of *p explains the samples after some iterations; *other: the Dice coefficient
+// of its surface with that of the fit is at most `dice`
+static sdm_status challenge(fit_problem *p, const own_fit *own, const start *from, double dice,
+                            bool *other, fit_standing *standing, sdm_error *err)
 {
     p->state = from->state;
     sdm_status s = climb(p, from->keep_params, STEPS, err);
     if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
-    *other = !s && map_likeness(own, &p->maps, &p->state) <= ALIKE;
+    *other = !s && map_likeness(own, &p->maps, &p->state) <= dice;
     if (s == SDM_E_QUALITY) return SDM_OK; // a state that cannot be fitted is no rival
     return s ? s : sdm_fit_stand(p, own->factor, standing, err);
 }
@@ -273,39 +316,72 @@ static void nearest_take(nearest *least, const fit_standing *fit, const fit_stan
                          size_t param)
 {
     const double gain = sdm_fit_gain(fit, rival);
-    if (!(least->gain <= gain) && !isnan(gain)) *least = (nearest){gain, param};
+    if (!(least->gain <= gain) && !isnan(gain)) least->gain = gain, least->param = param;
+}
+
+// Lowers *least where the fit, turned to a surface that is nearly its own, climbs to a better
+// maximum: then the fit is not the best one. A maximum as good is the same or a symmetric one. The
+// fit climbs as far on these samples.
+static sdm_status compare_alike(fit_problem *p, own_fit *own, const turns *t, nearest *least,
+                                sdm_error *err)
+{
+    fit_standing fit, rival;
+    bool other;
+    if (!t->n_alike || p->opts->keep_params) return SDM_OK;
+    const start here = {.state = own->state};
+    sdm_status s = challenge(p, own, &here, SAME, &other, &fit, err);
+    for (size_t i = 0; i < t->n_alike && !s; i++) {
+        s = challenge(p, own, &t->alike[i], SAME, &other, &rival, err);
+        if (!s && other && fit.chi_square >= BETTER * rival.chi_square &&
+            sdm_fit_gain(&fit, &rival) < -SDM_FIT_PREFERRED)
+            nearest_take(least, &fit, &rival, 0);
+    }
+    return s;
+}
+
+// the largest symmetry of the surface that is not a rotation by any angle, which is told elsewhere
+static void tell_symmetry(const turns *t, nearest *least)
+{
+    const double *v = t->same.rotation, angle = v3_norm(v);
+    if (!(t->same.dice > 0)) return;
+    snprintf(least->symmetry, sizeof least->symmetry,
+             "turned by %.0f degrees about (%.2g, %.2g, %.2g) (LPS) the surface is the same: the "
+             "rotation may be either",
+             angle * 57.29577951308232, v[0] / angle + 0, v[1] / angle + 0, v[2] / angle + 0);
 }
 
 // the least gain over the runner-up of the search, over the best turn, and over the best values
 static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_error *err)
 {
-    start *list = NULL, *value = NULL;
+    turns *t = NULL;
+    start *value = NULL;
     fit_standing fit, rival;
     bool other;
     size_t n_values = 0;
-    sdm_status s = SDM_ALLOC(&list, N_CUBE + N_EVEN, "rival of the fit", err);
+    sdm_status s = SDM_ALLOC(&t, 1, "rival of the fit", err);
     if (!s) s = SDM_ALLOC(&value, PARAMS_TRIED, "rival of the fit", err);
-    const size_t n = s ? 0 : turns_rank(own, list);
+    if (!s) turns_rank(own, t);
     // the tissues of the fit on these samples, as those of its rivals
     if (!s) s = climb(p, true, STEPS_OF_FIT, err);
     if (!s) s = sdm_fit_stand(p, own->factor, &fit, err);
     if (!s) s = values_rank(p, own, value, &n_values, err);
-    *least = (nearest){NAN, 0};
+    if (!s) tell_symmetry(t, least);
     if (!s && p->has_runner_up) {
         const start from = {.state = p->runner_up};
-        s = challenge(p, own, &from, &other, &rival, err);
+        s = challenge(p, own, &from, ALIKE, &other, &rival, err);
         if (!s && other) nearest_take(least, &fit, &rival, 0);
     }
     other = false;
-    for (size_t i = 0; i < n && i < TRIES_MAX && !s && !other; i++) {
-        s = challenge(p, own, &list[i], &other, &rival, err);
+    for (size_t i = 0; !s && i < t->n_other && i < TRIES_MAX && !other; i++) {
+        s = challenge(p, own, &t->other[i], ALIKE, &other, &rival, err);
         if (!s && other) nearest_take(least, &fit, &rival, 0);
     }
     for (size_t i = 0; i < n_values && !s; i++) {
-        s = challenge(p, own, &value[i], &other, &rival, err);
+        s = challenge(p, own, &value[i], ALIKE, &other, &rival, err);
         if (!s && other) nearest_take(least, &fit, &rival, value[i].param);
     }
-    sdm_free(list);
+    if (!s) s = compare_alike(p, own, t, least, err);
+    sdm_free(t);
     sdm_free(value);
     return s;
 }
@@ -316,7 +392,7 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     const sdm_fit_opts *given = p->opts;
     sdm_fit_opts quiet = *given;
     own_fit own = {0};
-    nearest least = {NAN, 0};
+    nearest least = {.gain = NAN};
     if (given->keep_pose || v->grade == SDM_FIT_FAILED) return SDM_OK;
     quiet.progress = NULL;
     p->opts = &quiet;
@@ -331,13 +407,14 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     sdm_free(own.distance);
     p->opts = given;
     if (s) return s;
+    if (p->n_motions > 0) least.symmetry[0] = 0; // any angle, which the fit tells
     if (isnan(least.gain)) {
-        sdm_fit_verdict_add(
-            v, &(sdm_fit_finding){.kind = SDM_FIT_CHECK_NEXT_POSE,
-                                  .figure = NAN,
-                                  .limit = NAN,
-                                  .text = "no other start, rotation or value of one parameter "
-                                          "gives another surface that explains the data"});
+        sdm_fit_finding none = {.kind = SDM_FIT_CHECK_NEXT_POSE, .figure = NAN, .limit = NAN};
+        snprintf(none.text, sizeof none.text, "%s",
+                 *least.symmetry ? least.symmetry
+                                 : "every other start, rotation and value of one parameter leads "
+                                   "back to this surface");
+        sdm_fit_verdict_add(v, &none);
         return SDM_OK;
     }
     const bool passed = least.gain > SDM_FIT_PREFERRED, points = p->target->kind == SDM_FIT_POINTS;
@@ -350,6 +427,13 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
              "the shape %s explains the data %s (log-likelihood of the fit less that of the other: "
              "%.2g): give a nearer start, or more turns",
              where, least.gain < 0 ? "better" : "as well", least.gain);
+    if (passed && *least.symmetry) {
+        sdm_fit_finding both = {
+            .kind = SDM_FIT_CHECK_NEXT_POSE, .figure = least.gain, .limit = SDM_FIT_PREFERRED};
+        snprintf(both.text, sizeof both.text, "%s", least.symmetry);
+        sdm_fit_verdict_add(v, &both);
+        return SDM_OK;
+    }
     // errors of coarse maps at sharp edges weigh more in fits to points than such a gain
     sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, passed,
                       points ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED, least.gain, SDM_FIT_PREFERRED,

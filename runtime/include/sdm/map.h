@@ -31,6 +31,12 @@ SDM_API sdm_status sdm_map_gradient(const sdm_grid *grid, const float *values, i
 SDM_API sdm_status sdm_map_volume(const sdm_grid *grid, const float *values, int n_threads,
                                   double *volume, sdm_error *err);
 
+/* adjoint[nz][ny][nx] = derivatives of the volume of sdm_map_volume() by the values, mm^3 per mm.
+   sdm_generate_vjp() makes derivatives of the volume by the parameters of them. n_threads as above.
+   adjoint may be the same array as values. SDM_E_ARG. [any thread] */
+SDM_API sdm_status sdm_map_volume_adjoint(const sdm_grid *grid, const float *values, int n_threads,
+                                          float *adjoint, sdm_error *err);
+
 #ifdef __cplusplus
 }
 #endif

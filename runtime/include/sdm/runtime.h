@@ -117,11 +117,12 @@ SDM_API sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, co
 /* *out = new instance of the shape that the model was trained on, with the same options, from a
    registry that contains the shape; free with sdm_instance_free(). Only for the exact engine:
    networks do not need it. SDM_E_PLUGIN: the registry does not contain the shape, or its parameters
-   differ from the model's. The data files of the shape are looked for in the model's folder alone
-   (sdm_model_info.folder), under the last part of the name that the model holds. SDM_E_IO: one is
-   not there, or the model was opened from memory; SDM_E_UNSUPPORTED: it is a symbolic link;
-   SDM_E_FORMAT: its content differs from that in training. For files elsewhere make the instance
-   with sdm_instance_create(). */
+   differ from the model's, or its mesh at the default parameters has another volume or area than at
+   the training (by more than 1e-6): the shape was changed since. The data files of the shape are
+   looked for in the model's folder alone (sdm_model_info.folder), under the last part of the name
+   that the model holds. SDM_E_IO: one is not there, or the model was opened from memory;
+   SDM_E_UNSUPPORTED: it is a symbolic link; SDM_E_FORMAT: its content differs from that in
+   training. For files elsewhere make the instance with sdm_instance_create(). */
 SDM_API sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r,
                                         sdm_instance **out, sdm_error *err);
 

@@ -24,6 +24,10 @@ static inline bool sdm_inside_beside(float exact, float map, float voxel)
     return (fabsf(exact) <= 1e-3f * voxel ? map : exact) < 0;
 }
 
-/* The second contour of pictures, beside that of the surface: at this distance (mm), five voxels.
- */
-static inline float sdm_grid_contour(const sdm_grid *g) { return (float)(2.5 * sdm_grid_near(g)); }
+/* The second contour of pictures, beside that of the surface: at this distance (mm), about five
+ * voxels, as 1, 2 or 5 times a power of ten. */
+static inline float sdm_grid_contour(const sdm_grid *g)
+{
+    const double mm = 2.5 * sdm_grid_near(g), unit = pow(10, floor(log10(mm))), digit = mm / unit;
+    return (float)((digit < 1.5 ? 1 : digit < 3.5 ? 2 : digit < 7.5 ? 5 : 10) * unit);
+}

@@ -126,6 +126,12 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
 sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance *shape,
                                    sdm_text *out, sdm_error *err);
 
+/* SDM_E_CONFIG, and how much memory is needed, if the maps that a training on this grid keeps from
+   its start on (data.static, data.start and, twice as large, data.holdout) do not fit into
+   data.memory_gb. A template without a correction keeps fewer. */
+sdm_status sdm_train_check_memory(const sdm_config *c, size_t n_params, const sdm_grid *g,
+                                  sdm_error *err);
+
 /* Distributions of the parameters in the training, out[n], on the ranges min[n] and max[n] of
    sdm_train_ranges(): as shape.distribution says. A normal distribution for which neither the
    configuration nor the shape has figures gets the default value (moved into the range) as its mean

@@ -1,0 +1,17 @@
+/* Two figures by which a shape that was changed is told from the one of a training. */
+#pragma once
+
+#include "sdm/registry.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* *volume (mm^3) and *area (mm^2) = the sums over all triangles of the mesh at p; overlaps count
+ * twice. The errors of sdm_instance_mesh(). [any thread] */
+sdm_status sdm_shape_sums(const sdm_instance *shape, const double *p, double *volume, double *area,
+                          sdm_error *err);
+
+#ifdef __cplusplus
+}
+#endif

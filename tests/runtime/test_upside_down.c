@@ -1,0 +1,120 @@
+/* A pin, a shaft with a ball on either end, one a little larger than the other: upside down it has
+ * almost the same surface. A fit to labels that starts upside down is refused, because the right
+ * pose explains them better; a pin with equal balls has two right poses. Tests: next_pose.c */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "oracle/fit_tools.h"
+#include "oracle/revolved.h"
+
+enum { LENGTH, LOWER, PIN_PARAMS };
+static const sdm_param pin_params[PIN_PARAMS] = {
+    {"length", "mm", 14, 22, 18, "between the middles of the balls"},
+    {"lower", "mm", 3, 5, 4, "radius of the lower ball"}};
+
+enum { RINGS = 48, AROUND = 24 };
+static const double UPPER = 4, SHAFT = 2.2;
+
+static double ball_at(double z, double radius)
+{
+    return fabs(z) < radius ? sqrt(radius * radius - z * z) : 0;
+}
+
+static void pin_ring(const double *p, int i, double *r, double *z)
+{
+    const double half = 0.5 * p[LENGTH], low = -half - p[LOWER], high = half + UPPER;
+    *z = low + (high - low) * (i + 1) / (RINGS + 1);
+    *r = fmax(ball_at(*z + half, p[LOWER]), ball_at(*z - half, UPPER));
+    if (fabs(*z) < half) *r = fmax(*r, SHAFT);
+}
+
+static int pin_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    return revolved_mesh(host, out, RINGS, AROUND, pin_ring, p, -0.5 * p[LENGTH] - p[LOWER],
+                         0.5 * p[LENGTH] + UPPER);
+}
+
+static const sdm_shape pin = {.abi = SDM_SHAPE_ABI,
+                              .size = sizeof(sdm_shape),
+                              .name = "pin",
+                              .summary = "a shaft with two balls",
+                              .params = pin_params,
+                              .n_params = PIN_PARAMS,
+                              .mesh = pin_mesh};
+
+/* Fits the labels of a pin with this lower ball from its own pose or, turned, upside down. */
+static sdm_status fit_pin(double lower, bool turned, sdm_fit_result *r, sdm_error *err)
+{
+    const double truth[PIN_PARAMS] = {18, lower};
+    const sdm_grid g = sdm_grid_centred((int64_t[3]){30, 30, 70}, 0.5, (double[3]){0, 0, 0});
+    sdm_instance *shape = NULL;
+    sdm_mesh mesh = {0};
+    sdm_exact *e = NULL;
+    float *v = calloc(sdm_grid_count(&g), sizeof *v);
+    if (!v || sdm_instance_create(&pin, NULL, 0, NULL, &shape, NULL) ||
+        sdm_instance_mesh(shape, truth, &mesh, NULL) || sdm_exact_create(&mesh, NULL, &e, NULL) ||
+        sdm_exact_map(e, &g, v, NULL))
+        abort();
+    for (size_t i = 0; i < sdm_grid_count(&g); i++) v[i] = v[i] < 0;
+    const sdm_fit_source source = {.shape = shape, .grid = g};
+    const sdm_fit_target t = {.kind = SDM_FIT_LABEL, .grid = g, .values = v};
+    sdm_fit_opts o = sdm_fit_defaults();
+    if (turned) o.start_pose.rotation[0] = 3.141592653589793;
+    o.polish_eps = 1e-3;
+    *err = (sdm_error){0};
+    const sdm_status s = sdm_fit(&source, &t, &o, r, err);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&mesh);
+    sdm_instance_free(shape);
+    free(v);
+    return s;
+}
+
+static const sdm_fit_finding *next_pose(const sdm_fit_result *r)
+{
+    for (size_t i = 0; i < r->verdict.n_findings; i++)
+        if (r->verdict.findings[i].kind == SDM_FIT_CHECK_NEXT_POSE) return &r->verdict.findings[i];
+    return NULL;
+    return NULL;
+}
+
+static void check(double lower, bool turned, bool accepted)
+{
+    sdm_fit_result r;
+    sdm_error err;
+    const sdm_status s = fit_pin(lower, turned, &r, &err);
+    const sdm_fit_finding *f = next_pose(&r);
+    if (accepted ? s != SDM_OK : s != SDM_E_QUALITY || !f || f->grade != SDM_FIT_FAILED)
+        fail_msg("lower ball %g, turned %d: %s (%s); %s", lower, turned, sdm_status_name(s),
+                 err.text, f ? f->text : "no next pose");
+    sdm_fit_dispose(&r);
+}
+
+static void test_upside_down_is_refused(void **state)
+{
+    (void)state;
+    check(4.2, true, false);
+    check(4.2, false, true);
+}
+
+static void test_both_ways_of_a_symmetric_pin_pass(void **state)
+{
+    (void)state;
+    check(UPPER, true, true);
+    check(UPPER, false, true);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_upside_down_is_refused),
+        cmocka_unit_test(test_both_ways_of_a_symmetric_pin_pass),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -15,11 +15,13 @@ pose() { sed -n "s/.*\"$1\": \\[\\([^]]*\\)\\].*/\\1/p" out | head -n 1 | tr -d 
 expect 0 - sdmgen phantom --shape cochlea -O edge=0.5 --spacing 0.5 --rotation 0,0,0.1 --translation 2,0,1 -o ct.nii
 start='--rotation 0,0,0 --start-centre 2.3,0.3,2'
 coarse='--tolerance 0.1 --mirror no'
-expect 0 - sdmgen fit $model ct.nii $start --keep parameters -o coarse.nrrd
+# a notice tells that the parameters keep their defaults; with -p there is none
+kept='^sdmgen: --keep parameters without -p: the parameters keep their default values$'
+expect 0 "$kept" sdmgen fit $model ct.nii $start --keep parameters -o coarse.nrrd
 has '^verdict: doubtful$' # coarse voxels widen the values inside
 has '^  inside       doubtful'
 has '^  --rotation gives one start: without it the fit tries 60 rotations$'
-expect 0 - sdmgen fit $model ct.nii $start $coarse --keep parameters -o fit.nrrd -o fit.ply -o fit.json --json
+expect 0 "$kept" sdmgen fit $model ct.nii $start $coarse --keep parameters -o fit.nrrd -o fit.ply -o fit.json --json
 [ "$(json trusted)" = true ] || bad "not trusted: $(cat out)"
 [ "$(json maps_network)" -gt 0 ] && [ "$(json maps_exact)" = 0 ] || bad 'maps must be the network'"'"'s'
 [ "$(json a)" = 0 ] || bad 'the sd of a parameter that is kept must be 0' # json prints parameters_sd, the last key of that name
@@ -36,10 +38,10 @@ expect 0 - sdmgen fit $start --mirror no --cases cohort/cases.csv -o cohort/out 
     bad "the fit of a table differs: $(cat cohort/out/a/log.txt)"
 
 # Exact maps of the model's shape on its grid, and the same fit started with the network.
-expect 0 - sdmgen fit $model ct.nii $start $coarse --keep parameters --exact -o exact.nrrd --json
+expect 0 "$kept" sdmgen fit $model ct.nii $start $coarse --keep parameters --exact -o exact.nrrd --json
 [ "$(json maps_network)" = 0 ] && [ "$(json maps_exact)" -gt 0 ] || bad 'maps must be exact'
 for i in 1 2 3; do exact[i]=$(pose translation_mm $i); done
-expect 0 - sdmgen fit $model ct.nii $start $coarse --keep parameters --polish -o polished.nrrd --json
+expect 0 "$kept" sdmgen fit $model ct.nii $start $coarse --keep parameters --polish -o polished.nrrd --json
 [ "$(json maps_network)" -gt 0 ] && [ "$(json maps_exact)" -gt 0 ] || bad 'maps must be of both kinds'
 for i in 1 2 3; do near "$(pose translation_mm $i)" "${exact[i]}" 0.02; done
 for file in exact polished; do

@@ -21,7 +21,9 @@
 
 // a surface that has this Dice coefficient with that of the fit is no rival
 #define ALIKE 0.9
-// a surface with a higher one is the same, up to the voxels of the map: the shape is symmetric
+// a turn to a surface with a higher one is a symmetry of the shape, up to the voxels of the map
+#define SYMMETRIC 0.9875
+// a rival that ends with a higher one has the surface of the fit
 #define SAME 0.975
 // turns by less than this, rad, are no symmetries
 #define SYMMETRIC_MIN 0.7
@@ -237,7 +239,7 @@ static void turns_rank(const own_fit *own, turns *t)
         start one = {0};
         turned(own, i, &one.state);
         const double dice = likeness(own, own->distance, own->volume, &one.state);
-        if (dice > 0.5 * (1 + SAME)) {
+        if (dice > SYMMETRIC) {
             same_take(own, &one.state, dice, t);
             continue;
         }

@@ -2,13 +2,12 @@
    its parameters agree. */
 #define _POSIX_C_SOURCE 200809L // for lstat()
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 
 #include "sdm/internal/checksum.h"
-#include "sdm/internal/shape_sums.h"
+#include "sdm/internal/model_mesh.h"
 #include "sdm/memory.h"
 #include "sdm/runtime.h"
 
@@ -36,29 +35,6 @@ static sdm_status check_agreement(const sdm_model_info *info, const sdm_instance
                 p[i].name, info->shape, p[i].unit ? p[i].unit : "", info->params[i].unit);
     }
     return SDM_OK;
-}
-
-/* Largest relative difference of volume and area between compilers and processors. */
-static const double SAME_MESH = 1e-6;
-
-/* SDM_E_PLUGIN unless the mesh at the default parameters is that of the training. */
-static sdm_status check_mesh(const sdm_model_info *info, const sdm_instance *shape, sdm_error *err)
-{
-    const double volume = info->quality.mesh_volume_mm3, area = info->quality.mesh_area_mm2;
-    double *p = NULL, v, a;
-    if (isnan(volume)) return SDM_OK; // a model of an earlier version
-    sdm_status s = SDM_ALLOC(&p, info->n_params, "parameters", err);
-    for (size_t i = 0; i < info->n_params && !s; i++) p[i] = info->params[i].def;
-    if (!s) s = sdm_shape_sums(shape, p, &v, &a, err);
-    sdm_free(p);
-    if (s || (fabs(a - area) <= SAME_MESH * area &&
-              fabs(v - volume) <= SAME_MESH * fmax(fabs(volume), area * sqrt(area))))
-        return s;
-    return sdm_fail(err, SDM_E_PLUGIN,
-                    "shape '%s' was changed after the training: at the default parameters its mesh "
-                    "has %.6g mm^3 and %.6g mm^2, at the training %.6g mm^3 and %.6g mm^2; load "
-                    "the shape of that time, or train again",
-                    info->shape, v, a, volume, area);
 }
 
 /* SDM_E_FORMAT unless the file has checksum `wanted`: a different file would silently give a
@@ -171,7 +147,7 @@ sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r, sdm_i
     sdm_status s = read_options(info, shape, &options, err);
     if (!s) s = sdm_instance_create(shape, options.given, options.n, NULL, &made, err);
     if (!s) s = check_agreement(info, made, err);
-    if (!s) s = check_mesh(info, made, err);
+    if (!s) s = sdm_model_mesh_check(info, made, err);
     sdm_free(options.paths);
     sdm_free(options.given);
     if (s)

@@ -45,10 +45,10 @@ check() {
         own("nn", "model")
         own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template")
         own("io", "glb image meshfile npy picture picture_child ssm volume")
-        own("shape", "callback conformance isolation mesh_measures registry shape_box shape_survey")
+        own("shape", "callback conformance isolation mesh_measures registry shape_box shape_sums shape_survey")
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit map phantom runtime vdb")
-        own("runtime", "vdb_memory")
+        own("runtime", "model_mesh vdb_memory")
          own("all", "sdmgen") # the header that includes all public ones
          own("trainer", "comm map_store ssm_build train train_file train_plan verdict")
         parts("core", "core")

@@ -586,8 +586,8 @@ const cli_option cli_options[] = {
      ".nii.gz .nrrd .seg.nrrd .mha"},
 
     {"measure", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT), AT(measure),
-     "print the measures of the shape: its own (sdmgen shapes NAME lists them), volume, area and "
-     "extents"},
+     "print the measures of the shape (of its mesh, not of the map): its own (sdmgen shapes NAME "
+     "lists them), volume, area and extents"},
     {"measure", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(measure),
      "print the measures of the fitted shape with standard deviations: its own (sdmgen shapes NAME "
      "lists them), volume, area and extents"},

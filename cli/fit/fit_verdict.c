@@ -27,7 +27,7 @@ void cli_fit_print_verdict(const cli_fit *f)
         if (!isnan(x->limit)) printf(", limit %.3g", x->limit);
         printf("%s%s\n", !*x->text ? "" : isnan(x->figure) ? " " : ": ", x->text);
     }
-    if (v->grade != SDM_FIT_PASSED && f->opts.turns == SDM_FIT_TURNS_NONE &&
+    if (v->grade == SDM_FIT_FAILED && f->opts.turns == SDM_FIT_TURNS_NONE &&
         !isnan(f->args->pose.rotation[0]))
         printf("  --rotation gives one start: without it the fit tries 60 rotations\n");
 }

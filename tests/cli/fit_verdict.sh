@@ -22,6 +22,7 @@ wrong='sdmgen fit --shape capsule -O edge=0.5 --rotation 0,0,0 --spacing 0.4 --e
 expect 4 '^sdmgen: error: torus.nii: ' $wrong torus.nii
 has 'NOT TO BE TRUSTED'
 has '^verdict: failed$'
+has '^  --rotation gives one start: without it the fit tries 60 rotations$'
 expect 4 '^sdmgen: error: torus-label.nii: ' $wrong torus-label.nii --label 1
 has '^  (empty|missing)  +FAILED '
 expect 2 '--beside does nothing in a fit to labels' $wrong torus-label.nii --label 1 --beside 1

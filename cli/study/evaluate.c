@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "inputs/setup.h"
 #include "report/terminal.h"
 #include "sdm/field.h"
 #include "sdm/internal/near.h"
@@ -335,7 +334,8 @@ sdm_status cli_picture_compare(const sdm_model *m, const sdm_instance *shape, ui
     sdm_text exact = {0};
     char error[64];
     sdm_text_add(&exact, "exact\n");
-    cli_add_params(params, n_params, p ? p : sampled, &exact);
+    for (size_t i = 0; i < n_params; i++)
+        sdm_text_add(&exact, "%s=%.4g ", params[i].name, p ? p[i] : sampled[i]);
     snprintf(error, sizeof error, "error\nroot mean square %.3g mm", sqrt(square / (double)n));
     const sdm_picture_map columns[] = {{exact.failed ? "exact" : exact.data, maps, false},
                                        {"network", maps + n, false},

@@ -346,10 +346,11 @@ static void tell_symmetry(const turns *t, nearest *least)
 {
     const double *v = t->same.rotation, angle = v3_norm(v);
     if (!(t->same.dice > 0)) return;
-    snprintf(least->symmetry, sizeof least->symmetry,
-             "turned by %.0f degrees about (%.2g, %.2g, %.2g) (LPS) the surface is the same: the "
-             "rotation may be either",
-             angle * 57.29577951308232, v[0] / angle + 0, v[1] / angle + 0, v[2] / angle + 0);
+    snprintf(
+        least->symmetry, sizeof least->symmetry,
+        "turned by %.0f degrees about (%.2g, %.2g, %.2g) (LPS) the surface is the same, so the "
+        "rotation may be either; no other pose is as good",
+        angle * 57.29577951308232, v[0] / angle + 0, v[1] / angle + 0, v[2] / angle + 0);
 }
 
 // the least gain over the runner-up of the search, over the best turn, and over the best values

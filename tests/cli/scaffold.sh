@@ -36,7 +36,9 @@ mutant() { # mutant PATTERN SED: with this change of knob_2.c the test of the me
 cmake -S "new folder" -B by-build -DCMAKE_PREFIX_PATH="$build" >log 2>&1 || bad "configure: $(tail -n 5 log)"
 mutant 'clockwise' 's/face(tri, a, b, c)/face(tri, a, c, b)/; s/tri\[1\] = b, tri\[2\] = c/tri[1] = c, tri[2] = b/'
 mutant 'not closed: [0-9]+ edges' 's/top + next, end)/top + next, j < 3 ? first : end)/'
-mutant "vertices, elsewhere" "s/reserve(host, out, TUBE_VERTICES(RINGS)/&+(p[TAPER]>0.1)/"
+more='s/reserve(host, out, TUBE_VERTICES(RINGS)/&+(p[TAPER]>0.1)/'
+mutant 'vertex [0-9]+ has a coordinate that is not finite, or was never written' "$more"
+mutant 'vertices, elsewhere' "$more; s/if (failed) return failed;/& for (size_t i = 0; i < 3 * out->n_vert; i++) out->vert[i] = 0;/"
 
 # Refusals; nothing is left.
 expect 1 '^sdmgen: error: mug exists already: .* --out' sdmgen shapes new mug

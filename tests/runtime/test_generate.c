@@ -1,6 +1,6 @@
 /* The runtime with a model known in closed form: a ball of radius p[0] + 0.1 p[1], which its
  * network represents exactly.
- * Tests: check_results.c generate.c jacobian.c model_shape.c */
+ * Tests: check_results.c generate.c jacobian.c model_mesh.c model_shape.c shape_sums.c */
 #include <math.h>
 #include <pthread.h>
 #include <setjmp.h>

@@ -1,7 +1,6 @@
 /* A page reads and writes no files, asks for no products with transposed Jacobians, and its shape
  * is compared with its model before it is written. The functions of this file take the place of the
- * library's, which would make every page 30 kB larger.
- */
+ * library's, which would make every page 30 kB larger. */
 #include "model/model_kind.h"
 #include "pod/pod_internal.h"
 #include "point/point_internal.h"

@@ -270,9 +270,10 @@ static double height_at(const void *owner, double fraction, double up, int end)
     sdm_duct_section_at(o->form, o->x, fraction, &s);
     double slant[2];
     sdm_duct_slant_at(o->x, fraction, slant);
+    // the heights of a mm along e1, which is horizontal, and along e2
     const double upward[2] = {up * slant[0] * s.tangent[2],
-                              up * (s.e2[2] + slant[1] * s.tangent[2])}, // e1 is horizontal
-        across = sdm_duct_reach(&s, upward),
+                              up * (s.e2[2] + slant[1] * s.tangent[2])};
+    const double across = sdm_duct_reach(&s, upward),
                  length = sdm_duct_mean_radius(&s) * (end < 0 ? o->x[DUCT_CAP] : 1),
                  along = up * end * length * s.tangent[2];
     return up * s.centre[2] + (along > 0 ? hypot(across, along) : across);

@@ -99,7 +99,7 @@ void sdm_duct_slant_at(const double *x, double fraction, double slant[2])
     double u[3] = {0, 0, 0};
     hook_add(1, fraction * x[DUCT_THETA], u);
     slant[0] = u[0] * x[DUCT_SLANT_OUT];
-    slant[1] = -u[0] * x[DUCT_SLANT_UP]; // e2 points down
+    slant[1] = -u[0] * x[DUCT_SLANT_UP]; // this parameter counts upwards, e2 points down
 }
 
 void sdm_duct_outline_at(const duct_section *s, double co, double si, double at[2])

@@ -29,7 +29,7 @@ enum {
     DUCT_WAIST,
     DUCT_EGG,
     DUCT_SLANT_OUT, /* slope of the basal end face outwards, mm along the centreline per mm */
-    DUCT_SLANT_UP,  /* the same upwards */
+    DUCT_SLANT_UP,  /* slope of the basal end face upwards, mm along the centreline per mm */
     DUCT_UNKNOWNS
 };
 

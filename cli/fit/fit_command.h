@@ -126,7 +126,8 @@ sdm_status cli_fit_check_size(const cli_fit *f, sdm_error *err);
  * them, unless the shape is the one for which they are made; sets f->suspicion. */
 void cli_fit_notice_tissues(cli_fit *f);
 
-/* A notice where --keep parameters keeps the defaults, as no -p is given. */
+/* Prints a notice if --keep parameters is given without -p: the shape then keeps the default values
+ * of its parameters. */
 void cli_fit_notice_kept(const cli_fit *f);
 
 /* Sets the start pose and the rotations to try. SDM_E_ARG; SDM_E_FORMAT: a bad file of points. */
@@ -145,7 +146,8 @@ size_t cli_fit_distinct(const sdm_volume *v, size_t most, float *found);
 /* *many = the volume has more different values than labels have, or fractions. SDM_E_NOMEM. */
 sdm_status cli_fit_many_values(const sdm_volume *v, bool *many, sdm_error *err);
 
-/* Prints a warning that this is so in the file `path`. mend: the end of it, what to do. */
+/* Prints a warning that the file `path` has so many values. mend: the end of the warning, which
+ * says what to do. */
 void cli_fit_warn_many_values(const char *path, const char *mend);
 
 /* With --label-close: morphological closing of values[grid] (1 and 0) by a ball of that radius. */

@@ -56,6 +56,17 @@ static void print_law(const char *side, const sdm_fit_law *law)
 /* Least share of outliers that is printed. */
 #define OUTLIERS_SHOWN 0.005
 
+/* The standard deviation of the point spread; maps show none below half of their voxels. */
+static void print_blur(const cli_fit *f)
+{
+    const double blur = f->result.blur, voxel = cli_fit_map_voxel(f);
+    printf("  point spread %.3g mm", blur);
+    if (!f->opts.keep_blur && blur <= 0.5 * voxel * (1 + 1e-6))
+        printf(", the least with voxels of the maps of %.3g mm: that of the image may be less",
+               voxel);
+    printf("\n");
+}
+
 /* Prints the number of voxels or points used, the values of the tissues and the evidence. */
 static void print_target(const cli_fit *f)
 {
@@ -88,12 +99,7 @@ static void print_target(const cli_fit *f)
         printf(r->appearance.n_outside > 1 ? ", share %.2g\n" : "\n",
                r->appearance.outside[i].weight);
     }
-    const double voxel = cli_fit_map_voxel(f);
-    if (r->blur > 0) printf("  point spread %.3g mm", r->blur);
-    if (r->blur > 0 && !f->opts.keep_blur && r->blur <= 0.5 * voxel * (1 + 1e-6))
-        printf(", the least with voxels of the maps of %.3g mm: that of the image may be less",
-               voxel);
-    if (r->blur > 0) printf("\n");
+    if (r->blur > 0) print_blur(f);
     if (!isnan(r->evidence))
         printf("  evidence     %.4g (log-likelihood relative to an image without the shape)\n",
                r->evidence);

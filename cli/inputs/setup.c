@@ -89,21 +89,23 @@ static const char *path_without_shapes(const sdm_registry *r)
 
 const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_error *err)
 {
-    const char *near = NULL, *skipped = find_skipped(r, name), *empty = path_without_shapes(r);
+    const char *near = NULL;
     const sdm_shape *shape = sdm_registry_find(r, name, &near);
-    if (!shape && skipped)
+    if (shape) return shape;
+    const char *skipped = find_skipped(r, name), *empty = near ? NULL : path_without_shapes(r);
+    if (skipped)
         sdm_fail(err, SDM_E_ARG, "unknown shape '%s'; %s", name, skipped);
-    else if (!shape && empty && !near)
+    else if (empty)
         sdm_fail(err, SDM_E_ARG,
                  "unknown shape '%s'; SDMGEN_PLUGIN_PATH=%.300s holds no plug-in: name the folder "
                  "in which the .so file lies (folders in it are not searched)",
                  name, empty);
-    else if (!shape)
+    else
         sdm_fail(err, SDM_E_ARG, "unknown shape '%s'%s%s%s", name,
                  near ? "; did you mean '"
                       : "; sdmgen shapes lists the known ones, --plugin FILE loads others",
                  near ? near : "", near ? "'?" : "");
-    return shape;
+    return NULL;
 }
 
 sdm_status cli_create_shape(const sdm_registry *r, const char *name, const cli_list *options,

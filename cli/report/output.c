@@ -355,7 +355,8 @@ sdm_status cli_write_maps(const char *const *paths, size_t n, cli_map *map, cons
     sdm_status s = SDM_OK;
     for (size_t i = 0; i < n && !s; i++) {
         s = cli_write_map(paths[i], map, args, err);
-        if (cli_ends_with_any(paths[i], CLI_MESH_ENDINGS)) map->volume = 0; // compared once
+        if (cli_ends_with_any(paths[i], CLI_MESH_ENDINGS))
+            map->volume = 0; // compare only one surface
     }
     return s;
 }

@@ -137,7 +137,7 @@ sdm_status sdm_config_read(const char *path, const char *const *overrides, size_
     return s;
 }
 
-/* Bytes of the value of a plain field. */
+/* Size, in bytes, of the value of a field that holds a number or a choice. */
 static size_t value_bytes(const sdm_field *f)
 {
     static const size_t bytes[] = {[SDM_FIELD_INT] = sizeof(int),
@@ -156,7 +156,9 @@ static sdm_reader defaults_reader(sdm_config *plain, sdm_mistakes *mistakes)
     return r;
 }
 
-/* Is the value of a plain field the default of this kind of network? plain: reads defaults. */
+/* Returns whether c has, in a field that holds a number or a choice, the default value for this
+ * kind of network. plain: a reader of defaults_reader(), into whose configuration the default is
+ * written. */
 static bool has_default(const sdm_config *c, sdm_reader *plain, const sdm_field *f, int kind)
 {
     sdm_field_set_default(plain, f, f->kind_defs ? f->kind_defs[kind] : f->def);

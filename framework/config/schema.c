@@ -368,13 +368,14 @@ void sdm_config_settle_override(sdm_reader *r, int override)
         replaces = true;
         argument |= is_argument(given[i]);
     }
-    for (int i = 0; i < 3 && replaces; i++) {
-        // two arguments that contradict each other both stay, so that check_budget() tells it
-        if (given[i]->mark.override == override || (argument && is_argument(given[i]))) continue;
-        if (i == 0) r->config->train.minutes = 0;
-        if (i == 1) r->config->train.steps = 0;
-        if (i == 2) r->config->train.samples = 0;
-    }
+    // two arguments that contradict each other both stay, so that check_budget() tells it
+    bool stays[3];
+    for (int i = 0; i < 3; i++)
+        stays[i] =
+            !replaces || given[i]->mark.override == override || (argument && is_argument(given[i]));
+    if (!stays[0]) r->config->train.minutes = 0;
+    if (!stays[1]) r->config->train.steps = 0;
+    if (!stays[2]) r->config->train.samples = 0;
 }
 
 /* Records a mistake unless exactly one budget is positive. */

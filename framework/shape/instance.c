@@ -193,7 +193,7 @@ static sdm_status mesh_check(const sdm_mesh *m, const sdm_mesh_out *out, sdm_err
     if (s) return s;
     if (m->n_tri == 0) return sdm_fail(err, SDM_E_PLUGIN, "the mesh has no triangle");
     for (size_t i = 0; i < 3 * m->n_tri; i++)
-        if (m->tri[i] == UINT32_MAX) // from host->reserve()
+        if (m->tri[i] == UINT32_MAX) // host->reserve() fills the array with it
             return sdm_fail(err, SDM_E_PLUGIN,
                             "triangle %zu of %zu was reserved, but never written", i / 3, m->n_tri);
         else if (m->tri[i] >= m->n_vert)

@@ -52,38 +52,34 @@ void trainer_dataset_random_params(const dataset *d, uint64_t k, double *p)
     sdm_sample_params(d->seed, STREAM_TRAIN, k, d->min, d->max, d->distribution, d->n_params, p);
 }
 
-static double maps_gb(const sdm_config *c, size_t n_voxels, double n_static)
+/* Numbers of the maps that a training keeps from its start on. */
+typedef struct kept_maps {
+    double fixed, start, holdout; // of the static grid, random, held out (twice as large)
+} kept_maps;
+
+static double kept_gb(kept_maps n, size_t n_voxels)
 {
-    const double maps = n_static + (double)c->data.start + 2 * (double)c->data.holdout;
-    return 2e-9 * maps * (double)n_voxels;
+    return 2e-9 * (n.fixed + n.start + 2 * n.holdout) * (double)n_voxels;
 }
 
-static sdm_status refuse_memory(const sdm_config *c, size_t n_voxels, double n_static,
-                                sdm_error *err)
+static sdm_status refuse_memory(const sdm_config *c, kept_maps n, size_t n_voxels, sdm_error *err)
 {
     return sdm_fail(
         err, SDM_E_CONFIG,
-        "%s: data.static (%.0f maps), data.start (%lld) and data.holdout (%lld) on %.3g voxels "
+        "%s: data.static (%.0f maps), data.start (%.0f) and data.holdout (%.0f) on %.3g voxels "
         "need %.1f GB, data.memory_gb is %g: raise it, or make fewer maps or a coarser grid",
-        c->file, n_static, (long long)c->data.start, (long long)c->data.holdout, (double)n_voxels,
-        maps_gb(c, n_voxels, n_static), c->data.memory_gb);
-}
-
-static double static_count(const sdm_config *c, size_t n_params)
-{
-    double n = 1;
-    for (size_t i = 0; i < n_params; i++) n *= (double)sdm_config_static_count(c, n_params, i);
-    return n;
+        c->file, n.fixed, n.start, n.holdout, (double)n_voxels, kept_gb(n, n_voxels),
+        c->data.memory_gb);
 }
 
 sdm_status sdm_train_check_memory(const sdm_config *c, size_t n_params, const sdm_grid *g,
                                   sdm_error *err)
 {
-    const double n_static = static_count(c, n_params);
+    kept_maps n = {1, (double)c->data.start, (double)c->data.holdout};
+    for (size_t i = 0; i < n_params; i++)
+        n.fixed *= (double)sdm_config_static_count(c, n_params, i);
     const size_t n_voxels = sdm_grid_count(g);
-    return maps_gb(c, n_voxels, n_static) <= c->data.memory_gb
-               ? SDM_OK
-               : refuse_memory(c, n_voxels, n_static, err);
+    return kept_gb(n, n_voxels) <= c->data.memory_gb ? SDM_OK : refuse_memory(c, n, n_voxels, err);
 }
 
 sdm_status trainer_dataset_size(dataset *d, const sdm_config *config, sdm_error *err)
@@ -102,7 +98,9 @@ sdm_status trainer_dataset_size(dataset *d, const sdm_config *config, sdm_error 
     const double map_bytes = 2.0 * (double)d->n_voxels;
     const double room = bytes / map_bytes - (double)d->n_static - 2.0 * (double)d->n_holdout;
     if (room < (double)d->n_start || (room < 1 && !d->only_holdout))
-        return refuse_memory(config, d->n_voxels, (double)d->n_static, err);
+        return refuse_memory(
+            config, (kept_maps){(double)d->n_static, (double)d->n_start, (double)d->n_holdout},
+            d->n_voxels, err);
     const size_t n_random = d->n_start + d->n_online;
     d->n_ring = room < (double)n_random ? (size_t)room : n_random;
     d->n_slots = d->n_static + d->n_ring;

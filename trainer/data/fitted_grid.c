@@ -16,46 +16,37 @@ static const double COUNT_MOST = 4e5;
 /* Most voxels of a grid that is proposed with the spacing of the configuration. */
 static const double PROPOSED_MAX = 2.5e6;
 
-/* range[n_params] of the training. */
-static sdm_status find_ranges(const sdm_config *config, const sdm_instance *shape,
-                              double range[SDM_MAX_PARAMS][2], sdm_error *err)
+/* The shapes of a configuration: the ranges of their parameters, and the box that holds them. */
+typedef struct family {
+    double range[SDM_MAX_PARAMS][2], low[3], high[3];
+} family;
+
+static sdm_status find_family(const sdm_config *config, const sdm_instance *shape, family *f,
+                              sdm_error *err)
 {
     double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
     size_t n;
     sdm_instance_params(shape, &n);
     const sdm_status s = sdm_train_ranges(config, shape, min, max, err);
-    for (size_t i = 0; i < n && !s; i++) range[i][0] = min[i], range[i][1] = max[i];
-    return s;
-}
-
-/* The box low[3] .. high[3] of the shapes of a configuration. */
-static sdm_status find_box(const sdm_config *config, const sdm_instance *shape, double low[3],
-                           double high[3], sdm_error *err)
-{
-    double range[SDM_MAX_PARAMS][2];
-    const sdm_status s = find_ranges(config, shape, range, err);
     if (s) return s;
-    return sdm_shape_box(shape, (const double(*)[2])range, BOX_SAMPLES, BOX_SEED, low, high, err);
+    for (size_t i = 0; i < n; i++) f->range[i][0] = min[i], f->range[i][1] = max[i];
+    return sdm_shape_box(shape, (const double(*)[2])f->range, BOX_SAMPLES, BOX_SEED, f->low,
+                         f->high, err);
 }
 
-/* *grid = the grid of `grid: auto` around the box, whose voxels the thinnest part, *thick mm, makes
- * smaller where it needs it. */
-static sdm_status auto_grid(const sdm_config *config, const sdm_instance *shape,
-                            const double low[3], const double high[3], double *thick,
-                            sdm_grid *grid, sdm_error *err)
+/* Replaces *grid, which has SDM_GRID_VOXELS along its longest edge, by a finer one if the thinnest
+ * part of the shapes, *thick mm, needs it: the grid of `grid: auto`. */
+static sdm_status refine_for_thin(const sdm_config *config, const sdm_instance *shape,
+                                  const family *f, double *thick, sdm_grid *grid, sdm_error *err)
 {
-    double range[SDM_MAX_PARAMS][2];
     size_t n_params;
     sdm_instance_params(shape, &n_params);
-    sdm_status s = find_ranges(config, shape, range, err);
-    if (!s)
-        s = sdm_shape_thickness(shape, (const double(*)[2])range, THIN_SAMPLES, BOX_SEED, thick,
-                                err);
-    if (!s) s = sdm_grid_around(low, high, SDM_GRID_VOXELS, NULL, grid, err);
+    sdm_status s = sdm_shape_thickness(shape, (const double(*)[2])f->range, THIN_SAMPLES, BOX_SEED,
+                                       thick, err);
     for (int n = SDM_GRID_VOXELS + 4; n <= VOXELS_MOST && !s; n += 4) {
         sdm_grid finer;
         if (isnan(*thick) || THIN_VOXELS * sdm_grid_coarsest(grid) <= *thick) break;
-        s = sdm_grid_around(low, high, n, NULL, &finer, err);
+        s = sdm_grid_around(f->low, f->high, n, NULL, &finer, err);
         if (s || (double)sdm_grid_count(&finer) > COUNT_MOST ||
             sdm_train_check_memory(config, n_params, &finer, NULL))
             break;
@@ -96,14 +87,15 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
     sdm_config_set_static(config, n_params);
     if (config->grid.n[0] > 0) return SDM_OK;
     const double *spacing = config->grid.spacing[0] > 0 ? config->grid.spacing : NULL;
-    double low[3], high[3], thick = NAN;
+    double thick = NAN;
+    family f;
     sdm_grid grid;
-    sdm_status s = find_box(config, shape, low, high, err);
+    sdm_status s = find_family(config, shape, &f, err);
     if (s) return s;
-    s = sdm_grid_around(low, high, config->grid_voxels, spacing, &grid, err);
+    s = sdm_grid_around(f.low, f.high, config->grid_voxels, spacing, &grid, err);
     if (s) return sdm_fail_in(err, SDM_E_CONFIG, "%s: grid", config->file);
     const double usual = grid.spacing[0];
-    if (config->grid_auto) s = auto_grid(config, shape, low, high, &thick, &grid, err);
+    if (config->grid_auto) s = refine_for_thin(config, shape, &f, &thick, &grid, err);
     if (s) return s;
     const bool finer = grid.spacing[0] < usual;
     sdm_config_set_grid(config, &grid);
@@ -113,7 +105,7 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
     sdm_text_add(line,
                  "; over the ranges the shape reaches from %.2f to %.2f mm in x, %.2f to %.2f in "
                  "y, %.2f to %.2f in z",
-                 low[0], high[0], low[1], high[1], low[2], high[2]);
+                 f.low[0], f.high[0], f.low[1], f.high[1], f.low[2], f.high[2]);
     if (finer)
         sdm_text_add(line,
                      "; voxels of %.3g mm in place of %.3g, because the thinnest part is %.2g mm "
@@ -125,12 +117,12 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
 sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance *shape,
                                    sdm_text *out, sdm_error *err)
 {
-    double low[3], high[3];
+    family f;
     sdm_grid grid;
-    sdm_status s = find_box(config, shape, low, high, err);
+    sdm_status s = find_family(config, shape, &f, err);
     if (s) return s;
     // the spacing stays, unless that makes very many voxels
-    s = sdm_grid_around(low, high, 0, config->grid.spacing, &grid, NULL);
+    s = sdm_grid_around(f.low, f.high, 0, config->grid.spacing, &grid, NULL);
     const double voxels = s ? INFINITY : (double)sdm_grid_count(&grid);
     if (voxels <= PROPOSED_MAX) {
         sdm_text_add(out, "grid: {spacing: ");
@@ -138,7 +130,8 @@ sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance 
         sdm_text_add(out, "} (");
     } else {
         double thick;
-        s = auto_grid(config, shape, low, high, &thick, &grid, err);
+        s = sdm_grid_around(f.low, f.high, SDM_GRID_VOXELS, NULL, &grid, err);
+        if (!s) s = refine_for_thin(config, shape, &f, &thick, &grid, err);
         if (s) return s;
         sdm_text_add(out, "grid: auto (");
     }

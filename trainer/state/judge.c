@@ -26,6 +26,12 @@ static const double GRID_SHARE = 2, GRID_ERROR = 0.05;
 /* A part thinner than this multiple of a voxel is missing in most places. */
 static const double MISSING = 0.7;
 
+/* Do surfaces on the grid lack the thinnest part of the shapes, or show it broken? */
+static bool lacks_thin_part(const sdm_verdict *v)
+{
+    return sdm_too_thin(v->thickness_mm, v->coarse_mm);
+}
+
 /* Sets the key to change and its values. */
 static void advise(sdm_verdict *v, const char *key, double from, double to)
 {
@@ -129,7 +135,7 @@ static const char *advise_part(const verdict_input *in, sdm_verdict *v)
         advise(v, "grid.spacing", v->voxel_mm, v->voxel_mm / 2);
         return "The lattices of the template limit it, which are as fine as the grid";
     default:
-        if (sdm_too_thin(v->thickness_mm, v->coarse_mm)) {
+        if (lacks_thin_part(v)) {
             advise(v, "grid.spacing", v->coarse_mm, spacing_for(v->thickness_mm));
             return "The grid is too coarse for the thinnest part, which surfaces lack or show "
                    "broken";
@@ -161,7 +167,7 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
         part[SDM_CAUSE_NETWORK] > 0.5 * part[SDM_CAUSE_MAPS])
         *limit = SDM_CAUSE_NETWORK;
     // no network shows a part that its grid does not
-    if (sdm_too_thin(v->thickness_mm, v->coarse_mm)) {
+    if (lacks_thin_part(v)) {
         *limit = SDM_CAUSE_GRID;
         return true;
     }
@@ -266,7 +272,7 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
     v->grade = grade_of(v);
     decide_limit(in, v);
     // the maps lack these parts: however exact the network is, it has learned another shape
-    const bool lacks = v->inside_out > 0 || sdm_too_thin(v->thickness_mm, v->coarse_mm);
+    const bool lacks = v->inside_out > 0 || lacks_thin_part(v);
     if (lacks && v->grade == SDM_GRADE_GOOD) v->grade = SDM_GRADE_USABLE;
     if (v->thickness_mm < MISSING * v->coarse_mm) v->grade = SDM_GRADE_POOR;
     if (v->inside_out > 0)

@@ -100,9 +100,8 @@ static sdm_status number_parts(job *j, sdm_error *err)
     return s;
 }
 
-/* Adds the area of triangle t and the signed volume of its tetrahedron with the point `apex`. */
-static void add_triangle(const sdm_mesh *m, size_t t, const double apex[3], double *area,
-                         double *volume)
+void sdm_triangle_add(const sdm_mesh *m, size_t t, const double apex[3], double *area,
+                      double *volume)
 {
     const double *a = m->vert + 3 * (size_t)m->tri[3 * t],
                  *b = m->vert + 3 * (size_t)m->tri[3 * t + 1],
@@ -138,7 +137,7 @@ static void measure_parts(job *j)
         sdm_part *p = &j->out->part[j->part_of[t]];
         double middle[3];
         for (size_t d = 0; d < 3; d++) middle[d] = 0.5 * (p->min[d] + p->max[d]);
-        add_triangle(m, t, middle, &p->area, &p->volume);
+        sdm_triangle_add(m, t, middle, &p->area, &p->volume);
     }
 }
 
@@ -232,7 +231,7 @@ static sdm_status measure_union(job *j, sdm_error *err)
     for (int d = 0; d < 3; d++) middle[d] = 0.5 * (a->mesh.min[d] + a->mesh.max[d]);
     a->union_volume = a->union_area = s ? NAN : 0;
     for (size_t t = 0; t < m->n_tri && !s; t++)
-        add_triangle(m, t, middle, &a->union_area, &a->union_volume);
+        sdm_triangle_add(m, t, middle, &a->union_area, &a->union_volume);
     sdm_mesh_dispose(&hull);
     sdm_free(source);
     return s;

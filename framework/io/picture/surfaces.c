@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "panel.h"
+#include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
@@ -113,13 +114,8 @@ static void scene_place(scene *sc)
 /* cross[3] = the cross product of two edges of triangle t. */
 static void triangle_cross(const sdm_mesh *m, size_t t, double cross[3])
 {
-    const double *a = m->vert + 3 * m->tri[3 * t], *b = m->vert + 3 * m->tri[3 * t + 1],
-                 *c = m->vert + 3 * m->tri[3 * t + 2];
-    const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]},
-                 w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-    cross[0] = u[1] * w[2] - u[2] * w[1];
-    cross[1] = u[2] * w[0] - u[0] * w[2];
-    cross[2] = u[0] * w[1] - u[1] * w[0];
+    v3_triangle_normal(m->vert + 3 * (size_t)m->tri[3 * t], m->vert + 3 * (size_t)m->tri[3 * t + 1],
+                       m->vert + 3 * (size_t)m->tri[3 * t + 2], cross);
 }
 
 /* Adds to normal[n_vert][3], for each vertex, the cross product of each triangle at the vertex; the

@@ -411,16 +411,19 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     p->opts = given;
     if (s) return s;
     if (p->n_motions > 0) least.symmetry[0] = 0; // any angle, which the fit tells
-    if (isnan(least.gain)) {
-        sdm_fit_finding none = {.kind = SDM_FIT_CHECK_NEXT_POSE, .figure = NAN, .limit = NAN};
-        snprintf(none.text, sizeof none.text, "%s",
+    const bool alone = isnan(least.gain), points = p->target->kind == SDM_FIT_POINTS;
+    if (alone || least.gain > SDM_FIT_PREFERRED) {
+        sdm_fit_finding passed = {.kind = SDM_FIT_CHECK_NEXT_POSE,
+                                  .figure = least.gain,
+                                  .limit = alone ? NAN : SDM_FIT_PREFERRED};
+        snprintf(passed.text, sizeof passed.text, "%s",
                  *least.symmetry ? least.symmetry
-                                 : "every other start, rotation and value of one parameter leads "
-                                   "back to this surface");
-        sdm_fit_verdict_add(v, &none);
+                 : alone         ? "every other start, rotation and value of one parameter leads "
+                                   "back to this surface"
+                                 : "");
+        sdm_fit_verdict_add(v, &passed);
         return SDM_OK;
     }
-    const bool passed = least.gain > SDM_FIT_PREFERRED, points = p->target->kind == SDM_FIT_POINTS;
     const char *name = NULL;
     double low, high;
     char where[100] = "in another pose", text[300];
@@ -430,16 +433,8 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
              "the shape %s explains the data %s (log-likelihood of the fit less that of the other: "
              "%.2g): give a nearer start, or more turns",
              where, least.gain < 0 ? "better" : "as well", least.gain);
-    if (passed && *least.symmetry) {
-        sdm_fit_finding both = {
-            .kind = SDM_FIT_CHECK_NEXT_POSE, .figure = least.gain, .limit = SDM_FIT_PREFERRED};
-        snprintf(both.text, sizeof both.text, "%s", least.symmetry);
-        sdm_fit_verdict_add(v, &both);
-        return SDM_OK;
-    }
     // errors of coarse maps at sharp edges weigh more in fits to points than such a gain
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, passed,
-                      points ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED, least.gain, SDM_FIT_PREFERRED,
-                      "%s", text);
-    return passed || points ? SDM_OK : sdm_fail(err, SDM_E_QUALITY, "%s", text);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, false, points ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED,
+                      least.gain, SDM_FIT_PREFERRED, "%s", text);
+    return points ? SDM_OK : sdm_fail(err, SDM_E_QUALITY, "%s", text);
 }

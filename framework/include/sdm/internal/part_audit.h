@@ -66,6 +66,12 @@ sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audi
                                sdm_error *err);
 void sdm_part_audit_dispose(sdm_part_audit *a);
 
+/* Adds the area of triangle t, mm^2, to *area, and to *volume the signed volume, mm^3, of the
+ * tetrahedron of the triangle and the point `apex`: over a closed mesh these sum up to its volume.
+ */
+void sdm_triangle_add(const sdm_mesh *m, size_t t, const double apex[3], double *area,
+                      double *volume);
+
 /* The smallest distance, mm, of a vertex of part `index` from the surface of the other parts. NaN:
  * it is the only part, numbers of its vertices lie among those of another part, or the engine
  * refuses the other parts. [any thread] */

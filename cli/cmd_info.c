@@ -66,6 +66,9 @@ static void json_quality(sdm_json *j, const sdm_model_quality *q)
     sdm_json_real(j, "cut", q->cut);
     sdm_json_real(j, "between_mm", q->between_mm);
     sdm_json_real(j, "thickness_mm", q->thickness_mm);
+    sdm_json_real(j, "volume_error", q->volume_error);
+    sdm_json_real(j, "derivative_error", q->derivative_error);
+    sdm_json_real(j, "volume_derivative_error", q->volume_derivative_error);
     sdm_json_close(j, '}');
 }
 

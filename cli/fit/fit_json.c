@@ -113,6 +113,7 @@ static void add_work(sdm_json *j, const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
     sdm_json_int(j, "iterations", (int64_t)r->n_iterations);
+    sdm_json_int(j, "restarts", (int64_t)r->n_restarts);
     sdm_json_reals(j, "objective", r->objective, r->n_iterations);
     sdm_json_bool(j, "start_clamped", f->start_clamped || r->start_clamped);
     sdm_json_int(j, "turn", (int64_t)r->turn);

@@ -121,6 +121,9 @@ void cli_fit_print(const cli_fit *f)
     cli_fit_print_candidates(f);
     printf("%s after %zu iterations (%s)\n", r->converged ? "converged" : "NOT CONVERGED",
            r->n_iterations, r->reason);
+    if (r->n_restarts)
+        printf("  restarts     %zu: a refused fit went on from another value of a parameter\n",
+               r->n_restarts);
     printf("  maps         %zu by the network, %zu by the exact engine\n", r->n_network,
            r->n_exact);
     printf("  time         %.2f s: maps %.2f s; search of the start %.2f s\n", r->seconds,

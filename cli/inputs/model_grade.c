@@ -53,4 +53,11 @@ void cli_print_quality(const sdm_model_quality *q)
     if (!isnan(q->thickness_mm))
         cli_print("             the thinnest part of the held-out shapes is %.2g mm thick\n",
                   q->thickness_mm);
+    if (!isnan(q->volume_error))
+        cli_print("             volumes of maps are off by %.3g %%", 100 * q->volume_error);
+    if (!isnan(q->volume_error) && !isnan(q->derivative_error))
+        cli_print("; derivatives by the worst parameter, of maps near the surface by %.3g %%, of "
+                  "volumes by %.3g %%",
+                  100 * q->derivative_error, 100 * q->volume_derivative_error);
+    if (!isnan(q->volume_error)) cli_print("\n");
 }

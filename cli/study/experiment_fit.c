@@ -152,7 +152,8 @@ static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *s
     // measure the overlap
     out->dice = NAN;
     const sdm_fit_source exact = {.shape = job->shape, .grid = job->maker.grid};
-    if (!s && !wrong)
+    const bool shown = !wrong || method->wrong == SDM_EXPERIMENT_MOVED; // the image has the shape
+    if (!s && shown && !*method->shows)
         s = measure_dice(polish ? &exact : source, &r, p, &out->dice, err);
     else if (s && s != SDM_E_QUALITY)
         s = sdm_fail(err, s, "%s", why->text);

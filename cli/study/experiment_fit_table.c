@@ -105,23 +105,35 @@ static bool has_fits(const cli_experiment_result *r)
     return r->state == CLI_EXPERIMENT_DONE && r->fits;
 }
 
+/* From this Dice coefficient on a fit that started beside the shape has found it: it is no wrong one.
+ */
+static const double FOUND_DICE = 0.9;
+
 /* Adds the number of right and of wrong fits, and how many of them were accepted, where the
  * experiment has wrong ones. */
 static void add_verdicts(const cli_experiment_run *run, sdm_text *t)
 {
-    size_t n[2] = {0, 0}, accepted[2] = {0, 0};
+    size_t n[2] = {0, 0}, accepted[2] = {0, 0}, found = 0;
     for (size_t i = 0; i < run->e->n_rows; i++) {
         const cli_experiment_result *r = &run->results[i];
         if (!has_fits(r)) continue;
         const bool wrong = *r->row->method->shows || r->row->method->wrong;
         n[wrong] += r->fits->n;
-        for (size_t k = 0; k < r->fits->n; k++) accepted[wrong] += r->fits->fit[k].converged;
+        for (size_t k = 0; k < r->fits->n; k++) {
+            const cli_experiment_fit *fit = &r->fits->fit[k];
+            const bool finds = wrong && fit->converged && fit->dice >= FOUND_DICE;
+            found += finds;
+            n[wrong] -= finds;
+            accepted[wrong] += fit->converged && !finds;
+        }
     }
     if (!n[1]) return;
     sdm_text_add(t,
                  "\n| cases | fits | accepted | refused |\n|---|---:|---:|---:|\n"
                  "| right | %zu | %zu | %zu |\n| wrong | %zu | %zu | %zu |\n",
                  n[0], accepted[0], n[0] - accepted[0], n[1], accepted[1], n[1] - accepted[1]);
+    if (found)
+        sdm_text_add(t, "| wrong start, the shape was found | %zu | %zu | 0 |\n", found, found);
 }
 
 void cli_experiment_fit_markdown(const cli_experiment_run *run, sdm_text *t)

@@ -54,6 +54,9 @@ sdm_status sdm_npy_read(const char *path, double **values, size_t shape[4], int 
 sdm_status sdm_npy_write(const char *path, const float *values, const size_t *shape, int n_dim, sdm_error *err);
 sdm_status sdm_npy_write_uint32(const char *path, const uint32_t *values, const size_t *shape, int n_dim, sdm_error *err);
 sdm_status sdm_isosurface(const sdm_grid *grid, const float *values, float level, sdm_mesh *out, bool *cut, sdm_error *err);
+sdm_status sdm_map_gradient(const sdm_grid *grid, const float *values, int n_threads, float *gradient, sdm_error *err);
+sdm_status sdm_map_volume(const sdm_grid *grid, const float *values, int n_threads, double *volume, sdm_error *err);
+sdm_status sdm_map_volume_adjoint(const sdm_grid *grid, const float *values, int n_threads, float *adjoint, sdm_error *err);
 sdm_status sdm_alloc(void **out, size_t count, size_t size, const char *what, sdm_error *err);
 void sdm_free(void *block);
 sdm_status sdm_mesh_read(const char *path, sdm_mesh *out, sdm_error *err);
@@ -72,7 +75,7 @@ typedef struct sdm_shape { uint32_t abi; uint32_t size; const char *name; const 
 enum { SDM_MODEL_NAME_MAX = 64 };
 typedef struct sdm_model_param { char name[SDM_MODEL_NAME_MAX], unit[16]; double min, max, def; sdm_distribution distribution; } sdm_model_param;
 typedef struct sdm_accuracy { int64_t samples; double mse_mm2, rmse_mm, mae_mm, max_abs_mm; double rmse_near_mm; double q50_mm, q90_mm, q99_mm; double near_mm; } sdm_accuracy;
-typedef struct sdm_model_quality { char grade[16]; double cut; double between_mm; double thickness_mm; double mesh_volume_mm3, mesh_area_mm2; } sdm_model_quality;
+typedef struct sdm_model_quality { char grade[16]; double cut; double between_mm; double thickness_mm; double mesh_volume_mm3, mesh_area_mm2; double volume_error, derivative_error, volume_derivative_error; } sdm_model_quality;
 typedef struct sdm_model_info { char shape[SDM_MODEL_NAME_MAX]; char kind[16]; char version[16]; size_t n_params; const sdm_model_param *params; size_t n_options; const char *const *option_names, *const *option_values; sdm_grid grid; sdm_accuracy accuracy; uint64_t seed; double train_seconds; int64_t train_samples; uint64_t checksum; size_t file_bytes, weight_bytes; double macs; const char *config; const char *folder; size_t fine_width; sdm_model_quality quality; } sdm_model_info;
 typedef struct sdm_model sdm_model;
 sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
@@ -189,7 +192,7 @@ typedef enum sdm_fit_model { SDM_FIT_PARTIAL_VOLUME = 0, SDM_FIT_LABELS = 1 } sd
 typedef enum sdm_fit_turns { SDM_FIT_TURNS_NONE = 0, SDM_FIT_TURNS_AXIS = 1, SDM_FIT_TURNS_SPHERE = 2 } sdm_fit_turns;
 typedef enum sdm_fit_phase { SDM_FIT_SEARCH = 0, SDM_FIT_MAIN = 1, SDM_FIT_POLISH = 2 } sdm_fit_phase;
 typedef struct sdm_fit_progress { sdm_fit_phase phase; size_t iteration; double objective; double step; const double *params; sdm_pose pose; size_t round, start, n_starts; const double *best_params; } sdm_fit_progress;
-typedef struct sdm_fit_opts { sdm_fit_model image_model; double l_ref; double blur; bool keep_blur; sdm_fit_appearance appearance; bool keep_appearance; double tissue_mm; double point_sd; double point_dof; const double *start_params; sdm_pose start_pose; sdm_fit_turns turns; size_t n_turns; double pivot[3]; bool keep_params; bool keep_pose; double prior_sd; double prior_rotation_sd; double prior_translation_sd; double margin; bool use_box; double box_min[3], box_max[3]; double cavity; double least_inside; size_t max_iterations; size_t max_polish_iterations; double eps; double polish_eps; int n_threads; void (*progress)(void *user, const sdm_fit_progress *p); bool (*cancelled)(void *user); void *user; double tolerance; double beside; } sdm_fit_opts;
+typedef struct sdm_fit_opts { sdm_fit_model image_model; double l_ref; double blur; bool keep_blur; sdm_fit_appearance appearance; bool keep_appearance; double tissue_mm; double point_sd; double point_dof; const double *start_params; sdm_pose start_pose; sdm_fit_turns turns; size_t n_turns; double pivot[3]; bool keep_params; bool keep_pose; double prior_sd; double prior_rotation_sd; double prior_translation_sd; double margin; bool use_box; double box_min[3], box_max[3]; double cavity; double least_inside; size_t max_iterations; size_t max_polish_iterations; double eps; double polish_eps; int n_threads; void (*progress)(void *user, const sdm_fit_progress *p); bool (*cancelled)(void *user); void *user; double tolerance; double beside; size_t max_restarts; } sdm_fit_opts;
 typedef enum sdm_fit_check_kind { SDM_FIT_CHECK_NO_SHAPE = 0, SDM_FIT_CHECK_CONTRAST, SDM_FIT_CHECK_CAVITY, SDM_FIT_CHECK_IN_IMAGE, SDM_FIT_CHECK_CONVERGED, SDM_FIT_CHECK_RESIDUALS, SDM_FIT_CHECK_BESIDE, SDM_FIT_CHECK_EMPTY, SDM_FIT_CHECK_MISSING, SDM_FIT_CHECK_INSIDE, SDM_FIT_CHECK_OUTSIDE, SDM_FIT_CHECK_GIVEN, SDM_FIT_CHECK_BOUNDS, SDM_FIT_CHECK_BLOB, SDM_FIT_CHECK_KEPT_POSE, SDM_FIT_CHECK_MIRROR, SDM_FIT_CHECK_GRID, SDM_FIT_CHECK_NETWORK, SDM_FIT_CHECK_DATA, SDM_FIT_CHECK_SIZE, SDM_FIT_CHECK_VOXELS, SDM_FIT_CHECK_NEXT_POSE, SDM_FIT_CHECK_PATCH, SDM_FIT_CHECK_COVERED, SDM_FIT_N_CHECKS } sdm_fit_check_kind;
 const char *sdm_fit_check_name(sdm_fit_check_kind kind);
 typedef enum sdm_fit_grade { SDM_FIT_PASSED = 0, SDM_FIT_DOUBTFUL = 1, SDM_FIT_FAILED = 2 } sdm_fit_grade;
@@ -197,7 +200,7 @@ typedef struct sdm_fit_finding { sdm_fit_check_kind kind; sdm_fit_grade grade; d
 typedef struct sdm_fit_verdict { sdm_fit_grade grade; size_t n_findings; sdm_fit_finding findings[SDM_FIT_N_CHECKS]; size_t n_units; double chi_square; } sdm_fit_verdict;
 sdm_fit_opts sdm_fit_defaults(void);
 sdm_fit_opts sdm_fit_defaults_for(double voxel);
-typedef struct sdm_fit_result { size_t n_params; double *params; sdm_pose pose; double *covariance; double *sd; double *correlation; bool *at_bound; bool *by_prior; bool start_clamped; size_t n_exact_outside; bool converged; char reason[256]; size_t n_iterations; double *objective; double log_likelihood; double log_likelihood_without; double evidence; double inside_share; size_t n_used, n_nan; size_t n_cavity; double noise_factor; double model_error_mm; double blur; sdm_fit_appearance appearance; double point_sd; size_t turn; size_t n_network, n_exact; double seconds, seconds_network, seconds_exact, seconds_search; double outliers; char open_motions[512]; double kept_pose_motion, kept_pose_gain; double widest_space; sdm_fit_verdict verdict; double *prior_sd; } sdm_fit_result;
+typedef struct sdm_fit_result { size_t n_params; double *params; sdm_pose pose; double *covariance; double *sd; double *correlation; bool *at_bound; bool *by_prior; bool start_clamped; size_t n_exact_outside; bool converged; char reason[256]; size_t n_iterations; double *objective; double log_likelihood; double log_likelihood_without; double evidence; double inside_share; size_t n_used, n_nan; size_t n_cavity; double noise_factor; double model_error_mm; double blur; sdm_fit_appearance appearance; double point_sd; size_t turn; size_t n_network, n_exact; double seconds, seconds_network, seconds_exact, seconds_search; double outliers; char open_motions[512]; double kept_pose_motion, kept_pose_gain; double widest_space; sdm_fit_verdict verdict; double *prior_sd; size_t n_restarts; } sdm_fit_result;
 sdm_status sdm_fit(const sdm_fit_source *source, const sdm_fit_target *target, const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err);
 void sdm_fit_dispose(sdm_fit_result *r);
 sdm_status sdm_fit_measure(const sdm_instance *shape, const sdm_fit_result *fit, const double *depths, size_t n_depths, sdm_measures *out, sdm_error *err);
@@ -212,9 +215,6 @@ sdm_status sdm_fit_pose_from_axis(const double point[3], const double centre[3],
 sdm_status sdm_fit_centre(const sdm_fit_source *source, const double *params, double centre[3], sdm_error *err);
 typedef struct sdm_fit_candidate { size_t source; sdm_pose pose; double score; } sdm_fit_candidate;
 sdm_status sdm_fit_find(const sdm_fit_source *sources, size_t n_sources, const sdm_fit_target *target, const sdm_fit_opts *opts, size_t most, sdm_fit_candidate *out, size_t *n, sdm_error *err);
-sdm_status sdm_map_gradient(const sdm_grid *grid, const float *values, int n_threads, float *gradient, sdm_error *err);
-sdm_status sdm_map_volume(const sdm_grid *grid, const float *values, int n_threads, double *volume, sdm_error *err);
-sdm_status sdm_map_volume_adjoint(const sdm_grid *grid, const float *values, int n_threads, float *adjoint, sdm_error *err);
 typedef struct sdm_tissue { double mean, sd; } sdm_tissue;
 typedef struct sdm_phantom_opts { sdm_tissue inside, outside; sdm_tissue air; double air_share; double air_mm; double air_clear_mm; double blur[3]; double texture_mm; double noise; bool noise_is_blurred; int supersampling; uint64_t seed; int n_threads; bool (*cancelled)(void *user); void *user; } sdm_phantom_opts;
 sdm_phantom_opts sdm_phantom_defaults(void);

@@ -99,6 +99,8 @@ class FitResult:
     #: why the fit stopped
     reason: str
     iterations: int
+    #: how often a refused fit went on from another value of a parameter
+    restarts: int
     #: log-posterior density after each iteration, up to a constant
     objective: Float64
     log_likelihood: float
@@ -611,6 +613,7 @@ def _result_of(
         converged=c.converged,
         reason=c.reason.decode(),
         iterations=c.n_iterations,
+        restarts=c.n_restarts,
         objective=copied(c.objective, (c.n_iterations,), np.float64),
         log_likelihood=c.log_likelihood,
         evidence=c.evidence,

@@ -49,12 +49,18 @@ def accuracy_of(c: Any) -> Accuracy:
 class Quality:
     """What the training found: `grade` is "good", "usable" or "poor" ("": trained by an earlier
     version), `cut` the share of the shapes that the grid cuts, `between_mm` how far exact maps miss
-    the surface between the voxels, `thickness_mm` the thickness of the thinnest part."""
+    the surface between the voxels, `thickness_mm` the thickness of the thinnest part. Root mean
+    square over the right value, NaN if not known: `volume_error` of the volume of maps,
+    `derivative_error` and `volume_derivative_error` of the derivatives, by the worst parameter, of
+    maps near the surface and of the volume."""
 
     grade: str
     cut: float
     between_mm: float
     thickness_mm: float
+    volume_error: float
+    derivative_error: float
+    volume_derivative_error: float
 
 
 #: largest share of shapes that the grid of a good model cuts (docs/network.md)
@@ -63,7 +69,8 @@ CUT_MAX = 0.05
 
 def _quality_of(c: Any, name: str) -> Quality:
     """The quality of a model; warns, as the program does, of one that is poor or cuts its shapes."""
-    result = Quality(c.grade.decode(), c.cut, c.between_mm, c.thickness_mm)
+    numbers = [name for name in Quality.__dataclass_fields__ if name != "grade"]
+    result = Quality(c.grade.decode(), *(getattr(c, name) for name in numbers))
     if result.grade == "poor":
         warnings.warn(f"{name}: the training graded this model poor (sdmgen info)", stacklevel=4)
     if result.cut > CUT_MAX:

@@ -20,6 +20,7 @@
 #include "fit/solver/tissue_field.h"
 #include "fit/solver/tissues.h"
 #include "fit/start/even_points.h"
+#include "fit/start/other_values.h"
 #include "fit/start/start_search.h"
 #include "fit/trust/convergence.h"
 #include "fit/trust/evidence.h"
@@ -86,6 +87,7 @@ sdm_fit_opts sdm_fit_defaults(void)
         .max_polish_iterations = 0,
         .eps = 1e-4,
         .polish_eps = 3e-6,
+        .max_restarts = 2,
     };
 }
 
@@ -515,6 +517,77 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     return s;
 }
 
+/* From the state of *p to a verdict. *fitted: the state that the result reports. */
+static sdm_status attempt(fit_problem *p, sdm_fit_result *out, fit_state *fitted, sdm_error *err)
+{
+    // 5. maximise the posterior; 6. covariance
+    sdm_status s = maximise(p, out, err);
+    if (!s) s = assess(p, out, err);
+    if (!s) sdm_fit_accept_small_steps(p, out);
+    // 7. report the result, also of a fit that failed with SDM_E_QUALITY; 8. judge it
+    if (!s || s == SDM_E_QUALITY) report(p, out);
+    *fitted = p->state;
+    if (!s) s = judge(p, out, err);
+    if (s) out->verdict.grade = SDM_FIT_FAILED;
+    return s;
+}
+
+// makes *p and *out ready for another attempt
+static sdm_status attempt_renew(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+{
+    p->objective = out->objective;
+    out->objective = NULL;
+    const sdm_fit_result old = *out;
+    sdm_fit_dispose(out);
+    const sdm_status s = result_create(p->n_params, out, err);
+    out->turn = old.turn;
+    out->seconds_search = old.seconds_search;
+    out->start_clamped = old.start_clamped;
+    out->n_cavity = old.n_cavity;
+    out->widest_space = old.widest_space;
+    out->n_restarts = old.n_restarts + 1;
+    for (size_t k = 0; k < FIT_PARAMS_MAX + 6; k++) p->prior_weight[k] = 1;
+    p->noise_factor = 1;
+    p->recent = (fit_recent){0};
+    return s;
+}
+
+/* A fit that was refused may have stopped at a wrong value of a parameter: goes on from a better
+ * one, if there is one. `exact`: the kind of maps with which the fit began. */
+static sdm_status attempt_again(fit_problem *p, bool exact, sdm_fit_result *out, fit_state *fitted,
+                                bool *again, sdm_error *err)
+{
+    const double from = sdm_clock();
+    p->state = *fitted;
+    p->maps.exact = exact;
+    p->maps_params[0] = NAN;
+    sdm_status s = sdm_fit_other_values(p, again, err);
+    if (s || !*again) return s;
+    s = attempt_renew(p, out, err);
+    if (!s) s = points_start(p, err);
+    out->seconds_search += sdm_clock() - from;
+    return s ? s : attempt(p, out, fitted, err);
+}
+
+/* Attempts until one is accepted or no better start is found. */
+static sdm_status attempts(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+{
+    const sdm_fit_opts *o = p->opts;
+    const bool exact = p->maps.exact;
+    bool again = !p->is_rival && !o->keep_params && !o->keep_pose;
+    fit_state fitted;
+    sdm_status s = attempt(p, out, &fitted, err);
+    for (size_t i = 0; i < o->max_restarts && again && s == SDM_E_QUALITY; i++) {
+        sdm_error trouble = {0};
+        const sdm_status tried = attempt_again(p, exact, out, &fitted, &again, &trouble);
+        // without a better start the refusal stands
+        if (!again && tried != SDM_E_NOMEM && tried != SDM_E_CANCELLED) break;
+        s = tried;
+        if (err) *err = trouble;
+    }
+    return s;
+}
+
 static sdm_status run(const sdm_fit_source *source, const sdm_fit_target *target,
                       const sdm_fit_opts *opts, bool is_rival, sdm_fit_result *out, sdm_error *err)
 {
@@ -544,19 +617,15 @@ static sdm_status run(const sdm_fit_source *source, const sdm_fit_target *target
         p.target = &as_image;
     }
 
-    // 3. set up the problem at the start; 4. search for a better start; 5. maximise the posterior
+    // 3. set up the problem at the start; 4. search for a better start
     if (!s) s = result_create(p.n_params, out, err);
     if (!s) s = problem_start(&p, out, err);
     if (!s) s = start_find(&p, out, err);
-    if (!s) s = maximise(&p, out, err);
-
-    // 6. covariance; 7. report the result, also of a fit that failed with
-    // SDM_E_QUALITY; 8. judge it, with the evidence
-    if (!s) s = assess(&p, out, err);
-    if (!s) sdm_fit_accept_small_steps(&p, out);
-    if (out->n_params && (!s || s == SDM_E_QUALITY)) report(&p, out);
-    if (!s) s = judge(&p, out, err);
+    if (s && out->n_params && s == SDM_E_QUALITY) report(&p, out);
     if (s) out->verdict.grade = SDM_FIT_FAILED;
+
+    // 5. to 8. fit and judge
+    if (!s) s = attempts(&p, out, err);
     if (s && err && !*out->reason) snprintf(out->reason, sizeof out->reason, "%.255s", err->text);
     report_work(&p, from, out);
     problem_dispose(&p);

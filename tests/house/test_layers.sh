@@ -40,14 +40,14 @@ check() {
         own("core", "blocks export grid memory pose shape status") # shape: types alone
          own("core", "block_border box checksum child clock container distribution envelope file foreign heap json_describe json_read mat3 near processor rng rotation sampling sanitized sha256 shared table team text threads units utf8 vec3")
          own("config", "config experiment mistakes")
-        own("geom", "exact isosurface mesh")
+        own("geom", "exact isosurface map mesh")
         own("geom", "brute_force builder methods part_audit")
         own("nn", "model")
         own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template")
         own("io", "glb image meshfile npy picture picture_child ssm volume")
         own("shape", "callback conformance isolation mesh_measures registry shape_box shape_sums shape_survey")
         own("shapes", "builtin_shapes")
-        own("runtime", "check field fit map phantom runtime vdb")
+        own("runtime", "check field fit phantom runtime vdb")
         own("runtime", "model_mesh vdb_memory")
          own("all", "sdmgen") # the header that includes all public ones
          own("trainer", "comm map_store ssm_build train train_file train_plan verdict")

@@ -1,6 +1,6 @@
 /* The verdict on a training: the decision from given figures, the measured parts, and that
  * following the advice makes the error smaller. Tests: judge.c verdict.c pod_parts.c tree_pass.c
- * surface_check.c history.c progress.c */
+ * surface_check.c derivative_check.c history.c progress.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,6 +14,9 @@
 
 #include "data/surface_check.h"
 #include "sdm/internal/text.h"
+#include "sdm/map.h"
+#include "sdm/memory.h"
+#include "sdm/model.h"
 #include "state/history.h"
 #include "state/judge.h"
 #include "state/progress.h"
@@ -386,6 +389,65 @@ static void parts_add_up(void **state)
     }
 }
 
+// Largest relative error of the volumes of the model's maps of capsules, which have a formula.
+static double volume_error_of(const char *path)
+{
+    sdm_model *m;
+    if (sdm_model_open(path, &m, NULL)) fail_msg("%s", path);
+    const sdm_model_info *info = sdm_model_get_info(m);
+    const sdm_model_param *param = info->params;
+    float *map = calloc(sdm_grid_count(&info->grid), sizeof *map);
+    void *scratch = NULL;
+    if (!map || sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "test", NULL)) abort();
+    assert_int_equal(info->n_params, 2);
+    double largest = 0;
+    for (int i = 0; i < 9; i++) {
+        // capsules of a radius of three voxels and more that lie within the grid
+        const double share[2] = {0.4 + 0.1 * (i % 3), 0.1 + 0.2 * (i / 3)};
+        double p[2], volume;
+        for (int k = 0; k < 2; k++)
+            p[k] = param[k].min + share[k] * (param[k].max - param[k].min);
+        const double length = p[sdm_model_param_index(m, "length")],
+                     radius = p[sdm_model_param_index(m, "radius")],
+                     exact = acos(-1) * radius * radius * (length + 4 * radius / 3);
+        sdm_model_forward(m, p, 1, map, scratch);
+        assert_int_equal(sdm_map_volume(&info->grid, map, 1, &volume, NULL), SDM_OK);
+        largest = fmax(largest, fabs(volume / exact - 1));
+    }
+    sdm_free(scratch);
+    free(map);
+    sdm_model_free(m);
+    return largest;
+}
+
+// A trained network holds volumes and derivatives, one of linear polynomials does not, and the
+// figures say so; the model file keeps them.
+static void volumes_and_derivatives(void **state)
+{
+    (void)state;
+    for (int linear = 0; linear < 2; linear++) {
+        static const char *const set[] = {"network.depth=0", "network.degree=1", "network.rank=2"};
+        const sdm_train_report r = train(set, linear ? 3 : 0);
+        const sdm_verdict *v = &r.verdict;
+        const double seen = volume_error_of(r.model_path);
+        if (linear ? !(v->volume_error > 0.02) || !(v->derivative_error > 0.15)
+                   : !(v->volume_error < 0.01) || !(v->derivative_error < 0.1))
+            fail_msg("linear %d: volumes %g, derivatives %g", linear, v->volume_error,
+                     v->derivative_error);
+        assert_true(v->volume_error > 0 && v->volume_error_max >= v->volume_error);
+        if (linear ? !(seen > 0.02) : !(seen < 0.03)) fail_msg("linear %d: %g", linear, seen);
+        assert_true((v->volume_derivative_error > 0.1) == (linear == 1));
+        assert_true(!strcmp(v->derivative_by, "length") || !strcmp(v->derivative_by, "radius"));
+        sdm_model *m;
+        assert_int_equal(sdm_model_open(r.model_path, &m, NULL), SDM_OK);
+        const sdm_model_quality *q = &sdm_model_get_info(m)->quality;
+        assert_true(fabs(q->volume_error / v->volume_error - 1) < 1e-6);
+        assert_true(fabs(q->derivative_error / v->derivative_error - 1) < 1e-6);
+        assert_true(fabs(q->volume_derivative_error / v->volume_derivative_error - 1) < 1e-6);
+        sdm_model_free(m);
+    }
+}
+
 // Each limit is provoked, named, and the advice followed: the error becomes smaller.
 static void advice_helps(void **state)
 {
@@ -472,6 +534,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(evaluations_are_due),
         cmocka_unit_test(surface_of_a_sphere),
         cmocka_unit_test(parts_add_up),
+        cmocka_unit_test(volumes_and_derivatives),
         cmocka_unit_test(progress_is_true),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

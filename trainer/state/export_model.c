@@ -332,8 +332,12 @@ static sdm_status set_quality(const sdm_verdict *v, const trainer *t, const sdm_
                               sdm_model_quality *q, sdm_error *err)
 {
     double p[SDM_MAX_PARAMS];
-    *q = (sdm_model_quality){"",  v->cut, sqrt(v->part_mm2[SDM_CAUSE_GRID]), v->thickness_mm,
-                             NAN, NAN};
+    *q = (sdm_model_quality){.cut = v->cut,
+                             .between_mm = sqrt(v->part_mm2[SDM_CAUSE_GRID]),
+                             .thickness_mm = v->thickness_mm,
+                             .volume_error = v->volume_error,
+                             .derivative_error = v->derivative_error,
+                             .volume_derivative_error = v->volume_derivative_error};
     snprintf(q->grade, sizeof q->grade, "%s", sdm_grade_name(v->grade));
     for (size_t i = 0; i < info->n_params; i++) p[i] = info->params[i].def;
     return sdm_shape_sums(t->data.shape, p, &q->mesh_volume_mm3, &q->mesh_area_mm2, err);
@@ -349,12 +353,13 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
     sdm_status s = description_create(t, &d, err);
     if (!s) s = model_open(t, report->model_path, d, &model, err);
     if (!s) s = measure_model(t, model, t->data.n_holdout, &t->accuracy, &more, err);
-    sdm_model_free(model);
     if (!s && !isfinite(t->accuracy.mse_mm2))
         s = sdm_fail(err, SDM_E_QUALITY,
                      "the trained network gives numbers that are not finite: use "
                      "network.weights=f32 or lower the "
                      "learning rates");
+    if (!s) s = trainer_derivative_check(t, model, &more.derivatives, err);
+    sdm_model_free(model);
     if (!s) {
         t->heldout_mse = t->accuracy.mse_mm2;
         s = trainer_metric(t, 0, err);

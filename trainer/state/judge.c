@@ -309,6 +309,21 @@ static void set_parts(const error_measures *m, const model_errors *errors, doubl
     }
 }
 
+static void set_derivatives(const trainer *t, const derivative_check *c, sdm_verdict *v)
+{
+    size_t n;
+    const sdm_param *p = sdm_instance_params(t->shape, &n);
+    v->volume_error = c->volume;
+    v->volume_error_max = c->volume_max;
+    v->derivative_error = c->slope;
+    v->volume_derivative_error = c->volume_slope;
+    if (isfinite(c->slope))
+        snprintf(v->derivative_by, sizeof v->derivative_by, "%.60s", p[c->slope_param].name);
+    if (isfinite(c->volume_slope))
+        snprintf(v->volume_derivative_by, sizeof v->volume_derivative_by, "%.60s",
+                 p[c->volume_slope_param].name);
+}
+
 sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verdict *out,
                                 sdm_error *err)
 {
@@ -361,6 +376,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                (int64_t)d->n_start<t->config->data.start, .ended_early = t->saved_seconds> 0,
         .steps = (double)t->step,
         .budget = t->turns->budget};
+    set_derivatives(t, &errors->derivatives, out);
     trainer_verdict_decide(&in, out);
     trainer_history_dispose(&h);
     return SDM_OK;

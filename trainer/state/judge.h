@@ -1,6 +1,7 @@
 /* What a run says at its end about its model (sdm/internal/verdict.h). */
 #pragma once
 
+#include "derivative_check.h"
 #include "kind.h"
 #include "sdm/internal/verdict.h"
 
@@ -14,6 +15,7 @@ typedef struct model_errors {
     double rmse_inside_mm, rmse_outside_mm;
     double far_mm2;       /* what these voxels add to the mean square error of all voxels */
     double largest_at_mm; /* exact signed distance at the voxel with the largest error */
+    derivative_check derivatives;
 } model_errors;
 
 /* Measures the parts of the error and fills *out. t->accuracy must be set. */

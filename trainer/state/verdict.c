@@ -71,6 +71,12 @@ void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
     sdm_json_real(j, "thickness_mm", v->thickness_mm);
     sdm_json_real(j, "cut", v->cut);
     sdm_json_real(j, "inside_out", v->inside_out);
+    sdm_json_real(j, "volume_error", v->volume_error);
+    sdm_json_real(j, "volume_error_max", v->volume_error_max);
+    sdm_json_real(j, "derivative_error", v->derivative_error);
+    sdm_json_text(j, "derivative_by", v->derivative_by);
+    sdm_json_real(j, "volume_derivative_error", v->volume_derivative_error);
+    sdm_json_text(j, "volume_derivative_by", v->volume_derivative_by);
     sdm_json_real(j, "fall", v->fall);
     sdm_json_text(j, "limit", v->limited ? sdm_cause_name(v->limit) : "none");
     sdm_json_text(j, "key", v->key);

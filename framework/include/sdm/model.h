@@ -47,6 +47,11 @@ typedef struct sdm_model_quality {
     /* of the mesh at the default parameters, the sum over its triangles; NaN: not known. A shape
        with others is not the one of the training (sdm_runtime_instance()). */
     double mesh_volume_mm3, mesh_area_mm2;
+    /* On a few held-out shapes, root mean square over the right value; NaN: not known. Of the
+       volume of a map (sdm_map_volume()); and, for the parameter for which they are largest: of the
+       derivatives of the map within sdm_accuracy.near_mm of the surface, and of the derivative of
+       the volume. */
+    double volume_error, derivative_error, volume_derivative_error;
 } sdm_model_quality;
 
 /* Description of a model. All pointers stay valid until sdm_model_free(); texts are

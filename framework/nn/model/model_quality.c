@@ -12,15 +12,20 @@ void sdm_quality_describe(const sdm_model_quality *q, sdm_text *t)
     if (!isnan(q->cut)) sdm_text_add_real(t, "cut", q->cut);
     if (!isnan(q->between_mm)) sdm_text_add_real(t, "between_mm", q->between_mm);
     if (!isnan(q->thickness_mm)) sdm_text_add_real(t, "thickness_mm", q->thickness_mm);
-    if (isnan(q->mesh_volume_mm3) || isnan(q->mesh_area_mm2)) return;
-    sdm_text_add_real(t, "mesh_volume_mm3", q->mesh_volume_mm3);
-    sdm_text_add_real(t, "mesh_area_mm2", q->mesh_area_mm2);
+    if (!isnan(q->mesh_volume_mm3) && !isnan(q->mesh_area_mm2)) {
+        sdm_text_add_real(t, "mesh_volume_mm3", q->mesh_volume_mm3);
+        sdm_text_add_real(t, "mesh_area_mm2", q->mesh_area_mm2);
+    }
+    if (!isnan(q->volume_error)) sdm_text_add_real(t, "volume_error", q->volume_error);
+    if (!isnan(q->derivative_error)) sdm_text_add_real(t, "derivative_error", q->derivative_error);
+    if (!isnan(q->volume_derivative_error))
+        sdm_text_add_real(t, "volume_derivative_error", q->volume_derivative_error);
 }
 
 sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sdm_error *err)
 {
     static const char *const grades[] = {"good", "usable", "poor"};
-    *q = (sdm_model_quality){"", NAN, NAN, NAN, NAN, NAN};
+    *q = (sdm_model_quality){"", NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
     if (!section) return SDM_OK;
     sdm_lines r = {.at = section->data};
     r.end = r.at + section->size;
@@ -32,11 +37,17 @@ sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sd
         q->mesh_volume_mm3 = sdm_lines_real(&r, "mesh_volume_mm3");
         q->mesh_area_mm2 = sdm_lines_real(&r, "mesh_area_mm2");
     }
+    if (sdm_lines_next_is(&r, "volume_error")) q->volume_error = sdm_lines_real(&r, "volume_error");
+    if (sdm_lines_next_is(&r, "derivative_error"))
+        q->derivative_error = sdm_lines_real(&r, "derivative_error");
+    if (sdm_lines_next_is(&r, "volume_derivative_error"))
+        q->volume_derivative_error = sdm_lines_real(&r, "volume_derivative_error");
     bool known = false;
     for (size_t i = 0; i < sizeof grades / sizeof *grades; i++)
         known = known || !strcmp(q->grade, grades[i]);
     if (!known || q->cut < 0 || q->cut > 1 || q->between_mm < 0 || q->thickness_mm < 0 ||
-        q->mesh_area_mm2 < 0)
+        q->mesh_area_mm2 < 0 || q->volume_error < 0 || q->derivative_error < 0 ||
+        q->volume_derivative_error < 0)
         r.failed = true;
     return sdm_lines_check(&r, err);
 }

@@ -11,6 +11,7 @@
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
 #include "fit/solver/open_motions.h"
+#include "fit/start/principal_axes.h"
 #include "fit/start/start_search.h"
 #include "fit/start/turn_set.h"
 #include "rival.h"
@@ -103,7 +104,6 @@ static double volume_of(const fit_maps *m, const double *distance)
 static sdm_status own_create(const fit_problem *p, own_fit *own, sdm_error *err)
 {
     const fit_maps *m = &p->maps;
-    double covariance[9] = {0}, value[3], x[3];
     fit_extent e;
     *own = (own_fit){.p = p, .state = p->state};
     sdm_status s = sdm_fit_extent(m, &e, err);
@@ -112,13 +112,7 @@ static sdm_status own_create(const fit_problem *p, own_fit *own, sdm_error *err)
     memcpy(own->centre, e.centre, sizeof own->centre);
     memcpy(own->distance, m->distance, m->n_voxels * sizeof *m->distance);
     own->volume = volume_of(m, m->distance);
-    for (size_t v = 0; v < m->n_voxels; v++) {
-        if (!(m->distance[v] < 0)) continue;
-        place_of(&m->grid, v, x);
-        for (int i = 0; i < 9; i++)
-            covariance[i] += (x[i / 3] - e.centre[i / 3]) * (x[i % 3] - e.centre[i % 3]);
-    }
-    sdm_fit_eigen(3, covariance, value, own->axes);
+    sdm_fit_principal_axes(m, own->centre, own->axes);
     return SDM_OK;
 }
 
@@ -181,21 +175,6 @@ static void turned(const own_fit *own, size_t i, fit_state *to)
     for (int k = 0; k < 3; k++) to->translation[k] += at[k] - moved[k];
 }
 
-// log-likelihood of a part of the samples with the map of the fit at another pose
-static double rank(const fit_problem *p, const fit_state *state)
-{
-    const size_t step = p->samples.n / SAMPLES_RANKED + 1;
-    double sum = 0;
-    fit_likelihood l;
-    for (size_t i = 0; i < p->samples.n; i += step) {
-        sdm_fit_likelihood(&p->observation, (double)p->samples.value[i],
-                           fit_sample_weights(&p->samples, i),
-                           sdm_fit_maps_at(&p->maps, state, p->samples.world + 3 * i), false, &l);
-        sum += l.log_likelihood;
-    }
-    return sum;
-}
-
 // Inserts a start into list[*n], the best first. Of more than `most` the worst is left out.
 static void start_insert(start *list, size_t *n, size_t most, const start *one)
 {
@@ -243,7 +222,7 @@ static void turns_rank(const own_fit *own, turns *t)
             same_take(own, &one.state, dice, t);
             continue;
         }
-        one.log_likelihood = rank(own->p, &one.state);
+        one.log_likelihood = sdm_fit_likelihood_at(own->p, &one.state, SAMPLES_RANKED);
         one.keep_params = dice <= ALIKE;
         if (one.keep_params)
             start_insert(t->other, &t->n_other, N_CUBE + N_EVEN, &one);

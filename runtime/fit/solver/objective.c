@@ -79,3 +79,17 @@ sdm_status sdm_fit_log_likelihood(fit_problem *p, const double *params, double *
         sdm_fit_samples_log_likelihood(&p->samples, &p->maps, &p->observation, &p->state);
     return SDM_OK;
 }
+
+double sdm_fit_likelihood_at(const fit_problem *p, const fit_state *state, size_t most)
+{
+    const size_t step = p->samples.n / most + 1;
+    double sum = 0;
+    fit_likelihood l;
+    for (size_t i = 0; i < p->samples.n; i += step) {
+        sdm_fit_likelihood(&p->observation, (double)p->samples.value[i],
+                           fit_sample_weights(&p->samples, i),
+                           sdm_fit_maps_at(&p->maps, state, p->samples.world + 3 * i), false, &l);
+        sum += l.log_likelihood;
+    }
+    return sum;
+}

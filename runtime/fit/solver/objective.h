@@ -19,3 +19,7 @@ double sdm_fit_objective(const fit_problem *p);
    anew; samples and information stay. */
 sdm_status sdm_fit_log_likelihood(fit_problem *p, const double *params, double *log_likelihood,
                                   sdm_error *err);
+
+/* Log-likelihood of every n-th sample, so that at most `most` are used, with the latest map at the
+   pose of `state`, after sdm_fit_evaluate() or sdm_fit_log_likelihood(). */
+double sdm_fit_likelihood_at(const fit_problem *p, const fit_state *state, size_t most);

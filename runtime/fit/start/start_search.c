@@ -149,6 +149,39 @@ static void runner_up_set(fit_problem *p, double objective, const fit_state *sta
     p->runner_up = *state;
 }
 
+void sdm_fit_start_widen(const fit_problem *p, fit_state *state)
+{
+    state->blur = widened(state->blur, p->extent.reach);
+    state->l_ref = widened(state->l_ref, p->extent.reach);
+    if (p->target->kind == SDM_FIT_POINTS)
+        state->point_sd = fmax(state->point_sd, 0.1 * p->extent.reach);
+}
+
+// of a search: all unknowns move but point spread and appearance, and what the options keep
+static fit_newton_opts search_steps(const fit_problem *p, size_t steps)
+{
+    return (fit_newton_opts){.phase = SDM_FIT_SEARCH,
+                             .keep_params = p->opts->keep_params,
+                             .keep_pose = p->opts->keep_pose,
+                             .keep_blur = true,
+                             .keep_appearance = true,
+                             .max_iterations = steps,
+                             .eps = 0.02};
+}
+
+sdm_status sdm_fit_start_continue(fit_problem *p, const fit_state *given, bool sharp,
+                                  sdm_error *err)
+{
+    const fit_newton_opts wide = search_steps(p, KEPT_STEPS), narrow = search_steps(p, SHARP_STEPS);
+    fit_newton_end end;
+    sdm_status s = sdm_fit_newton(p, &wide, &end, err);
+    p->state.blur = given->blur;
+    p->state.l_ref = given->l_ref;
+    p->state.point_sd = given->point_sd;
+    if (!s && sharp) s = sdm_fit_newton(p, &narrow, &end, err);
+    return s;
+}
+
 sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
@@ -161,20 +194,11 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
     if (s) return s;
     if (!p->samples.n) return no_samples(p, err);
     // one start, or every turn, with a wide point spread
-    start.blur = widened(start.blur, p->extent.reach);
-    start.l_ref = widened(start.l_ref, p->extent.reach);
-    if (p->target->kind == SDM_FIT_POINTS)
-        start.point_sd = fmax(start.point_sd, 0.1 * p->extent.reach);
+    sdm_fit_start_widen(p, &start);
     p->state = start;
 
-    // fit each turn with all unknowns but point spread and appearance
-    fit_newton_opts newton = {.phase = SDM_FIT_SEARCH,
-                              .keep_params = o->keep_params,
-                              .keep_pose = o->keep_pose,
-                              .keep_blur = true,
-                              .keep_appearance = true,
-                              .max_iterations = TURN_STEPS,
-                              .eps = 0.02};
+    // fit each turn
+    const fit_newton_opts newton = search_steps(p, TURN_STEPS);
     fit_newton_end end;
     found_turns found = {.n = n == 1, .state = {start}};
     for (size_t i = 0; i < n && !s && n > 1; i++) {
@@ -198,14 +222,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         if (n > 1) search_at(p, 2, i, found.n);
         p->state = found.state[i];
         if (n > 1) turn_start(p, found.turn[i], &start, &p->prior);
-        newton.max_iterations = KEPT_STEPS;
-        s = sdm_fit_newton(p, &newton, &end, err);
-        // back to the given point spread
-        p->state.blur = given.blur;
-        p->state.l_ref = given.l_ref;
-        p->state.point_sd = given.point_sd;
-        newton.max_iterations = SHARP_STEPS;
-        if (!s && n > 1) s = sdm_fit_newton(p, &newton, &end, err);
+        s = sdm_fit_start_continue(p, &given, n > 1, err);
         const double objective = s ? best : sdm_fit_objective(p);
         if (objective > best) {
             if (best > -INFINITY) runner_up_set(p, best, &chosen);

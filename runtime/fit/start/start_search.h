@@ -18,3 +18,14 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err);
 /* Chooses samples from a ball that holds the shape at problem->state in every turn, with a stride
    that leaves about `wanted` of them. */
 sdm_status sdm_fit_samples_near(fit_problem *p, double wanted, sdm_error *err);
+
+/* Widens the point spread of *state, or the deviation of points, so that a shape finds its surface
+   from a distance: three times the given width, at most 0.12 of the reach of the shape, and not
+   less than the given one. */
+void sdm_fit_start_widen(const fit_problem *problem, fit_state *state);
+
+/* Iterations from problem->state, which has a wide point spread; then the widths of `given` again,
+   with `sharp` further iterations. Keeps what the options keep, and the appearance. Errors of
+   sdm_fit_newton(). */
+sdm_status sdm_fit_start_continue(fit_problem *problem, const fit_state *given, bool sharp,
+                                  sdm_error *err);

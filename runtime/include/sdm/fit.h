@@ -244,6 +244,11 @@ typedef struct sdm_fit_opts {
     /* images, >= 0: volume of the inside's material that may lie beside the shape, over the volume
        of the shape, see SDM_FIT_CHECK_MISSING: other spaces of the same material */
     double beside;
+
+    /* number of times that a fit which its checks refuse goes on from another value of one parameter,
+       if such a fit explains the data better: a long shape may have stopped with one end on the data
+       and the other one beyond them. 0: never; nothing is tried where parameters or pose are kept */
+    size_t max_restarts;
 } sdm_fit_opts;
 
 /* What is checked before a fit is trusted. New checks are added at the end. */
@@ -480,6 +485,9 @@ typedef struct sdm_fit_result {
     /* [n_params] standard deviation of each parameter before the fit: that of its prior or, without
        a prior, of a uniform distribution over its range */
     double *prior_sd;
+    /* how often a refused fit went on from another value of a parameter, see
+       sdm_fit_opts.max_restarts; the result is that of the last of these fits */
+    size_t n_restarts;
 } sdm_fit_result;
 
 /* Fits the shape of source to target. Errors: SDM_E_ARG: source, options or start, or no voxel near

@@ -1,0 +1,24 @@
+/* How well a model holds volumes, and derivatives by the parameters: errors of distances alone do
+   not tell. Measured on a few held-out shapes that lie within the grid. */
+#pragma once
+
+#include "trainer.h"
+
+typedef struct derivative_check {
+    /* Error of the volume of the model's map (sdm_map_volume()) over the volume of the mesh: root
+       mean square, and the largest; NaN: no shape lies within the grid. */
+    double volume, volume_max;
+    /* Root mean square error over the root mean square, of the parameter for which it is largest,
+       and the index of this parameter: of the derivatives of the map within near_mm (two voxels) of
+       the surface, compared with differences of exact maps; of the derivative of the volume,
+       compared with that of the meshes. Where a parameter changes the volume by less than 5 % over
+       its range, these 5 % count as its root mean square. NaN: not measured. */
+    double slope, volume_slope;
+    size_t slope_param, volume_slope_param;
+} derivative_check;
+
+/* Measures m. Computes about 64 exact maps. A model whose derivatives take more than 1 GB, or whose
+   network is slow (t->kind->slow), has its volumes measured only. [t->n_threads threads; the same
+   bits for any number] */
+sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, derivative_check *out,
+                                    sdm_error *err);

@@ -122,7 +122,7 @@ sdm_status cli_fit_write_files(const cli_fit *f, sdm_error *err)
         if (is_image(path)) continue;
         if (cli_ends_with(path, ".json"))
             s = write_json(f, path, err);
-        else if (cli_is_picture(path) && f->target.kind != SDM_FIT_POINTS)
+        else if (cli_is_picture(path))
             s = cli_fit_write_picture(f, path, err);
         else
             s = write_map(&d, path, &f->map_grid, f->map, err);

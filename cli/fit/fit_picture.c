@@ -59,8 +59,27 @@ static cli_block choose_block(const cli_fit *f)
     return b;
 }
 
+/* The fitted map with the points. */
+static sdm_status write_points(const cli_fit *f, const char *path, sdm_error *err)
+{
+    char title[700];
+    const char *slash = strrchr(f->path, '/');
+    int used = snprintf(title, sizeof title, "%.60s, fitted\nto %.60s:", f->shape_name,
+                        slash ? slash + 1 : f->path);
+    for (size_t i = 0; i < f->n_params && used < (int)sizeof title; i++)
+        used += snprintf(title + used, sizeof title - (size_t)used, " %s=%.4g", f->params[i].name,
+                         f->result.params[i]);
+    const float levels[1] = {0};
+    const sdm_picture_map map = {.title = title,
+                                 .values = f->map,
+                                 .points = f->target.points,
+                                 .n_points = f->target.n_points};
+    return sdm_picture_slices(path, &f->map_grid, &map, 1, levels, 1, err);
+}
+
 sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *err)
 {
+    if (f->target.kind == SDM_FIT_POINTS) return write_points(f, path, err);
     const cli_block block = choose_block(f);
     const sdm_grid g = cli_block_grid(&f->target.grid, &block);
     const size_t n = sdm_grid_count(&g);
@@ -76,7 +95,8 @@ sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *
     // draw them
     if (!s) {
         char title[200], fitted[120];
-        const sdm_picture_map maps[2] = {{fitted, map, false}, {"reference", reference, false}};
+        const sdm_picture_map maps[2] = {{.title = fitted, .values = map},
+                                         {.title = "reference", .values = reference}};
         cli_block_copy(&f->target.grid, f->target.values, &block, image);
         if (compared) sample_reference(f, &g, reference);
         snprintf(fitted, sizeof fitted, "%s, fitted%s", f->shape_name,

@@ -253,7 +253,8 @@ static sdm_status write_picture(const char *path, const cli_map *map, sdm_error 
     describe_method(map, made);
     sdm_text_add(&title, "%.64s: %s%s%s", map->shape, made, map->params && *map->params ? "\n" : "",
                  map->params ? map->params : "");
-    const sdm_picture_map column = {title.failed ? made : title.data, map->values, false};
+    const sdm_picture_map column = {.title = title.failed ? made : title.data,
+                                    .values = map->values};
     const sdm_status s = sdm_picture_slices(path, map->grid, &column, 1, levels, 2, err);
     sdm_text_dispose(&title);
     return s;

@@ -89,9 +89,8 @@ static void print_unfit(const sdm_verdict *v, bool cuts)
         not_for(&first), printf("derivatives of maps by %s: off by %s %%\n", v->derivative_by,
                                 percent(v->derivative_error, text));
     if (v->volume_derivative_error > DERIVATIVE_BAD)
-        not_for(&first),
-            printf("derivatives of the volume by %s: off by %s %%\n", v->volume_derivative_by,
-                   percent(v->volume_derivative_error, text));
+        not_for(&first), printf("derivatives of the volume by %s: off by %s %%\n",
+                                v->volume_derivative_by, percent(v->volume_derivative_error, text));
     if (sdm_too_thin(v->thickness_mm, v->coarse_mm))
         not_for(&first), printf("its thinnest part, which is " CLI_THIN_PART "\n", v->thickness_mm,
                                 v->coarse_mm, 0.5 * v->thickness_mm);
@@ -105,9 +104,10 @@ static void print_derivatives(const sdm_verdict *v)
         printf("  volumes     of maps are off by %s %%, at most by %s %%\n",
                percent(v->volume_error, text), percent(v->volume_error_max, largest));
     if (!isfinite(v->derivative_error)) return;
-    printf("  derivatives by the parameters: of maps near the surface off by %s %% (by %s, the worst "
-           "one)",
-           percent(v->derivative_error, text), v->derivative_by);
+    printf(
+        "  derivatives by the parameters: of maps near the surface off by %s %% (by %s, the worst "
+        "one)",
+        percent(v->derivative_error, text), v->derivative_by);
     if (isfinite(v->volume_derivative_error))
         printf(", of volumes by %s %% (by %s)", percent(v->volume_derivative_error, text),
                v->volume_derivative_by);

@@ -337,9 +337,10 @@ sdm_status cli_picture_compare(const sdm_model *m, const sdm_instance *shape, ui
     for (size_t i = 0; i < n_params; i++)
         sdm_text_add(&exact, "%s=%.4g ", params[i].name, p ? p[i] : sampled[i]);
     snprintf(error, sizeof error, "error\nroot mean square %.3g mm", sqrt(square / (double)n));
-    const sdm_picture_map columns[] = {{exact.failed ? "exact" : exact.data, maps, false},
-                                       {"network", maps + n, false},
-                                       {error, maps + 2 * n, true}};
+    const sdm_picture_map columns[] = {
+        {.title = exact.failed ? "exact" : exact.data, .values = maps},
+        {.title = "network", .values = maps + n},
+        {.title = error, .values = maps + 2 * n, .error = true}};
     if (!s) s = sdm_picture_slices(path, g, columns, 3, levels, 2, err);
     sdm_text_dispose(&exact);
     sdm_free(maps);

@@ -23,9 +23,9 @@ static sdm_status draw_slices(const cli_experiment_run *run, const cli_experimen
     sdm_status s = sdm_alloc((void **)&maps, n, 2 * sizeof *maps, "maps of the picture", err);
     if (!s) s = sdm_exact_shape_map(job->shape, job->nominal, &opts, g, maps, NULL, err);
     for (size_t i = 0; i < n && !s; i++) maps[n + i] = values[i] - maps[i];
-    const sdm_picture_map columns[] = {{"exact", maps, false},
-                                       {run->e->rows[job->index].title, values, false},
-                                       {"error", maps + n, true}};
+    const sdm_picture_map columns[] = {{.title = "exact", .values = maps},
+                                       {.title = run->e->rows[job->index].title, .values = values},
+                                       {.title = "error", .values = maps + n, .error = true}};
     if (!s) s = cli_experiment_path(run, job->index, "slices.png", path, err);
     if (!s) s = sdm_picture_slices(path, g, columns, 3, levels, 2, err);
     sdm_free(maps);

@@ -105,7 +105,8 @@ static bool has_fits(const cli_experiment_result *r)
     return r->state == CLI_EXPERIMENT_DONE && r->fits;
 }
 
-/* From this Dice coefficient on a fit that started beside the shape has found it: it is no wrong one.
+/* From this Dice coefficient on a fit that started beside the shape has found it: it is no wrong
+ * one.
  */
 static const double FOUND_DICE = 0.9;
 

@@ -94,7 +94,7 @@ void sdm_model_vjp(const sdm_model *m, const double *params, const float *adjoin
 void sdm_jacobian_times(const float *jacobian, size_t n_params, size_t n, const double *direction, float *tangent);
 void sdm_jacobian_transposed_times(const float *jacobian, size_t n_params, size_t n, const float *adjoint, double *gradient);
 sdm_status sdm_picture_check(const char *path, sdm_error *err);
-typedef struct sdm_picture_map { const char *title; const float *values; bool error; } sdm_picture_map;
+typedef struct sdm_picture_map { const char *title; const float *values; bool error; const double *points; size_t n_points; } sdm_picture_map;
 sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid, const sdm_picture_map *maps, size_t n_maps, const float *levels, size_t n_levels, sdm_error *err);
 sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const float *image, const sdm_picture_map *maps, size_t n_maps, const char *title, sdm_error *err);
 typedef struct sdm_picture_surface { const char *title; const sdm_mesh *mesh; const double *values; } sdm_picture_surface;

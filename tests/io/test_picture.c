@@ -114,7 +114,8 @@ static void test_slices_show_equal_circles(void **state)
     const float levels[2] = {0, 1};
     assert_non_null(e);
     for (size_t i = 0; i < sdm_grid_count(&g); i++) e[i] = (float)fabs(0.01 * sin((double)i));
-    const sdm_picture_map maps[2] = {{"exact", v, false}, {"error", e, true}};
+    const sdm_picture_map maps[2] = {{.title = "exact", .values = v},
+                                     {.title = "error", .values = e, .error = true}};
     sdm_error err;
     assert_int_equal(sdm_picture_slices("test_picture_s.png", &g, maps, 1, levels, 2, &err),
                      SDM_OK);
@@ -159,6 +160,37 @@ static void test_slices_show_equal_circles(void **state)
     free(e);
 }
 
+/* Pixels with the ink of points, in a picture of the ball with these points. */
+static int dark_pixels(const sdm_grid *g, const float *v, const double *points, size_t n)
+{
+    const sdm_picture_map map = {.title = "a", .values = v, .points = points, .n_points = n};
+    sdm_error err = {0};
+    if (sdm_picture_slices("test_picture_p.png", g, &map, 1, NULL, 0, &err))
+        fail_msg("%s", err.text);
+    picture p = read_png("test_picture_p.png");
+    int dark = 0;
+    for (int i = 0; i < p.w * p.h; i++) dark += is_colour(p.rgb + 3 * (size_t)i, 40, 40, 48);
+    free(p.rgb);
+    return dark;
+}
+
+/* A point in the middle of the ball lies on all three slices, one above it on two, one beside all
+ * slices on none. */
+static void test_points_on_slices(void **state)
+{
+    (void)state;
+    sdm_grid g;
+    float *v = ball_map(&g, 3);
+    const double middle[3] = {0, 7, 13}, above[3] = {0, 7, 16}, beside[3] = {2, 9, 16};
+    const int none = dark_pixels(&g, v, NULL, 0);
+    const int three = dark_pixels(&g, v, middle, 1) - none,
+              two = dark_pixels(&g, v, above, 1) - none;
+    assert_true(three >= 3 && two >= 2);
+    assert_true(abs(2 * three - 3 * two) <= 6);
+    assert_int_equal(dark_pixels(&g, v, beside, 1), none);
+    free(v);
+}
+
 /* Maps with constant, NaN or huge values, and grids of a single voxel or line, still give a
  * picture. */
 static void test_slices_of_odd_maps(void **state)
@@ -167,8 +199,10 @@ static void test_slices_of_odd_maps(void **state)
     static float v[1000];
     const float level = 0;
     const sdm_picture_map maps[2] = {
-        {NULL, v, false},
-        {"a title that is much longer than its column is wide, \xFF\xC3", v, true}};
+        {.title = NULL, .values = v},
+        {.title = "a title that is much longer than its column is wide, \xFF\xC3",
+         .values = v,
+         .error = true}};
     static const int64_t sizes[][3] = {
         {1, 1, 1}, {1000, 1, 1}, {1, 1, 1000}, {10, 10, 10}, {2, 500, 1}};
     for (size_t k = 0; k < 5; k++)
@@ -195,7 +229,8 @@ static void test_overlay_shows_contours_on_the_image(void **state)
     assert_non_null(image);
     for (size_t i = 0; i < sdm_grid_count(&g); i++) image[i] = v[i] < 0 ? 900 : -100;
     image[0] = NAN;
-    const sdm_picture_map maps[2] = {{"fitted", v, false}, {"reference", w, true}};
+    const sdm_picture_map maps[2] = {{.title = "fitted", .values = v},
+                                     {.title = "reference", .values = w, .error = true}};
     assert_int_equal(sdm_picture_overlay("test_picture_w.png", &g, image, maps, 2, "a ball", NULL),
                      SDM_OK);
     picture p = read_png("test_picture_w.png");
@@ -241,7 +276,7 @@ static void test_overlay_shows_contours_on_the_image(void **state)
     assert_int_equal(sdm_picture_overlay("test_picture_w.png", &one, v, maps, 2, NULL, NULL),
                      SDM_OK);
 
-    const sdm_picture_map none = {"a", NULL, false};
+    const sdm_picture_map none = {.title = "a", .values = NULL};
     assert_int_equal(sdm_picture_overlay(NULL, &g, v, maps, 1, NULL, NULL), SDM_E_ARG);
     assert_int_equal(sdm_picture_overlay("a.png", NULL, v, maps, 1, NULL, NULL), SDM_E_ARG);
     assert_int_equal(sdm_picture_overlay("a.png", &g, NULL, maps, 1, NULL, NULL), SDM_E_ARG);
@@ -428,7 +463,7 @@ static void test_wrong_arguments_are_refused(void **state)
     float *v = ball_map(&g, 3);
     const float level = 0;
     const double x[2] = {0, 1};
-    const sdm_picture_map map = {"a", v, false}, none = {"a", NULL, false};
+    const sdm_picture_map map = {.title = "a", .values = v}, none = {.title = "a", .values = NULL};
     const sdm_curve curve = {"a", x, x, 2}, broken = {"a", x, NULL, 2};
     sdm_error err;
     sdm_canvas *c = NULL;
@@ -472,6 +507,7 @@ int main(void)
         cmocka_unit_test(test_image_is_exact),
         cmocka_unit_test(test_contour_is_subpixel),
         cmocka_unit_test(test_slices_show_equal_circles),
+        cmocka_unit_test(test_points_on_slices),
         cmocka_unit_test(test_slices_of_odd_maps),
         cmocka_unit_test(test_overlay_shows_contours_on_the_image),
         cmocka_unit_test(test_plot_draws_a_straight_line),

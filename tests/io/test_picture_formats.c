@@ -39,7 +39,8 @@ static sdm_status write_picture(int kind, const char *path, sdm_error *err)
     for (int i = 0; i < SIDE * SIDE * SIDE; i++)
         v[i] =
             (float)hypot(hypot(i % SIDE - 5.6, i / SIDE % SIDE - 5.7), i / SIDE / SIDE - 5.2) - 4;
-    const sdm_picture_map maps[] = {{"a < b & \"c\" > d", v, false}, {"image7 #image7", v, true}};
+    const sdm_picture_map maps[] = {{.title = "a < b & \"c\" > d", .values = v},
+                                    {.title = "image7 #image7", .values = v, .error = true}};
     const sdm_mesh mesh = {.vert = vert, .tri = tri, .n_vert = 6, .n_tri = 8};
     const sdm_picture_surface surface = {"a < b & \"c\" > d", &mesh, values};
     const sdm_curve curve = {"a < b & \"c\" > d", x, x, 4};

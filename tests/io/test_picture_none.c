@@ -17,7 +17,7 @@ static void test_pictures_are_refused(void **state)
     const sdm_grid grid = {.n = {1, 1, 1}};
     const float value = 0;
     const double x = 0;
-    const sdm_picture_map map = {"a", &value, false};
+    const sdm_picture_map map = {.title = "a", .values = &value};
     const sdm_picture_surface surface = {0};
     const sdm_curve curve = {"a", &x, &x, 1};
     for (int i = 0; i < 6; i++) {

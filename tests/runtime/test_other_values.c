@@ -1,7 +1,7 @@
-/* A goblet: a ball on a thin stem with a flat foot. A fit to labels that starts with a stem twice as
- * long brings the ball to its place and leaves the foot in the air beyond the labels, where no small
- * change of the stem brings it nearer. It goes on from another value of the stem.
- * Tests: other_values.c, principal_axes.c */
+/* A goblet: a ball on a thin stem with a flat foot. A fit to labels that starts with a stem twice
+ * as long brings the ball to its place and leaves the foot in the air beyond the labels, where no
+ * small change of the stem brings it nearer. It goes on from another value of the stem. Tests:
+ * other_values.c, principal_axes.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -405,8 +405,7 @@ static double volume_error_of(const char *path)
         // capsules of a radius of three voxels and more that lie within the grid
         const double share[2] = {0.4 + 0.1 * (i % 3), 0.1 + 0.2 * (i / 3)};
         double p[2], volume;
-        for (int k = 0; k < 2; k++)
-            p[k] = param[k].min + share[k] * (param[k].max - param[k].min);
+        for (int k = 0; k < 2; k++) p[k] = param[k].min + share[k] * (param[k].max - param[k].min);
         const double length = p[sdm_model_param_index(m, "length")],
                      radius = p[sdm_model_param_index(m, "radius")],
                      exact = acos(-1) * radius * radius * (length + 4 * radius / 3);

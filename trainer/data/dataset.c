@@ -64,11 +64,12 @@ static double kept_gb(kept_maps n, size_t n_voxels)
 
 static sdm_status refuse_memory(const sdm_config *c, kept_maps n, size_t n_voxels, sdm_error *err)
 {
+    const double gb = kept_gb(n, n_voxels);
     return sdm_fail(
         err, SDM_E_CONFIG,
         "%s: data.static (%.0f maps), data.start (%.0f) and data.holdout (%.0f) on %.3g voxels "
-        "need %.1f GB, data.memory_gb is %g: raise it, or make fewer maps or a coarser grid",
-        c->file, n.fixed, n.start, n.holdout, (double)n_voxels, kept_gb(n, n_voxels),
+        "need %.*f GB, data.memory_gb is %g: raise it, or make fewer maps or a coarser grid",
+        c->file, n.fixed, n.start, n.holdout, (double)n_voxels, gb < 1 ? 4 : 1, gb,
         c->data.memory_gb);
 }
 

@@ -105,27 +105,35 @@ double trainer_history_fall(const history *h, sdm_phase phase, double floor)
 sdm_status trainer_history_picture(const trainer *t, const history *h, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];
-    double *step = NULL, *loss = NULL, *heldout = NULL, end[2] = {NAN, NAN};
+    double *step = NULL, *loss = NULL, *refined = NULL, *heldout = NULL, end[2] = {NAN, NAN};
+    bool refines = false;
     sdm_status s = SDM_ALLOC(&step, h->n, "loss curve", err);
     if (!s) s = SDM_ALLOC(&loss, h->n, "loss curve", err);
+    if (!s) s = SDM_ALLOC(&refined, h->n, "loss curve", err);
     if (!s) s = SDM_ALLOC(&heldout, h->n, "loss curve", err);
     for (size_t i = 0; i < h->n && !s; i++) {
         const history_point *p = &h->point[i];
         const bool finished = p->phase == SDM_PHASE_EVALUATE;
         if (finished) end[0] = p->step, end[1] = sqrt(p->heldout);
         step[i] = p->step;
-        loss[i] = sqrt(p->loss);
+        // the refinement has another loss
+        const bool other = p->phase == SDM_PHASE_REFINE;
+        refines |= other;
+        loss[i] = other ? NAN : sqrt(p->loss);
+        refined[i] = other ? sqrt(p->loss) : NAN;
         heldout[i] = finished ? NAN : sqrt(p->heldout);
     }
     if (!s) {
         snprintf(path, sizeof path, "%s/loss.png", t->folder);
         const sdm_curve curves[] = {{"training (one batch)", step, loss, h->n},
                                     {"held-out shapes", step, heldout, h->n},
-                                    {"finished model, held-out shapes", &end[0], &end[1], 1}};
+                                    {"finished model, held-out shapes", &end[0], &end[1], 1},
+                                    {"refinement (one batch)", step, refined, h->n}};
         s = sdm_picture_plot(path, "Error of the network while it is trained", "optimiser steps",
-                             "root mean square error, mm", true, curves, 3, err);
+                             "root mean square error, mm", true, curves, refines ? 4 : 3, err);
     }
     sdm_free(heldout);
+    sdm_free(refined);
     sdm_free(loss);
     sdm_free(step);
     return s;

@@ -29,12 +29,16 @@ typedef struct sdm_picture_map {
     const float *values;
     /* true: an error map, which has another colour scale than the distances */
     bool error;
+    /* [n_points][3] places in the world, mm: a dot on every slice that is at most a voxel away;
+       sdm_picture_slices() alone. 0: none */
+    const double *points;
+    size_t n_points;
 } sdm_picture_map;
 
 /* Draws slices of maps[n_maps], 1 to 16 on the same grid: a row for each of the three orthogonal
    slices through the middle of the region where the first map is negative, a column for each map,
    with contours at levels[n_levels] mm (0 to 16; the first in red, the second in yellow), titles,
-   axes in mm, a scale bar and colour bars. */
+   axes in mm and colour bars. */
 SDM_API sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid,
                                       const sdm_picture_map *maps, size_t n_maps,
                                       const float *levels, size_t n_levels, sdm_error *err);

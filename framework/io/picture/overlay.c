@@ -10,7 +10,7 @@
 /* Limits, and lengths in pixels. */
 enum {
     MAPS_MAX = 4,
-    TOP = 46,
+    TOP = 46 + SDM_SECTION_ABOVE,
     FOOT = 100, /* grey bar with numbers and caption, then the legend of the contours */
     BAR = 14,
     RIGHT = 22
@@ -74,7 +74,6 @@ static void draw_panel(sdm_canvas *c, const overlay *o, sdm_box box, int axis)
         sdm_panel_contour(c, box, &s, 0, m ? 1.6 : 2, LINES[m], RIM);
     }
     sdm_section_draw_frame(c, &o->sections, box, axis, true);
-    if (axis == 0) sdm_panel_scale_bar(c, box, o->sections.pixels);
 }
 
 /* The legend: a sample of each contour's line with its title. */
@@ -94,8 +93,8 @@ static void draw_overlay(sdm_canvas *c, const overlay *o, int height, const char
     const sdm_sections *s = &o->sections;
     int x = SDM_SECTION_LEFT;
     if (title)
-        sdm_canvas_text(c, x, TOP - 16, (sdm_type){.size = 13, .bold = true, .colour = SDM_INK},
-                        title);
+        sdm_canvas_text(c, x, TOP - SDM_SECTION_ABOVE - 16,
+                        (sdm_type){.size = 13, .bold = true, .colour = SDM_INK}, title);
     for (int axis = 0; axis < 3; axis++) {
         draw_panel(c, o, (sdm_box){x, TOP, s->w[axis], s->h[axis]}, axis);
         x += s->w[axis] + SDM_SECTION_LEFT;

@@ -114,7 +114,8 @@ static void draw_log_axis(sdm_canvas *c, const window *w)
             const double v = e + log10(m);
             char text[32];
             if (v < w->low[1] || v > w->high[1] || (m > 1 && decades > 4)) continue;
-            const bool labelled = decades < 1.6 && (m == 2 || m == 5);
+            const bool labelled =
+                decades < 1.6 && (m == 2 || m == 5 || (decades < 0.8 && (m == 3 || m == 7)));
             snprintf(text, sizeof text, "%g", m * pow(10, e));
             const double y = to_y(w, v);
             if (m == 1 && decades >= 1.6) {

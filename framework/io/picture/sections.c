@@ -132,9 +132,7 @@ void sdm_section_draw_frame(sdm_canvas *c, const sdm_sections *s, sdm_box box, i
     else
         snprintf(text, sizeof text, "%c = %s mm", axis_name(s, axis),
                  sdm_tick_text(position(s, axis, (double)s->at[axis]), 0.01, number));
-    const int width = (int)sdm_canvas_text_width(c, 10, false, text) + 17;
-    sdm_canvas_fill(c, (sdm_box){box.x, box.y, width, 25}, SDM_WHITE, 0.82);
-    sdm_canvas_text(c, box.x + 8, box.y + 18, (sdm_type){.size = 10, .colour = SDM_INK}, text);
+    sdm_canvas_text(c, box.x, box.y - 6, (sdm_type){.size = 9, .colour = SDM_INK}, text);
     draw_axis(c, s, box, right, false);
     if (left) draw_axis(c, s, box, up, true);
 }

@@ -26,9 +26,10 @@ void sdm_sections_place(sdm_sections *s, const sdm_grid *grid, const float *map)
 /* The section normal to `axis` of values[nz][ny][nx] on the same grid. */
 sdm_slice sdm_section_of(const sdm_sections *s, const float *values, int axis);
 
-/* Draws the frame of a section, its position in a corner, and numbers in mm along its lower side
- * and, if `left`, along its left side. */
+/* Draws the frame of a section, its position above it, and numbers in mm along its lower side and,
+ * if `left`, along its left side. */
 void sdm_section_draw_frame(sdm_canvas *c, const sdm_sections *s, sdm_box box, int axis, bool left);
 
 #define SDM_SECTION_LEFT 66  /* room for numbers and axis names left of a section, pixels */
-#define SDM_SECTION_BELOW 54 /* the same below a section */
+#define SDM_SECTION_BELOW 60 /* the same below a section, and for the position above the next */
+#define SDM_SECTION_ABOVE 16 /* room for the position of the first section, pixels */

@@ -13,7 +13,7 @@
 /* Lengths of the layout in pixels. */
 #define LEFT SDM_SECTION_LEFT
 #define RIGHT 22
-#define TOP 46
+#define TOP (46 + SDM_SECTION_ABOVE)
 #define NOTE 32 /* two lines below the title */
 #define GAP 24
 #define BELOW SDM_SECTION_BELOW
@@ -112,6 +112,23 @@ static void draw_contours(sdm_canvas *c, const layout *l, sdm_box box, const sdm
     }
 }
 
+/* Dots where the points of the map lie, those within a voxel of the slice. */
+static void draw_points(sdm_canvas *c, const layout *l, sdm_box box, const sdm_picture_map *map,
+                        int axis)
+{
+    const int right = axis == 0 ? 1 : 0, up = axis == 2 ? 1 : 2;
+    sdm_canvas_clip(c, box);
+    for (size_t i = 0; i < map->n_points; i++) {
+        double at[3];
+        sdm_grid_index(l->g, map->points + 3 * i, at);
+        if (!(fabs(at[axis] - (double)l->sections.at[axis]) <= 1)) continue;
+        const double x = box.x + (at[right] + 0.5) / (double)l->g->n[right] * box.w,
+                     y = box.y + (1 - (at[up] + 0.5) / (double)l->g->n[up]) * box.h;
+        sdm_canvas_line(c, x, y, x, y, 3, DARK); // lines have round ends
+    }
+    sdm_canvas_unclip(c);
+}
+
 static sdm_colour_map map_of(const layout *l, bool error)
 {
     return !error ? SDM_MAP_DISTANCE : l->low[1] < 0 ? SDM_MAP_SIGNED : SDM_MAP_ERROR;
@@ -126,7 +143,7 @@ static void draw_panel(sdm_canvas *c, const layout *l, size_t column, int axis)
     sdm_panel_colours(c, box, &s, map_of(l, map->error), l->low[map->error], l->high[map->error]);
     draw_contours(c, l, box, map, axis);
     sdm_section_draw_frame(c, &l->sections, box, axis, column == 0);
-    if (column == 0) sdm_panel_scale_bar(c, box, l->sections.pixels);
+    draw_points(c, l, box, map, axis);
 }
 
 /* The legend, centred at x: a sample of each contour's line with its level. The first pass
@@ -160,8 +177,9 @@ static void draw_column(sdm_canvas *c, const layout *l, size_t column, int foot)
     char first[160];
     snprintf(first, sizeof first, "%.*s", map->title ? (int)strcspn(map->title, "\n") : 0,
              map->title ? map->title : "");
-    sdm_canvas_text(c, x + l->column / 2.0, TOP - 16, title, first);
-    if (note) sdm_panel_title(c, (sdm_box){x, l->top, l->column, 0}, false, note);
+    sdm_canvas_text(c, x + l->column / 2.0, TOP - SDM_SECTION_ABOVE - 16, title, first);
+    const sdm_box under = {x, l->top - SDM_SECTION_ABOVE, l->column, 0};
+    if (note) sdm_panel_title(c, under, false, note);
     for (int axis = 0; axis < 3; axis++) draw_panel(c, l, column, axis);
     const sdm_box bar = {x + l->column / 10, foot, l->column - 2 * (l->column / 10), BAR};
     const char *caption = !e               ? "signed distance (mm)"

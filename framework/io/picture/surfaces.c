@@ -105,7 +105,7 @@ static void scene_place(scene *sc)
     sc->pixels = PANEL / longest;
     sc->width = (int)fmax(220, ceil(widest * sc->pixels) + 8);
     for (int v = 0; v < N_VIEWS; v++)
-        sc->height[v] = (int)fmax(40, ceil((sc->high[v][1] - sc->low[v][1]) * sc->pixels) + 40);
+        sc->height[v] = (int)fmax(40, ceil((sc->high[v][1] - sc->low[v][1]) * sc->pixels) + 64);
     if (!(sc->limit > 0)) sc->limit = 1e-3;
     for (int i = 0; i < N_SHADES; i++)
         sc->shade[i] = sdm_map_colour(SDM_MAP_SIGNED, -1, 1, (double)(i - MIDDLE) / MIDDLE);

@@ -126,6 +126,9 @@ static void tell_continuous(tests *t)
         }
     if (!f->jump) {
         result(t, SDM_TEST_CONTINUOUS, SDM_TEST_SKIPPED, 0, "there is no mesh");
+    } else if (f->resized.shapes && !worst) {
+        result(t, SDM_TEST_CONTINUOUS, SDM_TEST_SKIPPED, 0,
+               "meshes with other numbers of vertices cannot be compared");
     } else if (worst) {
         sdm_test_result *r = result(t, SDM_TEST_CONTINUOUS, SDM_TEST_FAILED, worst->mm,
                                     "vertex %zu jumps by %.3g mm along %s", worst->vertex,

@@ -269,6 +269,18 @@ static void check_far_labels(const fit_problem *p, const fit_misfit *m, sdm_fit_
     }
 }
 
+// of the tissues outside that were given, the one whose mean is nearest to `mean`, in its
+// deviations
+static const sdm_fit_law *nearest_law(const sdm_fit_appearance *a, double mean)
+{
+    const sdm_fit_law *near = &a->outside[0];
+    for (size_t i = 1; i < a->n_outside; i++) {
+        const sdm_fit_law *l = &a->outside[i];
+        if (fabs(mean - l->mean) / l->sd < fabs(mean - near->mean) / near->sd) near = l;
+    }
+    return near;
+}
+
 // the tissues against the robust statistics, and against the values at the start
 static void check_tissues(const fit_problem *p, const fit_residuals *s, const sdm_fit_result *r,
                           sdm_fit_verdict *v)
@@ -287,12 +299,17 @@ static void check_tissues(const fit_problem *p, const fit_residuals *s, const sd
             "there",
             side ? "inside" : "outside", law[side]->sd, s->spread[side]);
     }
-    const double off = fabs(law[1]->mean - given->mean) / given->sd;
+    const sdm_fit_law *near[2] = {nearest_law(&p->opts->appearance, law[0]->mean), given};
+    double off[2];
+    for (int side = 0; side < 2; side++)
+        off[side] = fabs(law[side]->mean - near[side]->mean) / near[side]->sd;
+    const int side = off[1] >= off[0];
     sdm_fit_judge_add(
-        v, SDM_FIT_CHECK_GIVEN, off <= FIT_GIVEN_MAX, SDM_FIT_DOUBTFUL, off, FIT_GIVEN_MAX,
-        "the inside has the mean %.4g, the start %.4g: other values than those of this kind of "
-        "image were given",
-        law[1]->mean, given->mean);
+        v, SDM_FIT_CHECK_GIVEN, off[side] <= FIT_GIVEN_MAX, SDM_FIT_DOUBTFUL, off[side],
+        FIT_GIVEN_MAX,
+        "the %s has the mean %.4g, the start %.4g: other values than those of this kind of image "
+        "were given",
+        side ? "inside" : "outside", law[side]->mean, near[side]->mean);
 }
 
 // how deep inside the shape the border of its map is, mm; 0: the border is outside

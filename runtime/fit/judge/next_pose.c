@@ -65,7 +65,7 @@ typedef struct start {
 typedef struct nearest {
     double gain;
     size_t param;       /* as start.param */
-    char symmetry[160]; /* how the surface may be turned and stays the same; "": not at all */
+    char symmetry[240]; /* how the surface may be turned and stays the same; "": not at all */
 } nearest;
 
 /* The fit, with which its rivals are compared. */
@@ -328,7 +328,8 @@ static void tell_symmetry(const turns *t, nearest *least)
     snprintf(
         least->symmetry, sizeof least->symmetry,
         "turned by %.0f degrees about (%.2g, %.2g, %.2g) (LPS) the surface is the same, so the "
-        "rotation may be either; no other pose is as good",
+        "rotation may be either, as by other symmetries of the shape; no pose with another surface "
+        "is as good",
         angle * 57.29577951308232, v[0] / angle + 0, v[1] / angle + 0, v[2] / angle + 0);
 }
 

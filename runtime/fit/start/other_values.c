@@ -33,12 +33,14 @@ typedef struct value_start {
 static void shift_find(const fit_problem *p, const fit_state *state, const double axes[9],
                        double step, value_start *best)
 {
-    *best = (value_start){.state = *state, .log_likelihood = sdm_fit_likelihood_at(p, state, SAMPLES_RANKED)};
+    *best = (value_start){.state = *state,
+                          .log_likelihood = sdm_fit_likelihood_at(p, state, SAMPLES_RANKED)};
     for (int a = 0; a < 3; a++)
         for (int i = -N_SHIFTS; i <= N_SHIFTS; i++) {
             value_start one = {.state = *state};
             for (int k = 0; k < 3; k++) one.state.translation[k] += i * step * axes[3 * a + k];
-            one.log_likelihood = i ? sdm_fit_likelihood_at(p, &one.state, SAMPLES_RANKED) : -INFINITY;
+            one.log_likelihood =
+                i ? sdm_fit_likelihood_at(p, &one.state, SAMPLES_RANKED) : -INFINITY;
             if (one.log_likelihood > best->log_likelihood) *best = one;
         }
 }

@@ -245,9 +245,10 @@ typedef struct sdm_fit_opts {
        of the shape, see SDM_FIT_CHECK_MISSING: other spaces of the same material */
     double beside;
 
-    /* number of times that a fit which its checks refuse goes on from another value of one parameter,
-       if such a fit explains the data better: a long shape may have stopped with one end on the data
-       and the other one beyond them. 0: never; nothing is tried where parameters or pose are kept */
+    /* number of times that a fit which its checks refuse goes on from another value of one
+       parameter, if such a fit explains the data better: a long shape may have stopped with one end
+       on the data and the other one beyond them. 0: never; nothing is tried where parameters or
+       pose are kept */
     size_t max_restarts;
 } sdm_fit_opts;
 
@@ -285,7 +286,8 @@ typedef enum sdm_fit_check_kind {
     SDM_FIT_CHECK_INSIDE,
     /* the same for the main tissue outside */
     SDM_FIT_CHECK_OUTSIDE,
-    /* image: difference of the inside mean from that of the start, in sd of the start */
+    /* image: difference of the mean inside, or of the main tissue outside, from the nearest one of
+       the start, in sd of the start: the larger of the two */
     SDM_FIT_CHECK_GIVEN,
     /* number of parameters at an end of their range */
     SDM_FIT_CHECK_BOUNDS,

@@ -103,7 +103,8 @@ int main(int argc, char **argv)
 #endif
 #ifdef WITH_PICTURE
     snprintf(path, sizeof path, "%s/map.svg", argv[1]);
-    require_ok(sdm_picture_slices(path, &grid, &(sdm_picture_map){"octahedron", values, false}, 1,
+    require_ok(sdm_picture_slices(path, &grid,
+                                  &(sdm_picture_map){.title = "octahedron", .values = values}, 1,
                                   NULL, 0, &err),
                &err);
 #endif

@@ -25,7 +25,7 @@ cp out log
 # what the page says about the results
 present work/mug.png work/mug.stl work/mug.nrrd work/runs/mug/model.sdm work/runs/mug/slices.png work/big.{vdb,nii.gz,stl} work/fit.{png,stl,json}
 sed -n '/^wall 6 mm/,$p' log >out
-has '^wall 9 mm: [0-9]+ cm\^3, in the handle -[345]\.[0-9] mm$'
+has '^wall 9 mm: [0-9]+ cm\^3, [0-9.]+ cm\^3 more per mm; in the handle -[345]\.[0-9] mm$'
 truth=$(grep -oE '"wall": [0-9.]+' work/truth.json | cut -d' ' -f2)
 near "$truth" 8.521 0.001
 grep -E '^  wall .* [+]- ' log | awk '{ print $2 }' >walls # of the fits with coarse and with fine maps

@@ -92,10 +92,10 @@ SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, 
    sdm_generate() by rounding: for cochleas by 2e-4 mm root mean square, 2e-3 mm at most; and the
    error of the derivatives is, relative to the largest derivative by the same parameter, 2e-4 root
    mean square, 1.5e-3 at most. These are roundings: derivatives are those of the network's map,
-   whose error against exact distances changes with the parameters. Training does not measure them,
-   and where walls are thin beside the voxels they may be wrong several times; compare with
-   sdm_exact_shape_jacobian(). Errors as for sdm_generate() and sdm_exact_shape_jacobian(). [any
-   thread] */
+   whose error against exact distances changes with the parameters. Training measures them for the
+   worst parameter (sdm_model_quality.derivative_error); where walls are thin beside the voxels they
+   may be wrong several times: sdm_exact_shape_jacobian() is exact. Errors as for sdm_generate() and
+   sdm_exact_shape_jacobian(). [any thread] */
 SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params,
                                          const sdm_generate_opts *opts, float *values,
                                          float *jacobian, sdm_result *result, sdm_error *err);

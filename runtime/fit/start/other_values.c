@@ -20,8 +20,8 @@
 // samples on which starts are ranked, and on which the best continue
 #define SAMPLES_RANKED 2000
 #define SAMPLES_OF_KEPT 30000
-// gain of the log-posterior density, of independent samples, that counts as better
-#define GAIN_LEAST 3.0
+// gain of the log-posterior density, as of independent samples, from which on a fit begins again
+#define GAIN_LEAST 10.0
 
 typedef struct value_start {
     fit_state state;

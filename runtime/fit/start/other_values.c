@@ -7,6 +7,7 @@
 #include "fit/solver/objective.h"
 #include "principal_axes.h"
 #include "sdm/internal/mat3.h"
+#include "sdm/memory.h"
 #include "start_search.h"
 
 // values of a parameter that are tried: the middles of this many equal parts of its range, without
@@ -21,7 +22,9 @@
 #define SAMPLES_RANKED 2000
 #define SAMPLES_OF_KEPT 30000
 // gain of the log-posterior density, as of independent samples, from which on a fit begins again
-#define GAIN_LEAST 10.0
+#define GAIN_LEAST 3.0
+// a shape that has this Dice coefficient with that of the fit is the same one, found more exactly
+#define ALIKE 0.95
 
 typedef struct value_start {
     fit_state state;
@@ -96,11 +99,31 @@ static sdm_status values_rank(fit_problem *p, const double axes[9], double step,
     return SDM_OK;
 }
 
+// whether sample i lies inside the shape, as the latest evaluation sees it
+static bool is_inside(const fit_problem *p, size_t i)
+{
+    return p->maps.share ? p->samples.field[i] > 0.5 : p->samples.field[i] < 0;
+}
+
+// whether the shape holds about the same samples as that of the fit; inside[samples] of the fit
+static bool is_alike(const fit_problem *p, const bool *inside)
+{
+    if (p->target->kind == SDM_FIT_POINTS) return false;
+    size_t both = 0, sum = 0;
+    for (size_t i = 0; i < p->samples.n; i++) {
+        const bool now = is_inside(p, i);
+        both += now && inside[i];
+        sum += (size_t)now + (size_t)inside[i];
+    }
+    return 2 * (double)both >= ALIKE * (double)sum;
+}
+
 sdm_status sdm_fit_other_values(fit_problem *p, bool *found, sdm_error *err)
 {
     const fit_state given = p->state;
     fit_state wide = given, best = given;
     value_start list[N_KEPT];
+    bool *inside = NULL;
     double axes[9];
     size_t n = 0;
     *found = false;
@@ -114,17 +137,21 @@ sdm_status sdm_fit_other_values(fit_problem *p, bool *found, sdm_error *err)
     // of every `stride`-th voxel fewer count as one
     const double correlated = fmax(p->noise_factor / pow((double)p->stride, 3), 1);
     double least = sdm_fit_objective(p) + GAIN_LEAST * correlated;
-    s = axes_find(p, axes, err);
+    s = SDM_ALLOC(&inside, p->samples.n, "start of the fit", err);
+    for (size_t i = 0; i < p->samples.n && !s; i++) inside[i] = is_inside(p, i);
+    if (!s) s = axes_find(p, axes, err);
     p->state = wide;
     if (!s) s = sdm_fit_evaluate(p, err);
     if (!s) s = values_rank(p, axes, LARGEST_SHIFT / N_SHIFTS * p->extent.reach, list, &n, err);
     for (size_t i = 0; i < n && !s; i++) {
         p->state = list[i].state;
         s = sdm_fit_start_continue(p, &given, true, err);
-        if (!s && sdm_fit_objective(p) > least)
+        if (!s) s = sdm_fit_evaluate(p, err);
+        if (!s && sdm_fit_objective(p) > least && !is_alike(p, inside))
             *found = true, least = sdm_fit_objective(p), best = p->state;
         if (s == SDM_E_QUALITY) s = SDM_OK; // this start leads nowhere
     }
+    sdm_free(inside);
     p->state = best;
     return s;
 }

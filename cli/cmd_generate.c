@@ -9,6 +9,7 @@
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "measure/measures.h"
+#include "report/files.h"
 #include "report/generate_files.h"
 #include "report/json_values.h"
 #include "report/output.h"
@@ -134,6 +135,15 @@ static sdm_status read_rows(job *j, sdm_error *err)
     return s;
 }
 
+/* Is a surface compared with the shape? A level set only if it is the only one. */
+static bool compares_surface(const job *j)
+{
+    bool level_set = false;
+    for (size_t i = 0; i < j->args->outputs.n; i++)
+        level_set = level_set || cli_ends_with(j->args->outputs.items[i], ".vdb");
+    return cli_writes_surface(j->args) || (level_set && j->n_rows == 1);
+}
+
 /* Creates the shape if --check, --max-error, --measure, --policy exact or --outside exact need
  * it; also, if it is known, to compare surfaces with. */
 static sdm_status open_shape(job *j, sdm_error *err)
@@ -142,7 +152,7 @@ static sdm_status open_shape(job *j, sdm_error *err)
     const bool checks = args->check || args->max_error > 0 || args->measure;
     const bool exact =
         cli_policy(args) == SDM_RANGE_EXACT || cli_outside(args) == SDM_OUTSIDE_EXACT;
-    if (!checks && !exact && !cli_writes_surface(args)) return SDM_OK;
+    if (!checks && !exact && !compares_surface(j)) return SDM_OK;
     sdm_error why = {0};
     sdm_status s = cli_open_registry(args, &j->registry, &why);
     if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, &why);
@@ -226,6 +236,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     sdm_status s = open_model(j, err);
     if (!s) s = choose_grid(j, err);
     if (!s) cli_warn_thin_model(args->files.items[0], j->info, &j->grid);
+    if (!s && args->jacobian) cli_warn_derivatives(args->files.items[0], j->info);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
@@ -266,7 +277,7 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
                    .reason = result->reason,
                    .check = result->checked ? &result->check : NULL};
     if (result->source == SDM_SOURCE_NETWORK) map.trained_mm = sdm_grid_coarsest(&j->info->grid);
-    if (j->shape && cli_writes_surface(j->args)) compare_shape(j, row, &map);
+    if (j->shape && compares_surface(j)) compare_shape(j, row, &map);
     if (!s) s = cli_write_maps(files->list.items, j->args->outputs.n, &map, j->args, err);
     sdm_text_dispose(&params);
     return s;
@@ -574,7 +585,7 @@ static void notice_ridges(const point_answers *a)
     if (n)
         cli_notice("at %zu of %zu points the gradient is shorter than 0.%d: they lie about in the "
                    "middle between two parts of the surface, where distances of a network are too "
-                   "small; its stated error is that near the surface",
+                   "small; the errors that the training states are those near the surface",
                    n, a->n, PERCENT / 10);
 }
 

@@ -3,6 +3,7 @@
 
 #include "direct/direct.h"
 #include "pod/pod_kind.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/memory.h"
 #include "state/export_model.h"
 #include "template/template_kind.h"
@@ -68,7 +69,6 @@ sdm_status trainer_check_grid(const trainer *t, sdm_error *err)
     return sdm_fail(
         err, SDM_E_CONFIG,
         "%s: no voxel of the grid is inside any of %zu held-out shapes: check grid.centre (or "
-        "grid.origin), grid.size and "
-        "grid.spacing",
-        t->config->file, d->n_holdout);
+        "grid.origin), grid.size and grid.spacing (%g mm: smaller than the parts of the shape?)",
+        t->config->file, d->n_holdout, sdm_grid_coarsest(d->grid));
 }

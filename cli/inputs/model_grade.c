@@ -9,6 +9,7 @@
 #include "report/report_audit.h"
 #include "report/terminal.h"
 #include "sdm/internal/shape_box.h"
+#include "sdm/internal/verdict.h"
 
 /* Largest fraction of the shapes that the grid of a good model cuts (docs/network.md). */
 #define CUT_MAX 0.05
@@ -35,6 +36,15 @@ void cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_gr
                  voxel = fmax(sdm_grid_coarsest(&m->grid), sdm_grid_coarsest(g));
     if (sdm_too_thin(thick, voxel))
         cli_warn("%s: a part of its shapes is " CLI_THIN_PART, path, thick, voxel, 0.5 * thick);
+}
+
+void cli_warn_derivatives(const char *path, const sdm_model_info *m)
+{
+    const double error = m->quality.derivative_error;
+    if (error > SDM_DERIVATIVE_BAD)
+        cli_warn("%s: derivatives of its maps are off by %.0f %% for the worst parameter, which "
+                 "the training named (sdmgen info)",
+                 path, 100 * error);
 }
 
 void cli_print_quality(const sdm_model_quality *q)

@@ -11,5 +11,8 @@ void cli_warn_quality(const char *path, const sdm_model_info *m);
  * of the model or of the grid g, whichever are larger. */
 void cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_grid *g);
 
+/* Warns if the derivatives of the model's maps are off by over a fifth for a parameter. */
+void cli_warn_derivatives(const char *path, const sdm_model_info *m);
+
 /* Prints the verdict as lines of `info`. */
 void cli_print_quality(const sdm_model_quality *q);

@@ -137,6 +137,44 @@ static sdm_status map_beyond(void *engine, const sdm_grid *grid, float *values, 
 }
 #endif
 
+/* Maps of at most so many voxels have their level sets compared with the shape. */
+#define COMPARED_MAX 2000000
+
+/* Warns if the surface has more pieces than the shape whose map it was made from, or encloses
+ * another volume. */
+static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *surface)
+{
+    sdm_audit audit;
+    if (!(map->volume > 0) || sdm_mesh_audit(surface, &audit, NULL) || !audit.closed) return;
+    const double more = fabs(audit.volume) / map->volume - 1, voxel = sdm_grid_coarsest(map->grid);
+    const bool trained = map->trained_mm >= voxel; // a finer grid shows no more of the shape
+    if (map->pieces && audit.components > map->pieces)
+        cli_warn("%s: the surface has %zu pieces, the shape %zu: a neck or a wall is thinner than "
+                 "a voxel of %.3g mm and is torn; %s shows it",
+                 path, audit.components, map->pieces, trained ? map->trained_mm : voxel,
+                 trained ? "a training with a smaller grid.spacing" : "a smaller --spacing");
+    else if (fabs(more) > VOLUME_OFF_MAX)
+        cli_warn(
+            "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
+            "%.3g mm cut its edges and thin parts; %s%.2g shows more of them",
+            path, fabs(audit.volume), 100 * fabs(more), more < 0 ? "less" : "more", map->volume,
+            trained ? map->trained_mm : voxel,
+            trained ? "a training with grid.spacing " : "--spacing ",
+            0.5 * (trained ? map->trained_mm : voxel));
+}
+
+#ifdef SDM_HAVE_VDB
+/* The same of the surface of a level set. */
+static void warn_level_set(const char *path, const cli_map *map)
+{
+    sdm_mesh surface = {0};
+    if (!map->values || !(map->volume > 0) || sdm_grid_count(map->grid) > COMPARED_MAX) return;
+    if (!sdm_isosurface(map->grid, map->values, 0.0f, &surface, NULL, NULL))
+        warn_surface(path, map, &surface);
+    sdm_mesh_dispose(&surface);
+}
+#endif
+
 static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args *args,
                             sdm_error *err)
 {
@@ -172,6 +210,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
     const sdm_status s = map->blocks
                              ? sdm_vdb_write_blocks(path, map->blocks, &opts, &report, err)
                              : sdm_vdb_write(path, map->grid, map->values, &opts, &report, err);
+    if (!s && !cli_writes_surface(args)) warn_level_set(path, map); // else the surface tells it
     if (!s && report.adjusted_voxels > 0)
         cli_notice("%s: %lld voxels at creases were adjusted by at most %.2g mm to make a valid "
                    "level set; no sign changed",
@@ -187,29 +226,6 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
     (void)args;
     return sdm_fail(err, SDM_E_UNSUPPORTED, "output '%s': built without OpenVDB", path);
 #endif
-}
-
-/* Warns if the surface has more pieces than the shape whose map it was made from, or encloses
- * another volume. */
-static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *surface)
-{
-    sdm_audit audit;
-    if (!(map->volume > 0) || sdm_mesh_audit(surface, &audit, NULL) || !audit.closed) return;
-    const double more = fabs(audit.volume) / map->volume - 1, voxel = sdm_grid_coarsest(map->grid);
-    const bool trained = map->trained_mm >= voxel; // a finer grid shows no more of the shape
-    if (map->pieces && audit.components > map->pieces)
-        cli_warn("%s: the surface has %zu pieces, the shape %zu: a neck or a wall is thinner than "
-                 "a voxel of %.3g mm and is torn; %s shows it",
-                 path, audit.components, map->pieces, trained ? map->trained_mm : voxel,
-                 trained ? "a training with a smaller grid.spacing" : "a smaller --spacing");
-    else if (fabs(more) > VOLUME_OFF_MAX)
-        cli_warn(
-            "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
-            "%.3g mm cut its edges and thin parts; %s%.2g shows more of them",
-            path, fabs(audit.volume), 100 * fabs(more), more < 0 ? "less" : "more", map->volume,
-            trained ? map->trained_mm : voxel,
-            trained ? "a training with grid.spacing " : "--spacing ",
-            0.5 * (trained ? map->trained_mm : voxel));
 }
 
 void cli_map_compare(const sdm_mesh *shape, cli_map *map)

@@ -126,7 +126,7 @@ static void tell_turned(teller *t)
     sdm_text text = {0};
     if (!c->shapes || t->s->found.inside_out.shapes > 0) return; // tell_inside_out() has told them
     add_count(t->s, c, "parts that are inside out and that the exact engine turns", &text);
-    sdm_text_add(&text, "; " CLI_MEND_SHAPE);
+    sdm_text_add(&text, "; for each of these parts: " CLI_MEND_SHAPE);
     tell(t, SDM_E_QUALITY, &text);
 }
 

@@ -11,9 +11,6 @@
    surface near edges lost 5 % of its volume with 3.6 voxels, 10 % with 1.9, 1 % with 7.3. */
 static const double EDGES_MANY = 0.1, VOXELS_MANY = 4;
 
-/* Relative errors from which on volumes and derivatives are told to be bad. */
-static const double VOLUME_BAD = 0.02, DERIVATIVE_BAD = 0.2;
-
 /* The part of the error with its share of the sum of all parts. */
 static void print_part(const sdm_verdict *v, sdm_cause cause, double sum, bool first)
 {
@@ -78,17 +75,17 @@ static void print_unfit(const sdm_verdict *v, bool cuts)
     if (sdm_verdict_errs_far(v))
         not_for(&first),
             printf("distances far from the surface: wrong by up to %.2g mm\n", v->largest_mm);
-    if (v->volume_error > VOLUME_BAD)
+    if (v->volume_error > SDM_VOLUME_BAD)
         not_for(&first), printf("volumes: off by %s %%\n", percent(v->volume_error, text));
     if (is_coarse(v))
         not_for(&first),
             printf("volumes of surfaces (.stl): voxels of %.3g mm cut the edges of its parts, the "
                    "thinnest of which is %.2g mm thick; grid.spacing %.2g keeps more of them\n",
                    v->coarse_mm, v->thickness_mm, 0.25 * v->thickness_mm);
-    if (v->derivative_error > DERIVATIVE_BAD)
+    if (v->derivative_error > SDM_DERIVATIVE_BAD)
         not_for(&first), printf("derivatives of maps by %s: off by %s %%\n", v->derivative_by,
                                 percent(v->derivative_error, text));
-    if (v->volume_derivative_error > DERIVATIVE_BAD)
+    if (v->volume_derivative_error > SDM_DERIVATIVE_BAD)
         not_for(&first), printf("derivatives of the volume by %s: off by %s %%\n",
                                 v->volume_derivative_by, percent(v->volume_derivative_error, text));
     if (sdm_too_thin(v->thickness_mm, v->coarse_mm))

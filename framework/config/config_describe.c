@@ -47,8 +47,11 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out)
 {
     size_t n = 0;
     const sdm_section *sections = sdm_config_sections(&n);
-    sdm_text_add(out, "# every key of this kind of network with its value; reads back to the same "
-                      "configuration\n");
+    sdm_text_add(
+        out,
+        "# every key of this kind of network with its value; reads back to the same "
+        "configuration. What was left to auto has the values that the run chose; of two kinds that "
+        "were trained, train.minutes is the part of this one\n");
     for (size_t s = 0; s < n; s++) {
         const bool nested = *sections[s].name != 0;
         bool begun = !nested;

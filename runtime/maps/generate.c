@@ -175,6 +175,21 @@ static sdm_status generate_all(const sdm_model *m, const double *params, size_t 
                : s;
 }
 
+/* Is a voxel at the border of the grid inside the shape? */
+static bool is_cut(const sdm_grid *g, const float *values)
+{
+    const int64_t nx = g->n[0], ny = g->n[1], nz = g->n[2];
+    for (int64_t k = 0; k < nz; k++)
+        for (int64_t j = 0; j < ny; j++) {
+            const float *row = values + (k * ny + j) * nx;
+            const bool whole = k == 0 || k == nz - 1 || j == 0 || j == ny - 1;
+            if (row[0] < 0 || row[nx - 1] < 0) return true;
+            for (int64_t i = 1; whole && i < nx - 1; i++)
+                if (row[i] < 0) return true;
+        }
+    return false;
+}
+
 sdm_status sdm_generate_batch(const sdm_model *m, const double *params, size_t n,
                               const sdm_generate_opts *opts, float *values, sdm_result *results,
                               sdm_error *err)
@@ -193,7 +208,10 @@ sdm_status sdm_generate_batch(const sdm_model *m, const double *params, size_t n
     s = SDM_ALLOC(&used, count, "parameters of a batch", err);
     if (!s) s = SDM_ALLOC(&found, n, "results of a batch", err);
     if (!s) s = generate_all(m, params, n, &o, values, found, used, err);
-    if ((!s || s == SDM_E_QUALITY) && results) memcpy(results, found, n * sizeof *found);
+    for (size_t i = 0; i < n && results && (!s || s == SDM_E_QUALITY); i++) {
+        results[i] = found[i];
+        results[i].cut = is_cut(&info->grid, values + i * sdm_grid_count(&info->grid));
+    }
     sdm_free(found);
     sdm_free(used);
     return s;
@@ -249,7 +267,10 @@ sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params,
     sdm_result found = {0};
     sdm_status s = prepare_one(m, params, opts, &o, &used, &found, err);
     if (!s) s = jacobian_at(m, params, used, &o, values, jacobian, &found, err);
-    if ((!s || s == SDM_E_QUALITY) && result) *result = found;
+    if ((!s || s == SDM_E_QUALITY) && result) {
+        *result = found;
+        result->cut = is_cut(&sdm_model_get_info(m)->grid, values);
+    }
     sdm_free(used);
     return s;
 }

@@ -9,22 +9,36 @@
 /* Largest relative difference of volume and area between compilers and processors. */
 static const double SAME_MESH = 1e-6;
 
-sdm_status sdm_model_mesh_check(const sdm_model_info *info, const sdm_instance *shape,
-                                sdm_error *err)
+/* The shape at p against the volume (mm^3) and the area (mm^2) of its mesh at the training. */
+static sdm_status compare(const sdm_model_info *info, const sdm_instance *shape, const double *p,
+                          double volume, double area, const char *where, sdm_error *err)
 {
-    const double volume = info->quality.mesh_volume_mm3, area = info->quality.mesh_area_mm2;
-    double *p = NULL, v, a;
-    if (isnan(volume)) return SDM_OK; // a model of an earlier version
-    sdm_status s = SDM_ALLOC(&p, info->n_params, "parameters", err);
-    for (size_t i = 0; i < info->n_params && !s; i++) p[i] = info->params[i].def;
-    if (!s) s = sdm_shape_sums(shape, p, &v, &a, err);
-    sdm_free(p);
+    double v, a;
+    const sdm_status s = sdm_shape_sums(shape, p, &v, &a, err);
     if (s || (fabs(a - area) <= SAME_MESH * area &&
               fabs(v - volume) <= SAME_MESH * fmax(fabs(volume), area * sqrt(area))))
         return s;
     return sdm_fail(err, SDM_E_PLUGIN,
-                    "shape '%s' was changed after the training: at the default parameters its mesh "
-                    "has %.6g mm^3 and %.6g mm^2, at the training %.6g mm^3 and %.6g mm^2; load "
-                    "the shape of that time, or train again",
-                    info->shape, v, a, volume, area);
+                    "shape '%s' was changed after the training: at %s parameters its mesh has %.6g "
+                    "mm^3 and %.6g mm^2, at the training %.6g mm^3 and %.6g mm^2; load the shape "
+                    "of that time, or train again",
+                    info->shape, where, v, a, volume, area);
+}
+
+sdm_status sdm_model_mesh_check(const sdm_model_info *info, const sdm_instance *shape,
+                                sdm_error *err)
+{
+    const sdm_model_quality *q = &info->quality;
+    double *p = NULL;
+    if (isnan(q->mesh_volume_mm3)) return SDM_OK; // a model of an earlier version
+    sdm_status s = SDM_ALLOC(&p, info->n_params, "parameters", err);
+    for (size_t i = 0; i < info->n_params && !s; i++) p[i] = info->params[i].def;
+    if (!s) s = compare(info, shape, p, q->mesh_volume_mm3, q->mesh_area_mm2, "the default", err);
+    for (size_t k = 0; k < SDM_MODEL_PROBES && !s && !isnan(q->probe_volume_mm3[k]); k++) {
+        for (size_t i = 0; i < info->n_params; i++)
+            p[i] = sdm_probe_param(k, i, info->params[i].min, info->params[i].max);
+        s = compare(info, shape, p, q->probe_volume_mm3[k], q->probe_area_mm2[k], "other", err);
+    }
+    sdm_free(p);
+    return s;
 }

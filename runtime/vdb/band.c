@@ -103,7 +103,7 @@ static sdm_status check_jumps(const sdm_band *b, double width, sdm_error *err)
         return sdm_fail(
             err, SDM_E_ARG,
             "no voxel of the map is inside the surface: there is no level set to write; "
-            "use a grid that holds the shape, or write the map itself "
+            "use a grid that holds the shape, with smaller voxels, or write the map itself "
             "(sdm_vdb_opts.dense)");
     if (jumps)
         return sdm_fail(err, SDM_E_QUALITY,

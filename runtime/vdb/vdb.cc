@@ -373,10 +373,11 @@ Grid::Ptr make_from_blocks(const sdm_blocks &b, const sdm_vdb_opts &o, sdm_vdb_r
         acc.addTile(1, corner, -background, false);
     }
     if (!inside)
-        need(sdm_fail(err, SDM_E_ARG,
-                      "no voxel of the map is inside the surface: there is no level set to write; "
-                      "use a grid that holds the shape, or write the map itself "
-                      "(sdm_vdb_opts.dense)"));
+        need(sdm_fail(
+            err, SDM_E_ARG,
+            "no voxel of the map is inside the surface: there is no level set to write; "
+            "use a grid that holds the shape, with smaller voxels, or write the map itself "
+            "(sdm_vdb_opts.dense)"));
     grid->tree().prune();
     mend_creases(*grid, o, report, err);
     return grid;

@@ -263,7 +263,8 @@ static void quality_is_kept(void **state)
     const size_t without = sdm_model_get_info(m)->file_bytes;
     assert_true(!*q->grade && isnan(q->cut) && isnan(q->between_mm));
     sdm_model_free(m);
-    t.info.quality = (sdm_model_quality){"poor", 0.25, NAN, 0.5, 12.5, 30, 0.01, NAN, 0.5};
+    t.info.quality = (sdm_model_quality){"poor", 0.25, NAN, 0.5,         12.5,       30,
+                                         0.01,   NAN,  0.5, {1, 2, NAN}, {3, 4, NAN}};
     m = toy_open(&t);
     q = &sdm_model_get_info(m)->quality;
     assert_string_equal(q->grade, "poor");
@@ -271,14 +272,16 @@ static void quality_is_kept(void **state)
     assert_true(q->mesh_volume_mm3 == 12.5 && q->mesh_area_mm2 == 30);
     assert_true(q->volume_error == 0.01 && isnan(q->derivative_error));
     assert_true(q->volume_derivative_error == 0.5);
+    assert_true(q->probe_volume_mm3[1] == 2 && q->probe_area_mm2[1] == 4);
+    assert_true(isnan(q->probe_volume_mm3[2]) && isnan(q->probe_area_mm2[2]));
     assert_true(sdm_model_get_info(m)->file_bytes > without);
     sdm_model_free(m);
     // an unknown grade and an impossible share are damage
-    const sdm_model_quality wrong[] = {{"fine", 0, 0, 1, NAN, NAN, NAN, NAN, NAN},
-                                       {"good", 1.5, 0, 1, NAN, NAN, NAN, NAN, NAN},
-                                       {"good", 0, -1, 1, NAN, NAN, NAN, NAN, NAN},
-                                       {"good", 0, 0, -1, NAN, NAN, NAN, NAN, NAN},
-                                       {"good", 0, 0, 1, NAN, NAN, -0.1, NAN, NAN}};
+    const sdm_model_quality wrong[] = {{"fine", 0, 0, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}},
+                                       {"good", 1.5, 0, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}},
+                                       {"good", 0, -1, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}},
+                                       {"good", 0, 0, -1, NAN, NAN, NAN, NAN, NAN, {0}, {0}},
+                                       {"good", 0, 0, 1, NAN, NAN, -0.1, NAN, NAN, {0}, {0}}};
     for (size_t i = 0; i < 5; i++) {
         uint8_t *bytes;
         size_t size;

@@ -512,15 +512,23 @@ static void test_changed_shape_is_refused(void **state)
     double volume, area;
     assert_int_equal(sdm_shape_sums(s->shape, p, &volume, &area, &err), SDM_OK);
     assert_true(fabs(area / (16 * atan(1) * 1.44) - 1) < 0.2);
-    for (int k = 0; k < 3; k++) {
+    // the first probe, inside the ranges of the model
+    const double q[] = {sdm_probe_param(0, 0, 1, 1.5), sdm_probe_param(0, 1, -1, 1)};
+    double probe_volume, probe_area;
+    assert_true(q[0] > 1 && q[0] < 1.5 && q[1] > -1 && q[1] < 1);
+    assert_int_equal(sdm_shape_sums(s->shape, q, &probe_volume, &probe_area, &err), SDM_OK);
+    for (int k = 0; k < 5; k++) {
         sdm_instance *made = NULL;
         ball_mesh_volume = volume * (k == 1 ? 1 + 3e-5 : 1 + 1e-9);
         ball_mesh_area = area * (k == 2 ? 1 + 3e-5 : 1 - 1e-9);
+        ball_probe_volume = probe_volume * (k == 3 ? 1 + 3e-5 : 1 - 1e-9);
+        ball_probe_area = probe_area * (k == 4 ? 1 + 3e-5 : 1 - 1e-9);
         sdm_model *m = model_of("bulge");
-        ball_mesh_volume = ball_mesh_area = NAN;
+        ball_mesh_volume = ball_mesh_area = ball_probe_volume = ball_probe_area = NAN;
         const sdm_status status = sdm_runtime_instance(m, s->registry, &made, &err);
         assert_int_equal(status, k ? SDM_E_PLUGIN : SDM_OK);
         if (k) assert_non_null(strstr(err.text, "shape 'ball' was changed after the training"));
+        if (k) assert_non_null(strstr(err.text, k < 3 ? "at the default" : "at other parameters"));
         sdm_instance_free(made);
         sdm_model_free(m);
     }

@@ -340,7 +340,13 @@ static sdm_status set_quality(const sdm_verdict *v, const trainer *t, const sdm_
                              .volume_derivative_error = v->volume_derivative_error};
     snprintf(q->grade, sizeof q->grade, "%s", sdm_grade_name(v->grade));
     for (size_t i = 0; i < info->n_params; i++) p[i] = info->params[i].def;
-    return sdm_shape_sums(t->data.shape, p, &q->mesh_volume_mm3, &q->mesh_area_mm2, err);
+    sdm_status s = sdm_shape_sums(t->data.shape, p, &q->mesh_volume_mm3, &q->mesh_area_mm2, err);
+    for (size_t k = 0; k < SDM_MODEL_PROBES && !s; k++) {
+        for (size_t i = 0; i < info->n_params; i++)
+            p[i] = sdm_probe_param(k, i, info->params[i].min, info->params[i].max);
+        s = sdm_shape_sums(t->data.shape, p, &q->probe_volume_mm3[k], &q->probe_area_mm2[k], err);
+    }
+    return s;
 }
 
 sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error *err)

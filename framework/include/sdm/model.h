@@ -32,6 +32,8 @@ typedef struct sdm_accuracy {
     double near_mm; /* two voxels (their shortest edge); 0.4 mm in models of earlier versions */
 } sdm_accuracy;
 
+#define SDM_MODEL_PROBES 3
+
 /* The verdict of the training on the model. Earlier versions stored none: grade "", numbers NaN. */
 typedef struct sdm_model_quality {
     char grade[16]; /* "good", "usable" or "poor" */
@@ -52,6 +54,8 @@ typedef struct sdm_model_quality {
        derivatives of the map within sdm_accuracy.near_mm of the surface, and of the derivative of
        the volume. */
     double volume_error, derivative_error, volume_derivative_error;
+    /* as mesh_volume_mm3 and mesh_area_mm2, at three other parameter vectors; NaN: not known */
+    double probe_volume_mm3[SDM_MODEL_PROBES], probe_area_mm2[SDM_MODEL_PROBES];
 } sdm_model_quality;
 
 /* Description of a model. All pointers stay valid until sdm_model_free(); texts are

@@ -20,12 +20,18 @@ void sdm_quality_describe(const sdm_model_quality *q, sdm_text *t)
     if (!isnan(q->derivative_error)) sdm_text_add_real(t, "derivative_error", q->derivative_error);
     if (!isnan(q->volume_derivative_error))
         sdm_text_add_real(t, "volume_derivative_error", q->volume_derivative_error);
+    for (int i = 0; i < SDM_MODEL_PROBES; i++) {
+        if (isnan(q->probe_volume_mm3[i]) || isnan(q->probe_area_mm2[i])) break;
+        sdm_text_add_real(t, "probe_volume_mm3", q->probe_volume_mm3[i]);
+        sdm_text_add_real(t, "probe_area_mm2", q->probe_area_mm2[i]);
+    }
 }
 
 sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sdm_error *err)
 {
     static const char *const grades[] = {"good", "usable", "poor"};
-    *q = (sdm_model_quality){"", NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    *q = (sdm_model_quality){
+        "", NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, {NAN, NAN, NAN}, {NAN, NAN, NAN}};
     if (!section) return SDM_OK;
     sdm_lines r = {.at = section->data};
     r.end = r.at + section->size;
@@ -42,6 +48,10 @@ sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sd
         q->derivative_error = sdm_lines_real(&r, "derivative_error");
     if (sdm_lines_next_is(&r, "volume_derivative_error"))
         q->volume_derivative_error = sdm_lines_real(&r, "volume_derivative_error");
+    for (int i = 0; i < SDM_MODEL_PROBES && sdm_lines_next_is(&r, "probe_volume_mm3"); i++) {
+        q->probe_volume_mm3[i] = sdm_lines_real(&r, "probe_volume_mm3");
+        q->probe_area_mm2[i] = sdm_lines_real(&r, "probe_area_mm2");
+    }
     bool known = false;
     for (size_t i = 0; i < sizeof grades / sizeof *grades; i++)
         known = known || !strcmp(q->grade, grades[i]);

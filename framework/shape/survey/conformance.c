@@ -291,7 +291,7 @@ static void test_outside(tests *t)
     sdm_mesh_dispose(&mesh);
     if (!t->out->test[SDM_TEST_OUTSIDE].has_params)
         result(t, SDM_TEST_OUTSIDE, SDM_TEST_PASSED, (double)refused,
-               "NaN, infinite and far values: %zu calls, of which %zu gave no mesh", calls,
+               "NaN, infinite and far values: %zu calls returned, %zu of them with an error", calls,
                refused);
 }
 

@@ -187,7 +187,14 @@ static void check_residuals(const fit_problem *p, const fit_misfit *own, const f
     // residuals far beyond their limit
     const bool other = beyond > FAR_BEYOND && voxel < MUCH_COARSER * coarse.limit;
     char cause[400] = "";
-    if (bounds->n_wanted)
+    const fit_observation *o = &p->observation;
+    bool absent = image && o->n_in > 0; // no tissue of the inside is in the image
+    for (size_t i = 0; i < o->n_in; i++) absent = absent && p->absent[i];
+    if (absent)
+        snprintf(cause, sizeof cause,
+                 "the image holds no values like those given for the inside (mean %.4g, sd %.3g)",
+                 o->tissue[0].mean, o->tissue[0].sd);
+    else if (bounds->n_wanted)
         snprintf(cause, sizeof cause, "%s", bounds->text);
     else if (isfinite(coarse.advice))
         snprintf(

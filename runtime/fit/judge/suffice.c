@@ -163,15 +163,15 @@ void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_v
 {
     const double voxel = fit_longest_edge(&p->maps.grid);
     if (p->opts->keep_params || fit_maps_direct(&p->maps)) return;
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit),
-                      coarse.blind ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, voxel, coarse.limit,
-                      "the voxels of the maps are coarse beside %s: estimates are less exact, and "
-                      "standard deviations %s; exact maps with voxels of %.2g mm "
-                      "(sdm_fit_source.grid) show it",
-                      coarse.detail,
-                      p->target->kind == SDM_FIT_POINTS ? "larger, by an estimate of the error"
-                                                        : "too small",
-                      coarse.advice);
+    sdm_fit_judge_add(
+        v, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit),
+        coarse.blind ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, voxel, coarse.limit,
+        "the voxels of the maps are coarse beside %s: parameters may be biased, and their "
+        "standard deviations %s; exact maps with voxels of %.2g mm "
+        "(sdm_fit_source.grid) show it",
+        coarse.detail,
+        p->target->kind == SDM_FIT_POINTS ? "contain an estimate of this error" : "are too small",
+        coarse.advice);
 }
 
 /* Thickness (mm) of the thinnest part of the fitted shape; without the shape, of the thinnest part
@@ -196,11 +196,16 @@ void sdm_fit_check_labels(const fit_problem *p, sdm_fit_verdict *v)
     if (p->opts->keep_params) return;
     const double voxel = fit_longest_edge(&p->target->grid), thick = thinnest_part(p);
     if (!isfinite(thick)) return;
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, voxel <= thick, SDM_FIT_DOUBTFUL, voxel, thick,
+    // a parameter at a bound shows that the fit has missed the part
+    bool missed = false;
+    for (size_t k = 0; k < p->n_params; k++)
+        missed = missed || !(p->state.params[k] > p->low[k] && p->state.params[k] < p->high[k]);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, voxel <= thick,
+                      missed ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, voxel, thick,
                       "the voxels of the labels, %.3g mm, are longer than the thinnest part of the "
                       "shape is thick, %.3g mm: they hardly show it, and parameters of this part "
-                      "are not to be trusted; finer labels are needed",
-                      voxel, thick);
+                      "and of its neighbours are not to be trusted%s; finer labels are needed",
+                      voxel, thick, missed ? ", one of which ends at its bound" : "");
 }
 
 void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)

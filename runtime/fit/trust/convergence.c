@@ -56,10 +56,13 @@ static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_err
         snprintf(moves, sizeof moves,
                  "; %.100s still moves by %.2g of its standard deviation, need %.2g", name, most,
                  UNREST_MAX);
+    // more iterations have been given already
+    const bool many = p->opts->max_iterations > sdm_fit_defaults().max_iterations;
     sdm_fail(err, SDM_E_QUALITY,
-             "not converged after %zu iterations (%s%s): more of them "
-             "(sdm_fit_opts.max_iterations), or a nearer start",
-             r->n_iterations, r->reason, moves);
+             "not converged after %zu iterations (%s%s): %sa nearer start, or data that determine "
+             "what still moves",
+             r->n_iterations, r->reason, moves,
+             many ? "" : "more of them (sdm_fit_opts.max_iterations), ");
 }
 
 void sdm_fit_name_restless(const fit_problem *p, sdm_fit_result *r, sdm_error *err)

@@ -50,6 +50,9 @@ typedef struct sdm_result {
     sdm_reason reason; /* why source is SDM_SOURCE_EXACT */
     bool checked;      /* `check` is valid */
     sdm_check check;   /* check of the network's map, even if an exact one has replaced it */
+    /* The shape reaches the border of the grid, where its surface ends open: the map holds a part
+       of it. Of sdm_generate(), _batch() and _jacobian(). */
+    bool cut;
 } sdm_result;
 
 /* Initialise with zeros. Later versions add members at the end only. */

@@ -207,6 +207,7 @@ static sdm_status fit_one(const cli_args *args, const char *json, sdm_error *err
     if (!s) s = cli_fit_check_options(&f, err);
     if (!s) cli_fit_default_lengths(&f);
     if (!s) s = cli_fit_read_reference(&f, err);
+    if (!s) s = cli_fit_read_truth(&f, err);
     if (!s) s = cli_fit_read_start(&f, err);
     if (!s) s = cli_fit_check_size(&f, err);
     if (!s) cli_fit_notice_tissues(&f);

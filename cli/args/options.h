@@ -111,7 +111,7 @@ typedef struct cli_phantom_args {
 typedef struct cli_fit_args {
     bool exact, polish, ras, find;
     cli_list labels, reference_labels, keep;
-    const char *reference, *label_out, *start_points, *image_model, *mirror;
+    const char *reference, *truth, *label_out, *start_points, *image_model, *mirror;
     double start_centre[3], start_axis[3], region[6];
     int64_t turns, turns_sphere, max_iterations, candidates; /* 0: option missing */
     double inside[2], outside[2], air[2];

@@ -73,6 +73,9 @@ typedef struct cli_fit {
     float *reference;         /* [reference_grid] 1 inside, 0 outside; NULL: none */
     bool reference_is_target; /* reference == mask: the labels of the target itself */
 
+    /* fit_truth.c: true parameters, NaN: not known; NULL: none are */
+    double *truth; /* [n_params] */
+
     /* fit_result.c */
     sdm_fit_result result;
     bool found;      /* result holds an estimate */
@@ -160,6 +163,10 @@ double cli_fit_map_voxel(const cli_fit *f);
 /* Before the fit: reads the labels of --reference; without this option the labels of the target are
  * the reference. SDM_E_ARG, SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err);
+
+/* Before the fit: fills f->truth from the file of --truth, if it is given. SDM_E_ARG: the truth of
+ * another shape; SDM_E_FORMAT, SDM_E_IO. */
+sdm_status cli_fit_read_truth(cli_fit *f, sdm_error *err);
 
 /* After cli_fit_make_map(): fills f->overlap, unless there is no reference or no surface. */
 sdm_status cli_fit_compare(cli_fit *f, sdm_error *err);

@@ -21,6 +21,7 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
     // parameters
     cli_json_params(j, "parameters", f->params, f->n_params, r->params);
     cli_json_params(j, "parameters_sd", f->params, f->n_params, r->sd);
+    if (f->truth) cli_json_params(j, "truth", f->params, f->n_params, f->truth);
     sdm_json_open(j, "at_bound", '[');
     for (size_t i = 0; i < f->n_params; i++)
         if (r->at_bound[i]) sdm_json_text(j, NULL, f->params[i].name);

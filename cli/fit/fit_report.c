@@ -18,7 +18,12 @@ static void print_params(const cli_fit *f)
         printf("  %-*s %10.5g", width, p->name, r->params[i]);
         if (isnan(r->sd[i])) printf(" +- %-9s", "unknown");
         if (r->sd[i] > 0) printf(" +- %-9.2g", r->sd[i]);
-        printf(" %s%s%s\n", p->unit,
+        const bool known = f->truth && isfinite(f->truth[i]);
+        printf(known ? " %-4s" : " %s", p->unit);
+        if (known) printf("  truth %.5g", f->truth[i]);
+        if (known && r->sd[i] > 0)
+            printf(", off by %.1f sd", fabs(r->params[i] - f->truth[i]) / r->sd[i]);
+        printf("%s%s\n",
                r->at_bound[i] ? "   at the end of its range: the standard deviation is unreliable"
                               : "",
                r->by_prior[i]

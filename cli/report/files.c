@@ -65,10 +65,15 @@ static bool is_same_file(const char *a, const char *b)
  * options are included. */
 static sdm_status find_inputs(const cli_args *args, cli_list *out, sdm_error *err)
 {
-    const char *const single[] = {args->mesh,           args->rows,
-                                  args->points,         args->like,
-                                  args->fit.reference,  args->fit.start_points,
-                                  args->import.surface, args->import.particles};
+    const char *const single[] = {args->mesh,
+                                  args->rows,
+                                  args->points,
+                                  args->like,
+                                  args->fit.reference,
+                                  args->fit.truth,
+                                  args->fit.start_points,
+                                  args->import.surface,
+                                  args->import.particles};
     const size_t n_single = sizeof single / sizeof *single;
     const sdm_status s =
         SDM_ALLOC(&out->items, args->files.n + args->options.n + n_single, "names of files", err);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: a phantom is recovered, every kind of target and output, fits that must fail, mistakes.
-# Tests: cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_options.c fit_picture.c fit_repeat.c fit_report.c fit_result.c
+# Tests: fit_truth.c cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_options.c fit_picture.c fit_repeat.c fit_report.c fit_result.c
 # fit_start.c fit_target.c progress_bar.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
@@ -89,6 +89,12 @@ has 'rx +3\.[0-9]+ \+- 0\.0'
 has 'reference: Dice 0.9'
 has 'converged after'
 has '^  map voxels   doubtful  0.35, limit 0.2.*coarse beside the point spread of the image: .*with voxels of 0.2[0-9]* mm \(--exact --spacing\)'
+# the truth of the test image beside the estimate; that of another shape, and a file without parameters, are refused
+expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --truth truth.json
+has '^  rx .* \+- .* mm +truth 3\.5, off by [0-9.]+ sd$'
+expect 2 'truth\.json: the truth of another shape than .torus.: ellipsoid' sdmgen fit --shape torus ct.nii.gz $near_truth --truth truth.json
+echo '{"shape": "ellipsoid"}' >empty.json
+expect 3 'empty\.json: no object .parameters. with a parameter of .ellipsoid.' sdmgen fit $fit ct.nii.gz $near_truth --truth empty.json
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --blur 0.3 --keep blur
 has 'point spread 0.3 mm'
 ! grep -q 'are coarse' out || bad 'maps of 0.35 mm are fine beside a point spread of 0.3 mm'

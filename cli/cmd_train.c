@@ -128,6 +128,11 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
             "not kept\n",
             other_kind(r), r->other.rmse_mm, r->other_voxel_mm);
     cli_print_verdict(&r->verdict);
+    if (cli_warnings() > 0)
+        printf("  warnings    %zu, at the beginning of the output: what they name the verdict does "
+               "not "
+               "see\n",
+               cli_warnings());
     return SDM_OK;
 }
 

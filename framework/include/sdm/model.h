@@ -43,7 +43,8 @@ typedef struct sdm_model_quality {
     /* Between the voxels: how far exact maps, interpolated linearly, miss the surface of held-out
        shapes, root mean square, mm. sdm_accuracy holds errors at the voxels only. */
     double between_mm;
-    /* thickness of the thinnest part of a few held-out shapes, mm; NaN: not known. Surfaces on
+    /* thickness of the thinnest part of a few held-out shapes, and of those at both ends of all
+       ranges, mm; NaN: not known. Surfaces on
        voxels larger than about 0.7 of it lack such a part, or show it broken. */
     double thickness_mm;
     /* of the mesh at the default parameters, the sum over its triangles; NaN: not known. A shape

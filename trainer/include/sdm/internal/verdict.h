@@ -63,8 +63,10 @@ typedef struct sdm_verdict {
     double degree, ridge;
     double thin; /* fraction of the surface where the shape is thinner than two voxels or has an
                     edge */
-    double thickness_mm; /* of the thinnest part of a few held-out shapes; NaN: not known */
-    double coarse_mm;    /* largest spacing of the grid */
+    /* of the thinnest part of a few held-out shapes and those at the ends of the ranges; NaN: not
+       known */
+    double thickness_mm;
+    double coarse_mm; /* largest spacing of the grid */
     double cut; /* fraction of the held-out shapes whose surfaces leave the grid: there they end
                    open */
     /* fraction of a few held-out shapes with parts that are inside out and overlap others */

@@ -167,7 +167,12 @@ static const char *remedy(const cli_fit *f)
     const bool network = f->model && f->shape && !f->args->fit.exact && !f->args->fit.polish;
     if (f->found && !f->result.converged && network)
         return "; if the network is the limit, --exact fits with exact maps";
-    const bool turned = !isnan(f->args->pose.rotation[0]) && !f->opts.keep_pose;
+    bool contrast = false; // tissues that are the wrong way round are no matter of the start
+    for (size_t i = 0; i < f->result.verdict.n_findings && f->found; i++) {
+        const sdm_fit_finding *x = &f->result.verdict.findings[i];
+        contrast = contrast || (x->kind == SDM_FIT_CHECK_CONTRAST && x->grade == SDM_FIT_FAILED);
+    }
+    const bool turned = !isnan(f->args->pose.rotation[0]) && !f->opts.keep_pose && !contrast;
     return turned ? "; a wrong start ends like this, too: without --rotation many are tried" : "";
 }
 

@@ -236,7 +236,6 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     sdm_status s = open_model(j, err);
     if (!s) s = choose_grid(j, err);
     if (!s) cli_warn_thin_model(args->files.items[0], j->info, &j->grid);
-    if (!s && args->jacobian) cli_warn_derivatives(args->files.items[0], j->info);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
@@ -440,7 +439,10 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
     if (args->json && !j->band.tile &&
         (s = sdm_map_volume(&j->grid, j->values, (int)args->threads, &j->volume, err)))
         return s;
-    return write_row(j, row, &result, err);
+    s = write_row(j, row, &result, err);
+    if (!s && row == 0 && j->jacobian && result.source == SDM_SOURCE_NETWORK)
+        cli_warn_derivatives(args->files.items[0], j->info);
+    return s;
 }
 
 static void add_check_json(const job *j, sdm_json *json)

@@ -71,6 +71,34 @@ static void print_ranks(const cli_ranks_use *use)
            use->by, 1e-6 * (double)least, 1e-6 * (double)most, 1e-6 * (double)all);
 }
 
+/* An argument as a shell reads it back. */
+static void print_argument(const char *text)
+{
+    const bool plain = !text[strcspn(text, " '\"{}[]*?$&;|<>()")];
+    printf(plain ? " %s" : " '%s'", text);
+}
+
+/* Prints the command that follows the advice of the verdict. */
+static void print_next(const cli_args *args, const sdm_train_report *r)
+{
+    const sdm_verdict *v = &r->verdict;
+    char change[80];
+    if (!v->key[0] || !args->files.n) return;
+    // a given grid.size would cut the shapes
+    if (strcmp(v->key, "grid.spacing"))
+        snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
+    else
+        snprintf(change, sizeof change, "grid={spacing: %.6g}", v->to);
+    printf("  %-11s sdmgen train", v->grade == SDM_GRADE_GOOD ? "better" : "next");
+    for (size_t i = 0; i < args->files.n; i++) print_argument(args->files.items[i]);
+    print_argument(change);
+    for (size_t i = 0; i < args->plugins.n; i++) {
+        printf(" --plugin");
+        print_argument(args->plugins.items[i]);
+    }
+    printf(" --out %.*s-2\n", (int)(strrchr(r->model_path, '/') - r->model_path), r->model_path);
+}
+
 static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
                                 const cli_timing *times, const cli_ranks_use *use, sdm_error *err)
 {
@@ -128,6 +156,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
             "not kept\n",
             other_kind(r), r->other.rmse_mm, r->other_voxel_mm);
     cli_print_verdict(&r->verdict);
+    print_next(args, r);
     if (cli_warnings() > 0)
         printf("  warnings    %zu, at the beginning of the output: what they name the verdict does "
                "not "

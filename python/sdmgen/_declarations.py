@@ -197,7 +197,7 @@ typedef struct sdm_fit_opts { sdm_fit_model image_model; double l_ref; double bl
 typedef enum sdm_fit_check_kind { SDM_FIT_CHECK_NO_SHAPE = 0, SDM_FIT_CHECK_CONTRAST, SDM_FIT_CHECK_CAVITY, SDM_FIT_CHECK_IN_IMAGE, SDM_FIT_CHECK_CONVERGED, SDM_FIT_CHECK_RESIDUALS, SDM_FIT_CHECK_BESIDE, SDM_FIT_CHECK_EMPTY, SDM_FIT_CHECK_MISSING, SDM_FIT_CHECK_INSIDE, SDM_FIT_CHECK_OUTSIDE, SDM_FIT_CHECK_GIVEN, SDM_FIT_CHECK_BOUNDS, SDM_FIT_CHECK_BLOB, SDM_FIT_CHECK_KEPT_POSE, SDM_FIT_CHECK_MIRROR, SDM_FIT_CHECK_GRID, SDM_FIT_CHECK_NETWORK, SDM_FIT_CHECK_DATA, SDM_FIT_CHECK_SIZE, SDM_FIT_CHECK_VOXELS, SDM_FIT_CHECK_NEXT_POSE, SDM_FIT_CHECK_PATCH, SDM_FIT_CHECK_COVERED, SDM_FIT_N_CHECKS } sdm_fit_check_kind;
 const char *sdm_fit_check_name(sdm_fit_check_kind kind);
 typedef enum sdm_fit_grade { SDM_FIT_PASSED = 0, SDM_FIT_DOUBTFUL = 1, SDM_FIT_FAILED = 2 } sdm_fit_grade;
-typedef struct sdm_fit_finding { sdm_fit_check_kind kind; sdm_fit_grade grade; double figure, limit; char text[320]; } sdm_fit_finding;
+typedef struct sdm_fit_finding { sdm_fit_check_kind kind; sdm_fit_grade grade; double figure, limit; char text[512]; } sdm_fit_finding;
 typedef struct sdm_fit_verdict { sdm_fit_grade grade; size_t n_findings; sdm_fit_finding findings[SDM_FIT_N_CHECKS]; size_t n_units; double chi_square; } sdm_fit_verdict;
 sdm_fit_opts sdm_fit_defaults(void);
 sdm_fit_opts sdm_fit_defaults_for(double voxel);

@@ -115,24 +115,6 @@ static sdm_status check_parts(const sdm_mesh *m, size_t *n, double *thickness, s
     return s;
 }
 
-/* Lowers *thickness to that of the thinnest part of the shapes with all parameters at their lower
- * and at their upper ends. Where values near the ends are unlikely, they count for nothing. */
-static sdm_status check_ends(const dataset *d, double *thickness, sdm_error *err)
-{
-    for (size_t k = 0; k < d->n_params; k++)
-        if (d->distribution[k].kind != SDM_DISTRIBUTION_UNIFORM || !(d->max[k] > d->min[k]))
-            return SDM_OK;
-    sdm_mesh mesh = {0};
-    size_t ignored = 0;
-    sdm_status s = SDM_OK;
-    for (int upper = 0; upper < 2 && !s; upper++) {
-        s = sdm_instance_mesh(d->shape, upper ? d->max : d->min, &mesh, err);
-        if (!s) s = check_parts(&mesh, &ignored, thickness, err);
-    }
-    sdm_mesh_dispose(&mesh);
-    return s;
-}
-
 sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check *out,
                                  sdm_error *err)
 {
@@ -154,7 +136,6 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
         if (!s) s = check_surface(d, e, i, map, &sums, err);
         sdm_exact_free(e);
     }
-    if (!s) s = check_ends(d, &thickness, err);
     sdm_mesh_dispose(&mesh);
     sdm_free(map);
     *out = (surface_check){.rms_mm = sums.n > 0 ? sqrt(sums.square / sums.n) : NAN,

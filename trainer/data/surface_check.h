@@ -11,8 +11,7 @@ typedef struct surface_check {
     /* Fraction of the surface where no ball with the radius of a voxel fits into the shape: there
        it is thinner than two voxels, or has an edge or a corner. */
     double thin;
-    /* Thickness of the thinnest part of the compared shapes, and of the shapes with all parameters
-       at their lower and at their upper ends (part_audit.h), mm; NaN: not known. */
+    /* Thickness of the thinnest part of the compared shapes (part_audit.h), mm; NaN: not known. */
     double thickness_mm;
     /* Fraction of all held-out shapes with vertices beyond the outer voxel centres: their surfaces
        end open at the border of the grid. */

@@ -8,7 +8,6 @@
 #include "kind.h"
 #include "sdm/exact.h"
 #include "sdm/internal/model_threads.h"
-#include "sdm/internal/near.h"
 #include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/map.h"
@@ -146,7 +145,7 @@ static sdm_status check_slopes(const trainer *t, const sdm_model *m, const doubl
 {
     const dataset *d = &t->data;
     const size_t voxels = sdm_grid_count(d->grid);
-    const float near_mm = (float)sdm_grid_near(d->grid);
+    const float near_mm = (float)(0.5 * trainer_dataset_voxel(d));
     sdm_status s = beside_make(t, p, c, err);
     for (size_t k = 0; k < 2 * d->n_params && !s; k++)
         if (c->beside[k].cut) return SDM_OK;

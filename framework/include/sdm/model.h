@@ -43,8 +43,7 @@ typedef struct sdm_model_quality {
     /* Between the voxels: how far exact maps, interpolated linearly, miss the surface of held-out
        shapes, root mean square, mm. sdm_accuracy holds errors at the voxels only. */
     double between_mm;
-    /* thickness of the thinnest part of a few held-out shapes, and of those at both ends of all
-       ranges, mm; NaN: not known. Surfaces on
+    /* thickness of the thinnest part of a few held-out shapes, mm; NaN: not known. Surfaces on
        voxels larger than about 0.7 of it lack such a part, or show it broken. */
     double thickness_mm;
     /* of the mesh at the default parameters, the sum over its triangles; NaN: not known. A shape
@@ -52,7 +51,7 @@ typedef struct sdm_model_quality {
     double mesh_volume_mm3, mesh_area_mm2;
     /* On a few held-out shapes, root mean square over the right value; NaN: not known. Of the
        volume of a map (sdm_map_volume()); and, for the parameter for which they are largest: of the
-       derivatives of the map within sdm_accuracy.near_mm of the surface, and of the derivative of
+       derivatives of the map within half a voxel of the surface, and of the derivative of
        the volume. */
     double volume_error, derivative_error, volume_derivative_error;
     /* as mesh_volume_mm3 and mesh_area_mm2, at three other parameter vectors; NaN: not known */

@@ -217,6 +217,23 @@ void sdm_panel_scale_bar(sdm_canvas *c, sdm_box box, double pixels_per_mm)
                     text);
 }
 
+/* As many ticks as have room for their numbers below the bar. */
+static int bar_ticks(sdm_canvas *c, sdm_box box, double low, double high, double *first,
+                     double *step)
+{
+    int n = 0;
+    for (int wanted = box.w / 33; wanted > 0; wanted--) {
+        char text[32];
+        double widest = 0;
+        n = sdm_ticks(low, high, wanted, first, step);
+        for (int i = 0; i < n; i++)
+            widest = fmax(widest, sdm_canvas_text_width(
+                                      c, 9, false, sdm_tick_text(*first + i * *step, *step, text)));
+        if (widest + 8 <= *step / (high - low) * box.w) break;
+    }
+    return n;
+}
+
 void sdm_colour_bar(sdm_canvas *c, sdm_box box, sdm_colour_map map, double low, double high,
                     const char *caption)
 {
@@ -228,7 +245,7 @@ void sdm_colour_bar(sdm_canvas *c, sdm_box box, sdm_colour_map map, double low, 
     double first, step;
     char text[32];
     const sdm_type type = {.size = 9, .align = SDM_CENTRE, .colour = SDM_INK};
-    const int n = sdm_ticks(low, high, box.w / 33, &first, &step);
+    const int n = bar_ticks(c, box, low, high, &first, &step);
     for (int i = 0; i < n; i++) {
         const double v = first + i * step, x = box.x + (v - low) / (high - low) * box.w;
         sdm_canvas_line(c, x, box.y + box.h + 1, x, box.y + box.h + 5, 1, SDM_INK_LIGHT);

@@ -11,7 +11,7 @@ typedef struct fit_at_bounds {
     char names[100];
     /* "base ends at its bound: the data want more than 60, the largest value of its range", of
        the parameter that the data want farthest beyond; else "" */
-    char text[240];
+    char text[320];
     /* the data are longer or shorter than the shape by a length that this parameter would explain:
        `text` says how large it would have to be */
     bool measured;

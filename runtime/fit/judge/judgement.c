@@ -84,8 +84,8 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
             v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > SDM_FIT_PREFERRED, SDM_FIT_FAILED, r->evidence,
             SDM_FIT_PREFERRED,
             "the image shows no such shape near the start: explaining it without one is %s by %.3g "
-            "(log-likelihood of independent voxels); check the start pose, and whether the inside "
-            "is %s than the outside in this image",
+            "(log-likelihood of independent voxels); check the start pose, whether the inside is "
+            "%s than the outside in this image, and whether it shows this shape at all",
             r->evidence < 0 ? "better" : "worse only", fabs(r->evidence),
             darker ? "darker" : "brighter");
         sdm_fit_judge_add(

@@ -65,6 +65,7 @@ typedef struct start {
 typedef struct nearest {
     double gain;
     size_t param;       /* as start.param */
+    double value;       /* of this parameter */
     char symmetry[240]; /* how the surface may be turned and stays the same; "": not at all */
 } nearest;
 
@@ -293,11 +294,14 @@ static sdm_status values_rank(fit_problem *p, const own_fit *own, start *list, s
     return s;
 }
 
-static void nearest_take(nearest *least, const fit_standing *fit, const fit_standing *rival,
-                         size_t param)
+static void nearest_take(nearest *least, const fit_problem *p, const fit_standing *fit,
+                         const fit_standing *rival, size_t param)
 {
     const double gain = sdm_fit_gain(fit, rival);
-    if (!(least->gain <= gain) && !isnan(gain)) least->gain = gain, least->param = param;
+    if (least->gain <= gain || isnan(gain)) return;
+    least->gain = gain;
+    least->param = param;
+    if (param) least->value = p->state.params[param - 1];
 }
 
 // Lowers *least where the fit, turned to a surface that is nearly its own, climbs to a better
@@ -315,7 +319,7 @@ static sdm_status compare_alike(fit_problem *p, own_fit *own, const turns *t, ne
         s = challenge(p, own, &t->alike[i], SAME, &other, &rival, err);
         if (!s && other && fit.chi_square >= BETTER * rival.chi_square &&
             sdm_fit_gain(&fit, &rival) < -SDM_FIT_PREFERRED)
-            nearest_take(least, &fit, &rival, 0);
+            nearest_take(least, p, &fit, &rival, 0);
     }
     return s;
 }
@@ -352,16 +356,16 @@ static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_e
     if (!s && p->has_runner_up) {
         const start from = {.state = p->runner_up};
         s = challenge(p, own, &from, ALIKE, &other, &rival, err);
-        if (!s && other) nearest_take(least, &fit, &rival, 0);
+        if (!s && other) nearest_take(least, p, &fit, &rival, 0);
     }
     other = false;
     for (size_t i = 0; !s && i < t->n_other && i < TRIES_MAX && !other; i++) {
         s = challenge(p, own, &t->other[i], ALIKE, &other, &rival, err);
-        if (!s && other) nearest_take(least, &fit, &rival, 0);
+        if (!s && other) nearest_take(least, p, &fit, &rival, 0);
     }
     for (size_t i = 0; i < n_values && !s; i++) {
         s = challenge(p, own, &value[i], ALIKE, &other, &rival, err);
-        if (!s && other) nearest_take(least, &fit, &rival, value[i].param);
+        if (!s && other) nearest_take(least, p, &fit, &rival, value[i].param);
     }
     if (!s) s = compare_alike(p, own, t, least, err);
     sdm_free(t);
@@ -408,7 +412,8 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     double low, high;
     char where[100] = "in another pose", text[300];
     if (least.param) sdm_fit_bounds(p->source, least.param - 1, &low, &high, &name);
-    if (name) snprintf(where, sizeof where, "with another value of %.60s", name);
+    if (name)
+        snprintf(where, sizeof where, "with another value of %.60s, %.4g,", name, least.value);
     snprintf(text, sizeof text,
              "the shape %s explains the data %s (log-likelihood of the fit less that of the other: "
              "%.2g): give a nearer start, or more turns",

@@ -359,7 +359,7 @@ typedef struct sdm_fit_finding {
     /* the figure, and the limit that separates passed from the rest; NaN: none */
     double figure, limit;
     /* why the check did not pass, or why it has no figure; empty: it passed with a figure */
-    char text[320];
+    char text[512];
 } sdm_fit_finding;
 
 /* All checks of a fit in the order of their kinds, those that do not apply left out. */

@@ -63,17 +63,15 @@ typedef struct sdm_verdict {
     double degree, ridge;
     double thin; /* fraction of the surface where the shape is thinner than two voxels or has an
                     edge */
-    /* of the thinnest part of a few held-out shapes and those at the ends of the ranges; NaN: not
-       known */
-    double thickness_mm;
-    double coarse_mm; /* largest spacing of the grid */
+    double thickness_mm; /* of the thinnest part of a few held-out shapes; NaN: not known */
+    double coarse_mm;    /* largest spacing of the grid */
     double cut; /* fraction of the held-out shapes whose surfaces leave the grid: there they end
                    open */
     /* fraction of a few held-out shapes with parts that are inside out and overlap others */
     double inside_out;
     /* On a few held-out shapes, over the right value; NaN: not measured. Volumes of maps: root mean
        square, and the largest. Derivatives by the parameter for which they are worst, root mean
-       square: of maps within near_mm of the surface, and of the volume of maps. */
+       square: of maps within half a voxel of the surface, and of the volume of maps. */
     double volume_error, volume_error_max, derivative_error, volume_derivative_error;
     char derivative_by[64], volume_derivative_by[64]; /* names of these parameters; "": none */
     double saved_seconds;                             /* that train.patience has saved */

@@ -148,13 +148,19 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
            "%.5f mm, largest %.5f mm\n",
            (long long)a->samples, a->mse_mm2, a->rmse_mm, a->near_mm, a->rmse_near_mm,
            a->max_abs_mm);
+    // errors far away count for little in the choice, but for something
+    const bool better = r->compared && r->other_voxel_mm < r->verdict.rmse_voxel_mm;
     cli_print_two("  time        ", times);
     if (use->n > 1) print_ranks(use);
     if (r->compared)
         printf(
             "  auto        trained %s, too: RMSE %.5f mm, within a voxel of the surface %.5f mm; "
-            "not kept\n",
-            other_kind(r), r->other.rmse_mm, r->other_voxel_mm);
+            "not kept%s%s%s\n",
+            other_kind(r), r->other.rmse_mm, r->other_voxel_mm,
+            better ? ": better at the surface, "
+                     "but worse elsewhere (network.kind="
+                   : "",
+            better ? other_kind(r) : "", better ? " keeps it)" : "");
     cli_print_verdict(&r->verdict);
     print_next(args, r);
     if (cli_warnings() > 0)

@@ -58,6 +58,12 @@ sdm_onnx_value sdm_template_onnx(const sdm_model *m, sdm_onnx *g, sdm_onnx_value
     return sdm_point_onnx(m, g, x);
 }
 
+void sdm_pod_decode_back(const pod_network *k, const sdm_grid *grid, const float *adjoint,
+                         const pod_scratch *w, float *dz)
+{
+    (void)k, (void)grid, (void)adjoint, (void)w, (void)dz;
+}
+
 size_t sdm_template_vjp_scratch_bytes(const sdm_model *m)
 {
     (void)m;

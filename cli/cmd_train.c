@@ -71,11 +71,18 @@ static void print_ranks(const cli_ranks_use *use)
            use->by, 1e-6 * (double)least, 1e-6 * (double)most, 1e-6 * (double)all);
 }
 
-/* An argument as a shell reads it back. */
-static void print_argument(const char *text)
+/* Text as a shell reads it back: in quotes unless it is plain. */
+static void print_quoted(const char *text)
 {
-    const bool plain = !text[strcspn(text, " '\"{}[]*?$&;|<>()")];
-    printf(plain ? " %s" : " '%s'", text);
+    const char *const plain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789"
+                              "_./=,:+@%-";
+    if (*text && !text[strspn(text, plain)]) {
+        printf(" %s", text);
+        return;
+    }
+    printf(" '");
+    for (; *text; text++) printf(*text == '\'' ? "'\\''" : "%c", *text);
+    printf("'");
 }
 
 /* Prints the command that follows the advice of the verdict. */
@@ -83,20 +90,27 @@ static void print_next(const cli_args *args, const sdm_train_report *r)
 {
     const sdm_verdict *v = &r->verdict;
     char change[80];
-    if (!v->key[0] || !args->files.n) return;
+    char folder[sizeof r->model_path + 8];
+    const char *slash = strrchr(r->model_path, '/');
+    // options for many processes, files of maps or plug-ins that crash are the user's to repeat
+    if (!v->key[0] || !args->files.n || !slash || args->ranks || args->dataset || args->isolate)
+        return;
+    snprintf(folder, sizeof folder, "%.*s-2", (int)(slash - r->model_path), r->model_path);
     // a given grid.size would cut the shapes
     if (strcmp(v->key, "grid.spacing"))
         snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
     else
         snprintf(change, sizeof change, "grid={spacing: %.6g}", v->to);
     printf("  %-11s sdmgen train", v->grade == SDM_GRADE_GOOD ? "better" : "next");
-    for (size_t i = 0; i < args->files.n; i++) print_argument(args->files.items[i]);
-    print_argument(change);
+    for (size_t i = 0; i < args->files.n; i++) print_quoted(args->files.items[i]);
+    print_quoted(change);
     for (size_t i = 0; i < args->plugins.n; i++) {
         printf(" --plugin");
-        print_argument(args->plugins.items[i]);
+        print_quoted(args->plugins.items[i]);
     }
-    printf(" --out %.*s-2\n", (int)(strrchr(r->model_path, '/') - r->model_path), r->model_path);
+    printf(" --out");
+    print_quoted(folder);
+    printf("\n");
 }
 
 static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,

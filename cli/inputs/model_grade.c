@@ -43,7 +43,7 @@ void cli_warn_derivatives(const char *path, const sdm_model_info *m)
     const double error = m->quality.derivative_error;
     if (error > SDM_DERIVATIVE_BAD)
         cli_warn("%s: derivatives of its maps are off by %.0f %% for the worst parameter, which "
-                 "the training named (sdmgen info)",
+                 "the training named at its end",
                  path, 100 * error);
 }
 
@@ -64,10 +64,13 @@ void cli_print_quality(const sdm_model_quality *q)
         cli_print("             the thinnest part of the held-out shapes is %.2g mm thick\n",
                   q->thickness_mm);
     if (!isnan(q->volume_error))
-        cli_print("             volumes of maps are off by %.3g %%", 100 * q->volume_error);
-    if (!isnan(q->volume_error) && !isnan(q->derivative_error))
-        cli_print("; derivatives by the worst parameter, of maps near the surface by %.3g %%, of "
-                  "volumes by %.3g %%",
-                  100 * q->derivative_error, 100 * q->volume_derivative_error);
-    if (!isnan(q->volume_error)) cli_print("\n");
+        cli_print("             volumes of maps are off by %.3g %%\n", 100 * q->volume_error);
+    if (!isnan(q->derivative_error))
+        cli_print("             derivatives of maps near the surface are off by %.3g %% for the "
+                  "worst parameter\n",
+                  100 * q->derivative_error);
+    if (!isnan(q->volume_derivative_error))
+        cli_print(
+            "             derivatives of volumes are off by %.3g %% for the worst parameter\n",
+            100 * q->volume_derivative_error);
 }

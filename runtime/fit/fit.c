@@ -562,10 +562,11 @@ static sdm_status attempt_again(fit_problem *p, bool exact, sdm_fit_result *out,
     p->maps.exact = exact;
     p->maps_params[0] = NAN;
     sdm_status s = sdm_fit_other_values(p, again, err);
+    const double seconds = sdm_clock() - from;
+    out->seconds_search += seconds;
     if (s || !*again) return s;
     s = attempt_renew(p, out, err);
     if (!s) s = points_start(p, err);
-    out->seconds_search += sdm_clock() - from;
     return s ? s : attempt(p, out, fitted, err);
 }
 

@@ -26,7 +26,7 @@ static const double VOLUME_CHANGE = 0.05;
 
 static const size_t JACOBIAN_BYTES = 1000000000;
 
-/* The exact shape at some parameters. */
+/* The exact shape at some parameters; of one that the grid cuts no more is known. */
 typedef struct exact_shape {
     double volume; // mm^3
     float *map;    // NULL: not wanted
@@ -45,16 +45,17 @@ static sdm_status exact_make(const dataset *d, const double *p, exact_shape *out
     sdm_mesh mesh = {0};
     sdm_exact *e = NULL;
     sdm_status s = sdm_instance_mesh(d->shape, p, &mesh, err);
-    if (!s) s = sdm_exact_create(&mesh, &opts, &e, err);
-    if (!s) {
+    out->cut = false;
+    for (size_t v = 0; v < mesh.n_vert && !s && !out->cut; v++)
+        out->cut = sdm_grid_beyond(d->grid, mesh.vert + 3 * v, NULL) > 0;
+    if (!s && !out->cut) s = sdm_exact_create(&mesh, &opts, &e, err);
+    if (!s && !out->cut) {
         const sdm_mesh *surface = sdm_exact_surface(e);
         const double apex[3] = {0, 0, 0};
         double area = 0;
-        out->volume = 0, out->cut = false;
+        out->volume = 0;
         for (size_t t = 0; t < surface->n_tri; t++)
             sdm_triangle_add(surface, t, apex, &area, &out->volume);
-        for (size_t v = 0; v < mesh.n_vert && !out->cut; v++)
-            out->cut = sdm_grid_beyond(d->grid, mesh.vert + 3 * v, NULL) > 0;
         if (out->map) s = sdm_exact_map(e, d->grid, out->map, err);
     }
     sdm_exact_free(e);
@@ -121,6 +122,7 @@ static sdm_status beside_make(const trainer *t, const double *p, check_memory *c
     const dataset *d = &t->data;
     const int64_t n = 2 * (int64_t)d->n_params;
     sdm_status status = SDM_OK;
+    int64_t failed = n; // the first neighbour that failed, whichever thread is first
 #pragma omp parallel for schedule(dynamic) num_threads(t->n_threads)
     for (int64_t i = 0; i < n; i++) {
         const size_t k = (size_t)i / 2;
@@ -128,13 +130,14 @@ static sdm_status beside_make(const trainer *t, const double *p, check_memory *c
         sdm_error own = {0};
         memcpy(q, p, d->n_params * sizeof *q);
         q[k] += (i % 2 ? 1 : -1) * STEP * (d->max[k] - d->min[k]);
+        q[k] = fmin(fmax(q[k], d->min[k]), d->max[k]); // rounding may lead beyond
         const sdm_status s = exact_make(d, q, &c->beside[i], &own);
         if (s)
 #pragma omp critical(sdm_derivative_check)
-        {
-            status = s;
-            if (err) *err = own;
-        }
+            if (i < failed) {
+                failed = i, status = s;
+                if (err) *err = own;
+            }
     }
     return status;
 }
@@ -193,7 +196,8 @@ sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, deriva
 {
     const dataset *d = &t->data;
     const size_t bytes = d->n_params * sdm_grid_count(d->grid) * sizeof(float);
-    const bool slopes = bytes <= JACOBIAN_BYTES && !t->kind->slow;
+    // the exact maps on both sides take twice as much
+    const bool slopes = 3 * bytes <= JACOBIAN_BYTES && !t->kind->slow;
     const size_t wanted = least_of(SHAPES, 1 + (SHAPES_TIMES_PARAMS - 1) / d->n_params);
     check_memory c = {0};
     slope_sums sums[SDM_POD_MAX_PARAMS] = {{0}};
@@ -201,7 +205,7 @@ sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, deriva
     size_t n = 0, n_slopes = 0;
     *out = (derivative_check){NAN, NAN, NAN, NAN, 0, 0};
     sdm_status s = memory_create(t, m, slopes, &c, err);
-    for (size_t i = 0; i < d->n_holdout && n < VOLUMES && !s; i++)
+    for (size_t i = 0; i < least_of(d->n_holdout, 4 * VOLUMES) && n < VOLUMES && !s; i++)
         s = check_volume(t, m, i, &c, &square, &largest, &n, err);
     for (size_t i = 0; slopes && i < least_of(d->n_holdout, 4 * wanted) && n_slopes < wanted && !s;
          i++) {

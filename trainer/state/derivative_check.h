@@ -18,7 +18,8 @@ typedef struct derivative_check {
     size_t slope_param, volume_slope_param;
 } derivative_check;
 
-/* Measures m. Computes about 64 exact maps. A model whose derivatives take more than 1 GB, or whose
+/* Measures m. Computes about 64 exact maps, or two for each parameter if that is more. A model
+ * whose derivatives and the maps to compare them with take more than 1 GB, or whose
    network is slow (t->kind->slow), has its volumes measured only. [t->n_threads threads; the same
    bits for any number] */
 sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, derivative_check *out,

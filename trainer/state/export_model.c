@@ -344,7 +344,11 @@ static sdm_status set_quality(const sdm_verdict *v, const trainer *t, const sdm_
     for (size_t k = 0; k < SDM_MODEL_PROBES && !s; k++) {
         for (size_t i = 0; i < info->n_params; i++)
             p[i] = sdm_probe_param(k, i, info->params[i].min, info->params[i].max);
-        s = sdm_shape_sums(t->data.shape, p, &q->probe_volume_mm3[k], &q->probe_area_mm2[k], err);
+        // a place where mesh() fails tells nothing
+        const sdm_status one =
+            sdm_shape_sums(t->data.shape, p, &q->probe_volume_mm3[k], &q->probe_area_mm2[k], err);
+        if (one == SDM_E_NOMEM) s = one;
+        if (one) q->probe_volume_mm3[k] = q->probe_area_mm2[k] = NAN;
     }
     return s;
 }
@@ -364,7 +368,12 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
                      "the trained network gives numbers that are not finite: use "
                      "network.weights=f32 or lower the "
                      "learning rates");
-    if (!s) s = trainer_derivative_check(t, model, &more.derivatives, err);
+    sdm_error why = {0};
+    if (!s && trainer_derivative_check(t, model, &more.derivatives, &why)) {
+        // no reason to lose the network: a notice only
+        more.derivatives = (derivative_check){NAN, NAN, NAN, NAN, 0, 0};
+        trainer_message(t, "volumes and derivatives were not measured: %s", why.text);
+    }
     sdm_model_free(model);
     if (!s) {
         t->heldout_mse = t->accuracy.mse_mm2;

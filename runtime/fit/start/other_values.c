@@ -134,8 +134,9 @@ sdm_status sdm_fit_other_values(fit_problem *p, bool *found, sdm_error *err)
     sdm_status s = sdm_fit_samples_near(p, SAMPLES_OF_KEPT, err);
     if (!s && p->samples.n) s = sdm_fit_evaluate(p, err);
     if (s || !p->samples.n) return s;
-    // of every `stride`-th voxel fewer count as one
-    const double correlated = fmax(p->noise_factor / pow((double)p->stride, 3), 1);
+    // of every `stride`-th voxel, along each axis, or point fewer count as one
+    const double fewer = pow((double)p->stride, p->target->kind == SDM_FIT_POINTS ? 1 : 3),
+                 correlated = fmax(p->noise_factor / fewer, 1);
     double least = sdm_fit_objective(p) + GAIN_LEAST * correlated;
     s = SDM_ALLOC(&inside, p->samples.n, "start of the fit", err);
     for (size_t i = 0; i < p->samples.n && !s; i++) inside[i] = is_inside(p, i);
@@ -149,7 +150,7 @@ sdm_status sdm_fit_other_values(fit_problem *p, bool *found, sdm_error *err)
         if (!s) s = sdm_fit_evaluate(p, err);
         if (!s && sdm_fit_objective(p) > least && !is_alike(p, inside))
             *found = true, least = sdm_fit_objective(p), best = p->state;
-        if (s == SDM_E_QUALITY) s = SDM_OK; // this start leads nowhere
+        if (s != SDM_E_NOMEM && s != SDM_E_CANCELLED) s = SDM_OK; // else it leads nowhere
     }
     sdm_free(inside);
     p->state = best;

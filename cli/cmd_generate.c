@@ -9,7 +9,6 @@
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "measure/measures.h"
-#include "report/files.h"
 #include "report/generate_files.h"
 #include "report/json_values.h"
 #include "report/output.h"
@@ -138,10 +137,7 @@ static sdm_status read_rows(job *j, sdm_error *err)
 /* Is a surface compared with the shape? A level set only if it is the only one. */
 static bool compares_surface(const job *j)
 {
-    bool level_set = false;
-    for (size_t i = 0; i < j->args->outputs.n; i++)
-        level_set = level_set || cli_ends_with(j->args->outputs.items[i], ".vdb");
-    return cli_writes_surface(j->args) || (level_set && j->n_rows == 1);
+    return cli_writes_surface(j->args) || (cli_writes_level_set(j->args) && j->n_rows == 1);
 }
 
 /* Creates the shape if --check, --max-error, --measure, --policy exact or --outside exact need

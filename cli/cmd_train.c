@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "args/shell_word.h"
 #include "commands.h"
 #include "inputs/config_shape.h"
 #include "inputs/ranks.h"
@@ -71,45 +72,53 @@ static void print_ranks(const cli_ranks_use *use)
            use->by, 1e-6 * (double)least, 1e-6 * (double)most, 1e-6 * (double)all);
 }
 
-/* Text as a shell reads it back: in quotes unless it is plain. */
-static void print_quoted(const char *text)
+/* Appends " word" to a command. */
+static void add_word(sdm_text *command, const char *word)
 {
-    const char *const plain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789"
-                              "_./=,:+@%-";
-    if (*text && !text[strspn(text, plain)]) {
-        printf(" %s", text);
-        return;
-    }
-    printf(" '");
-    for (; *text; text++) printf(*text == '\'' ? "'\\''" : "%c", *text);
-    printf("'");
+    sdm_text_add(command, " ");
+    cli_add_shell_word(command, word);
 }
 
 /* Prints the command that follows the advice of the verdict. */
 static void print_next(const cli_args *args, const sdm_train_report *r)
 {
     const sdm_verdict *v = &r->verdict;
-    char change[80];
-    char folder[sizeof r->model_path + 8];
     const char *slash = strrchr(r->model_path, '/');
+    char change[80], folder[sizeof r->model_path + 8];
+    sdm_text command = {0};
     // options for many processes, files of maps or plug-ins that crash are the user's to repeat
     if (!v->key[0] || !args->files.n || !slash || args->ranks || args->dataset || args->isolate)
         return;
-    snprintf(folder, sizeof folder, "%.*s-2", (int)(slash - r->model_path), r->model_path);
-    // a given grid.size would cut the shapes
+    // a grid.size of the configuration, with other voxels, would cut the shapes
     if (strcmp(v->key, "grid.spacing"))
         snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
     else
         snprintf(change, sizeof change, "grid={spacing: %.6g}", v->to);
-    printf("  %-11s sdmgen train", v->grade == SDM_GRADE_GOOD ? "better" : "next");
-    for (size_t i = 0; i < args->files.n; i++) print_quoted(args->files.items[i]);
-    print_quoted(change);
+    snprintf(folder, sizeof folder, "%.*s-2", (int)(slash - r->model_path), r->model_path);
+    for (size_t i = 0; i < args->files.n; i++) add_word(&command, args->files.items[i]);
+    add_word(&command, change);
     for (size_t i = 0; i < args->plugins.n; i++) {
-        printf(" --plugin");
-        print_quoted(args->plugins.items[i]);
+        add_word(&command, "--plugin");
+        add_word(&command, args->plugins.items[i]);
     }
-    printf(" --out");
-    print_quoted(folder);
+    add_word(&command, "--out");
+    add_word(&command, folder);
+    if (!command.failed)
+        printf("  %-11s sdmgen train%s\n", v->grade == SDM_GRADE_GOOD ? "better" : "next",
+               command.data);
+    sdm_text_dispose(&command);
+}
+
+/* Tells of the kind that network.kind: auto has trained and not kept, and what it was better at. */
+static void print_other(const sdm_train_report *r)
+{
+    printf(
+        "  auto        trained %s, too: RMSE %.5f mm, within a voxel of the surface %.5f mm; not "
+        "kept",
+        other_kind(r), r->other.rmse_mm, r->other_voxel_mm);
+    if (r->other_voxel_mm < r->verdict.rmse_voxel_mm)
+        printf(": better at the surface, but worse elsewhere (network.kind=%s keeps it)",
+               other_kind(r));
     printf("\n");
 }
 
@@ -162,25 +171,14 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
            "%.5f mm, largest %.5f mm\n",
            (long long)a->samples, a->mse_mm2, a->rmse_mm, a->near_mm, a->rmse_near_mm,
            a->max_abs_mm);
-    // errors far away count for little in the choice, but for something
-    const bool better = r->compared && r->other_voxel_mm < r->verdict.rmse_voxel_mm;
     cli_print_two("  time        ", times);
     if (use->n > 1) print_ranks(use);
-    if (r->compared)
-        printf(
-            "  auto        trained %s, too: RMSE %.5f mm, within a voxel of the surface %.5f mm; "
-            "not kept%s%s%s\n",
-            other_kind(r), r->other.rmse_mm, r->other_voxel_mm,
-            better ? ": better at the surface, "
-                     "but worse elsewhere (network.kind="
-                   : "",
-            better ? other_kind(r) : "", better ? " keeps it)" : "");
+    if (r->compared) print_other(r);
     cli_print_verdict(&r->verdict);
     print_next(args, r);
     if (cli_warnings() > 0)
         printf("  warnings    %zu, at the beginning of the output: what they name the verdict does "
-               "not "
-               "see\n",
+               "not see\n",
                cli_warnings());
     return SDM_OK;
 }

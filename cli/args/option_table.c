@@ -228,8 +228,7 @@ const cli_option cli_options[] = {
      "centre of the first voxel, LPS mm; default: the grid is centred on the mesh"},
     {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576, ON(CLI_GENERATE), AT(size),
      "voxels along x, y, z (default: the grid fills the box of the model's voxel centres). In "
-     "other "
-     "proportions than this box the grid leaves it unless --spacing is given: --outside"},
+     "other proportions than this box the grid leaves it unless --spacing is given: --outside"},
     {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_GENERATE), AT(spacing),
      "voxel edge, one number or one per axis (default: the model's; with --size the smallest one "
      "with which the grid covers the model's box)"},

@@ -3,22 +3,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "args/shell_word.h"
 #include "fit_command.h"
 #include "inputs/input_checksum.h"
-
-/* Appends a word as a shell reads it: in quotes where it holds more than plain characters. */
-static void add_word(sdm_text *t, const char *word)
-{
-    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
-                                "-_=+.,:/@%";
-    if (*word && !word[strspn(word, plain)]) {
-        sdm_text_add(t, "%s", word);
-        return;
-    }
-    sdm_text_add(t, "'");
-    for (; *word; word++) sdm_text_add(t, *word == '\'' ? "'\\''" : "%c", *word);
-    sdm_text_add(t, "'");
-}
 
 /* Adds a file with its checksum; no file of this name: nothing. */
 static void add_file(sdm_json *j, const char *path)
@@ -40,7 +27,7 @@ void cli_fit_json_repeat(const cli_fit *f, sdm_json *j)
     sdm_text_add(&command, "sdmgen");
     for (int i = 1; i < a->argc; i++) {
         sdm_text_add(&command, " ");
-        add_word(&command, a->argv[i]);
+        cli_add_shell_word(&command, a->argv[i]);
     }
     if (command.failed)
         j->text.failed = true;

@@ -72,16 +72,20 @@ sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
     return kind == KIND_PICTURE ? sdm_picture_check(path, err) : SDM_OK;
 }
 
+bool cli_writes_level_set(const cli_args *args)
+{
+    for (size_t i = 0; i < args->outputs.n; i++)
+        if (kind_of(args->outputs.items[i], NULL) == KIND_VDB) return true;
+    return false;
+}
+
 sdm_status cli_check_vdb_options(const cli_args *args, sdm_error *err)
 {
     const char *given = args->dense      ? "--dense"
                         : args->half     ? "--half"
                         : args->band > 0 ? "--band"
                                          : NULL;
-    bool vdb = false;
-    for (size_t i = 0; i < args->outputs.n; i++)
-        vdb = vdb || kind_of(args->outputs.items[i], NULL) == KIND_VDB;
-    if (given && !vdb)
+    if (given && !cli_writes_level_set(args))
         return sdm_fail(err, SDM_E_ARG, "%s: %s does nothing without an output -o FILE.vdb",
                         args->command->name, given);
     if (args->dense && args->band > 0)

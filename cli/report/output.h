@@ -45,6 +45,9 @@ void cli_map_compare(const sdm_mesh *shape, cli_map *map);
 /* True if an output of the command line is a surface. */
 bool cli_writes_surface(const cli_args *args);
 
+/* True if an output of the command line is a level set (.vdb). */
+bool cli_writes_level_set(const cli_args *args);
+
 /* Checks, before any work, that the ending of the name is a known type; meshes_only: a known type
  * of mesh files. SDM_E_ARG; SDM_E_UNSUPPORTED: .vdb in a build without OpenVDB. */
 sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err);

@@ -48,7 +48,7 @@ static bool is_coarse(const sdm_verdict *v)
     return v->thin >= EDGES_MANY && v->thickness_mm < VOXELS_MANY * v->coarse_mm;
 }
 
-/* Begins a line of the list of purposes for which the model is not good. */
+/* Begins a line: with the label "not for" if it is the first of the list, else with spaces. */
 static void not_for(bool *first)
 {
     printf("  %-11s ", *first ? "not for" : "");

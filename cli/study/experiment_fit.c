@@ -152,8 +152,9 @@ static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *s
     // measure the overlap
     out->dice = NAN;
     const sdm_fit_source exact = {.shape = job->shape, .grid = job->maker.grid};
-    const bool shown = !wrong || method->wrong == SDM_EXPERIMENT_MOVED; // the image has the shape
-    if (!s && shown && !*method->shows)
+    // does the image show the shape, so that there is something to overlap with?
+    const bool shown = !*method->shows && (!method->wrong || method->wrong == SDM_EXPERIMENT_MOVED);
+    if (!s && shown)
         s = measure_dice(polish ? &exact : source, &r, p, &out->dice, err);
     else if (s && s != SDM_E_QUALITY)
         s = sdm_fail(err, s, "%s", why->text);

@@ -105,9 +105,7 @@ static bool has_fits(const cli_experiment_result *r)
     return r->state == CLI_EXPERIMENT_DONE && r->fits;
 }
 
-/* From this Dice coefficient on a fit that started beside the shape has found it: it is no wrong
- * one.
- */
+/* A fit that started beside the shape has found it, and is right, from this Dice coefficient on. */
 static const double FOUND_DICE = 0.9;
 
 /* Adds the number of right and of wrong fits, and how many of them were accepted, where the

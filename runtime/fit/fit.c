@@ -83,7 +83,7 @@ sdm_fit_opts sdm_fit_defaults(void)
         .margin = 1.5,
         .least_inside = 0.5,
         .beside = 0.3,
-        .max_iterations = 60,
+        .max_iterations = FIT_ITERATIONS_USUAL,
         .max_polish_iterations = 0,
         .eps = 1e-4,
         .polish_eps = 3e-6,
@@ -570,7 +570,8 @@ static sdm_status attempt_again(fit_problem *p, bool exact, sdm_fit_result *out,
     return s ? s : attempt(p, out, fitted, err);
 }
 
-/* Attempts until one is accepted or no better start is found. */
+/* Fits and judges, and begins again from another value of a parameter as long as the fit is refused
+ * and such a value explains the data better. */
 static sdm_status attempts(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;

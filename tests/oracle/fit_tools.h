@@ -101,6 +101,32 @@ static inline sdm_fit_result fit(const sdm_fit_target *t, const sdm_fit_opts *o)
     return r;
 }
 
+/* Fits a shape of this table to the labels of its mesh at truth[n_params], on the grid g, which is
+ * also that of the maps. */
+static inline sdm_status fit_labels_of(const sdm_shape *table, const double *truth,
+                                       const sdm_grid *g, const sdm_fit_opts *o, sdm_fit_result *r,
+                                       sdm_error *err)
+{
+    sdm_instance *shape = NULL;
+    sdm_mesh mesh = {0};
+    sdm_exact *e = NULL;
+    float *v = calloc(sdm_grid_count(g), sizeof *v);
+    if (!v || sdm_instance_create(table, NULL, 0, NULL, &shape, NULL) ||
+        sdm_instance_mesh(shape, truth, &mesh, NULL) || sdm_exact_create(&mesh, NULL, &e, NULL) ||
+        sdm_exact_map(e, g, v, NULL))
+        abort();
+    for (size_t i = 0; i < sdm_grid_count(g); i++) v[i] = v[i] < 0;
+    const sdm_fit_source source = {.shape = shape, .grid = *g};
+    const sdm_fit_target t = {.kind = SDM_FIT_LABEL, .grid = *g, .values = v};
+    *err = (sdm_error){0};
+    const sdm_status s = sdm_fit(&source, &t, o, r, err);
+    sdm_exact_free(e);
+    sdm_mesh_dispose(&mesh);
+    sdm_instance_free(shape);
+    free(v);
+    return s;
+}
+
 /* Errors of a fit: e[n_params + 6] in the order of the covariance matrix: parameters, rotation
  * vector (rad, about the axes of the world frame), translation (mm). */
 static inline void errors(const sdm_fit_result *r, const double *p, const sdm_pose *pose, double *e)

@@ -1,7 +1,7 @@
 /* A goblet: a ball on a thin stem with a flat foot. A fit to labels that starts with a stem twice
  * as long brings the ball to its place and leaves the foot in the air beyond the labels, where no
  * small change of the stem brings it nearer. It goes on from another value of the stem. Tests:
- * other_values.c, principal_axes.c */
+ * other_values.c principal_axes.c start_list.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -50,26 +50,9 @@ static sdm_status fit_goblet(double stem, sdm_fit_result *r, sdm_error *err)
 {
     const double truth[GOBLET_PARAMS] = {stem, 6.5};
     const sdm_grid g = sdm_grid_centred((int64_t[3]){30, 30, 90}, 0.7, (double[3]){0, 0, -18});
-    sdm_instance *shape = NULL;
-    sdm_mesh mesh = {0};
-    sdm_exact *e = NULL;
-    float *v = calloc(sdm_grid_count(&g), sizeof *v);
-    if (!v || sdm_instance_create(&goblet, NULL, 0, NULL, &shape, NULL) ||
-        sdm_instance_mesh(shape, truth, &mesh, NULL) || sdm_exact_create(&mesh, NULL, &e, NULL) ||
-        sdm_exact_map(e, &g, v, NULL))
-        abort();
-    for (size_t i = 0; i < sdm_grid_count(&g); i++) v[i] = v[i] < 0;
-    const sdm_fit_source source = {.shape = shape, .grid = g};
-    const sdm_fit_target t = {.kind = SDM_FIT_LABEL, .grid = g, .values = v};
     sdm_fit_opts o = sdm_fit_defaults();
     o.polish_eps = 1e-3;
-    *err = (sdm_error){0};
-    const sdm_status s = sdm_fit(&source, &t, &o, r, err);
-    sdm_exact_free(e);
-    sdm_mesh_dispose(&mesh);
-    sdm_instance_free(shape);
-    free(v);
-    return s;
+    return fit_labels_of(&goblet, truth, &g, &o, r, err);
 }
 
 static void a_wrong_length_is_left(void **state)

@@ -53,27 +53,10 @@ static sdm_status fit_pin(double lower, bool turned, sdm_fit_result *r, sdm_erro
 {
     const double truth[PIN_PARAMS] = {18, lower};
     const sdm_grid g = sdm_grid_centred((int64_t[3]){30, 30, 70}, 0.5, (double[3]){0, 0, 0});
-    sdm_instance *shape = NULL;
-    sdm_mesh mesh = {0};
-    sdm_exact *e = NULL;
-    float *v = calloc(sdm_grid_count(&g), sizeof *v);
-    if (!v || sdm_instance_create(&pin, NULL, 0, NULL, &shape, NULL) ||
-        sdm_instance_mesh(shape, truth, &mesh, NULL) || sdm_exact_create(&mesh, NULL, &e, NULL) ||
-        sdm_exact_map(e, &g, v, NULL))
-        abort();
-    for (size_t i = 0; i < sdm_grid_count(&g); i++) v[i] = v[i] < 0;
-    const sdm_fit_source source = {.shape = shape, .grid = g};
-    const sdm_fit_target t = {.kind = SDM_FIT_LABEL, .grid = g, .values = v};
     sdm_fit_opts o = sdm_fit_defaults();
     if (turned) o.start_pose.rotation[0] = 3.141592653589793;
     o.polish_eps = 1e-3;
-    *err = (sdm_error){0};
-    const sdm_status s = sdm_fit(&source, &t, &o, r, err);
-    sdm_exact_free(e);
-    sdm_mesh_dispose(&mesh);
-    sdm_instance_free(shape);
-    free(v);
-    return s;
+    return fit_labels_of(&pin, truth, &g, &o, r, err);
 }
 
 static const sdm_fit_finding *next_pose(const sdm_fit_result *r)

@@ -96,7 +96,7 @@ static sdm_status check_surface(const dataset *d, const sdm_exact *e, size_t sha
     return status;
 }
 
-static bool is_cut(const sdm_mesh *m, const sdm_grid *g)
+bool trainer_is_cut(const sdm_mesh *m, const sdm_grid *g)
 {
     for (size_t v = 0; v < m->n_vert; v++)
         if (sdm_grid_beyond(g, m->vert + 3 * v, NULL) > 0) return true;
@@ -128,7 +128,7 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
     for (size_t i = 0; i < d->n_holdout && !s; i++) {
         sdm_exact *e = NULL;
         s = sdm_instance_mesh(d->shape, d->holdout_params + i * d->n_params, &mesh, err);
-        if (!s) cut += is_cut(&mesh, d->grid);
+        if (!s) cut += trainer_is_cut(&mesh, d->grid);
         if (s || i >= SHAPES) continue;
         s = check_parts(&mesh, &inside_out, &thickness, err);
         compared++;

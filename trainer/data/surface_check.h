@@ -21,6 +21,9 @@ typedef struct surface_check {
     double inside_out;
 } surface_check;
 
+/* Does the mesh reach beyond the outer voxel centres of the grid? */
+bool trainer_is_cut(const sdm_mesh *m, const sdm_grid *g);
+
 /* Compares a few held-out shapes at random points of their surfaces that lie inside the grid;
    rms_mm and thin are NaN if there is no such point. `cut` is of all held-out shapes. [n_threads
    threads; the same bits for any number] */

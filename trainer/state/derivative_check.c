@@ -5,11 +5,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "data/surface_check.h"
 #include "kind.h"
 #include "sdm/exact.h"
 #include "sdm/internal/model_threads.h"
 #include "sdm/internal/part_audit.h"
-#include "sdm/internal/shape_box.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
 
@@ -45,17 +45,11 @@ static sdm_status exact_make(const dataset *d, const double *p, exact_shape *out
     sdm_mesh mesh = {0};
     sdm_exact *e = NULL;
     sdm_status s = sdm_instance_mesh(d->shape, p, &mesh, err);
-    out->cut = false;
-    for (size_t v = 0; v < mesh.n_vert && !s && !out->cut; v++)
-        out->cut = sdm_grid_beyond(d->grid, mesh.vert + 3 * v, NULL) > 0;
+    out->cut = !s && trainer_is_cut(&mesh, d->grid);
     if (!s && !out->cut) s = sdm_exact_create(&mesh, &opts, &e, err);
     if (!s && !out->cut) {
-        const sdm_mesh *surface = sdm_exact_surface(e);
-        const double apex[3] = {0, 0, 0};
-        double area = 0;
-        out->volume = 0;
-        for (size_t t = 0; t < surface->n_tri; t++)
-            sdm_triangle_add(surface, t, apex, &area, &out->volume);
+        double area;
+        sdm_mesh_sums(sdm_exact_surface(e), &out->volume, &area);
         if (out->map) s = sdm_exact_map(e, d->grid, out->map, err);
     }
     sdm_exact_free(e);

@@ -8,12 +8,12 @@ typedef struct derivative_check {
     /* Error of the volume of the model's map (sdm_map_volume()) over the volume of the mesh: root
        mean square, and the largest; NaN: no shape lies within the grid. */
     double volume, volume_max;
-    /* Root mean square error over the root mean square, of the parameter for which it is largest,
-       and the index of this parameter: of the derivatives of the map within half a voxel of the
-       surface (farther inside thin walls a distance has a ridge, where its derivative jumps),
-       compared with differences of exact maps; of the derivative of the volume, compared with that
-       of the meshes. Where a parameter changes the volume by less than 5 % over its range, these 5
-       % count as its root mean square. NaN: not measured. */
+    /* Relative errors, the root mean square of the error over that of the right value, of the
+       parameter with the largest one, and the index of this parameter: of the derivatives of the
+       map within half a voxel of the surface (farther inside thin walls a distance has a ridge,
+       where its derivative jumps), compared with differences of exact maps; of the derivative of
+       the volume, compared with that of the meshes. Where a parameter changes the volume by less
+       than 5 % over its range, these 5 % count as its root mean square. NaN: not measured. */
     double slope, volume_slope;
     size_t slope_param, volume_slope_param;
 } derivative_check;

@@ -113,6 +113,13 @@ void sdm_triangle_add(const sdm_mesh *m, size_t t, const double apex[3], double 
     *volume += v3_dot(w, n) / 6;
 }
 
+void sdm_mesh_sums(const sdm_mesh *m, double *volume, double *area)
+{
+    const double origin[3] = {0, 0, 0};
+    *volume = *area = 0;
+    for (size_t t = 0; t < m->n_tri; t++) sdm_triangle_add(m, t, origin, area, volume);
+}
+
 /* Boxes, ranges of vertices, areas and volumes of the parts, from the mesh as given. */
 static void measure_parts(job *j)
 {

@@ -30,6 +30,7 @@ sdm_slice sdm_section_of(const sdm_sections *s, const float *values, int axis);
  * if `left`, along its left side. */
 void sdm_section_draw_frame(sdm_canvas *c, const sdm_sections *s, sdm_box box, int axis, bool left);
 
-#define SDM_SECTION_LEFT 66  /* room for numbers and axis names left of a section, pixels */
-#define SDM_SECTION_BELOW 60 /* the same below a section, and for the position above the next */
-#define SDM_SECTION_ABOVE 16 /* room for the position of the first section, pixels */
+#define SDM_SECTION_LEFT 66 /* room for numbers and axis names left of a section, pixels */
+#define SDM_SECTION_BELOW                                                                          \
+    60 /* room for them below a section and for the position of the next one */
+#define SDM_SECTION_ABOVE 16 /* room for the position above the first section, pixels */

@@ -12,6 +12,7 @@
 #include "fit/solver/objective.h"
 #include "fit/solver/open_motions.h"
 #include "fit/start/principal_axes.h"
+#include "fit/start/start_list.h"
 #include "fit/start/start_search.h"
 #include "fit/start/turn_set.h"
 #include "rival.h"
@@ -52,19 +53,10 @@
 // parameters with another value of which rivals start
 #define PARAMS_TRIED 2
 
-/* A start of a rival. */
-typedef struct start {
-    fit_state state;
-    double log_likelihood;
-    bool keep_params;
-    size_t
-        param; /* the parameter that has another value, from 1; 0: the shape is that of the fit */
-} start;
-
 /* The rival with the least gain of the fit over it; NaN: there is none. */
 typedef struct nearest {
     double gain;
-    size_t param;       /* as start.param */
+    size_t param;       /* as fit_start.param */
     double value;       /* of this parameter */
     char symmetry[240]; /* how the surface may be turned and stays the same; "": not at all */
 } nearest;
@@ -176,20 +168,10 @@ static void turned(const own_fit *own, size_t i, fit_state *to)
     for (int k = 0; k < 3; k++) to->translation[k] += at[k] - moved[k];
 }
 
-// Inserts a start into list[*n], the best first. Of more than `most` the worst is left out.
-static void start_insert(start *list, size_t *n, size_t most, const start *one)
-{
-    if (*n == most && !(one->log_likelihood > list[most - 1].log_likelihood)) return;
-    size_t at = *n < most ? (*n)++ : most - 1;
-    for (; at > 0 && list[at - 1].log_likelihood < one->log_likelihood; at--)
-        list[at] = list[at - 1];
-    list[at] = *one;
-}
-
 /* The turns from which rivals start, the best first. */
 typedef struct turns {
-    start other[N_CUBE + N_EVEN]; // to other surfaces, with the parameters of the fit
-    start alike[ALIKE_TRIED];     // to surfaces that are nearly that of the fit, all free
+    fit_start other[N_CUBE + N_EVEN]; // to other surfaces, with the parameters of the fit
+    fit_start alike[ALIKE_TRIED];     // to surfaces that are nearly that of the fit, all free
     size_t n_other, n_alike;
     // the turn by at least SYMMETRIC_MIN to the most similar surface, if it is the same; same.dice
     // 0: there is none
@@ -216,7 +198,7 @@ static void turns_rank(const own_fit *own, turns *t)
     t->n_other = t->n_alike = 0;
     t->same.dice = 0;
     for (size_t i = 0; i < N_CUBE + N_EVEN; i++) {
-        start one = {0};
+        fit_start one = {0};
         turned(own, i, &one.state);
         const double dice = likeness(own, own->distance, own->volume, &one.state);
         if (dice > SYMMETRIC) {
@@ -226,9 +208,9 @@ static void turns_rank(const own_fit *own, turns *t)
         one.log_likelihood = sdm_fit_likelihood_at(own->p, &one.state, SAMPLES_RANKED);
         one.keep_params = dice <= ALIKE;
         if (one.keep_params)
-            start_insert(t->other, &t->n_other, N_CUBE + N_EVEN, &one);
+            sdm_fit_start_insert(t->other, &t->n_other, N_CUBE + N_EVEN, &one);
         else
-            start_insert(t->alike, &t->n_alike, ALIKE_TRIED, &one);
+            sdm_fit_start_insert(t->alike, &t->n_alike, ALIKE_TRIED, &one);
     }
 }
 
@@ -247,7 +229,7 @@ static sdm_status climb(fit_problem *p, bool keep_params, size_t steps, sdm_erro
 
 // how well the state of *p explains the samples after some iterations; *other: the Dice coefficient
 // of its surface with that of the fit is at most `dice`
-static sdm_status challenge(fit_problem *p, const own_fit *own, const start *from, double dice,
+static sdm_status challenge(fit_problem *p, const own_fit *own, const fit_start *from, double dice,
                             bool *other, fit_standing *standing, sdm_error *err)
 {
     p->state = from->state;
@@ -260,13 +242,13 @@ static sdm_status challenge(fit_problem *p, const own_fit *own, const start *fro
 
 // *best = the value of parameter k, of those that are tried, with which the shape explains the
 // samples best, in the pose of the fit; best->param 0: none gives another surface
-static sdm_status value_find(fit_problem *p, const own_fit *own, size_t k, start *best,
+static sdm_status value_find(fit_problem *p, const own_fit *own, size_t k, fit_start *best,
                              sdm_error *err)
 {
     const double range = p->high[k] - p->low[k], here = own->state.params[k];
-    *best = (start){.log_likelihood = -INFINITY};
+    *best = (fit_start){.log_likelihood = -INFINITY};
     for (int i = 0; i < N_PARTS; i++) {
-        start one = {.state = own->state, .param = k + 1};
+        fit_start one = {.state = own->state, .param = k + 1};
         one.state.params[k] = p->low[k] + (i + 0.5) / N_PARTS * range;
         if (fabs(one.state.params[k] - here) < 0.5 / N_PARTS * range) continue;
         sdm_status s = sdm_fit_log_likelihood(p, one.state.params, &one.log_likelihood, err);
@@ -281,15 +263,15 @@ static sdm_status value_find(fit_problem *p, const own_fit *own, size_t k, start
 
 // list[PARAMS_TRIED] = the parameters whose best other values explain the samples best; *n: how
 // many. The state of *p is that of the fit
-static sdm_status values_rank(fit_problem *p, const own_fit *own, start *list, size_t *n,
+static sdm_status values_rank(fit_problem *p, const own_fit *own, fit_start *list, size_t *n,
                               sdm_error *err)
 {
     sdm_status s = SDM_OK;
     *n = 0;
     for (size_t k = 0; k < p->n_params && !s && !p->opts->keep_params; k++) {
-        start one;
+        fit_start one;
         s = value_find(p, own, k, &one, err);
-        if (!s && one.param) start_insert(list, n, PARAMS_TRIED, &one);
+        if (!s && one.param) sdm_fit_start_insert(list, n, PARAMS_TRIED, &one);
     }
     return s;
 }
@@ -313,7 +295,7 @@ static sdm_status compare_alike(fit_problem *p, own_fit *own, const turns *t, ne
     fit_standing fit, rival;
     bool other;
     if (!t->n_alike || p->opts->keep_params) return SDM_OK;
-    const start here = {.state = own->state};
+    const fit_start here = {.state = own->state};
     sdm_status s = challenge(p, own, &here, SAME, &other, &fit, err);
     for (size_t i = 0; i < t->n_alike && !s; i++) {
         s = challenge(p, own, &t->alike[i], SAME, &other, &rival, err);
@@ -341,7 +323,7 @@ static void tell_symmetry(const turns *t, nearest *least)
 static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_error *err)
 {
     turns *t = NULL;
-    start *value = NULL;
+    fit_start *value = NULL;
     fit_standing fit, rival;
     bool other;
     size_t n_values = 0;
@@ -354,7 +336,7 @@ static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_e
     if (!s) s = values_rank(p, own, value, &n_values, err);
     if (!s) tell_symmetry(t, least);
     if (!s && p->has_runner_up) {
-        const start from = {.state = p->runner_up};
+        const fit_start from = {.state = p->runner_up};
         s = challenge(p, own, &from, ALIKE, &other, &rival, err);
         if (!s && other) nearest_take(least, p, &fit, &rival, 0);
     }

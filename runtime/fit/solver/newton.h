@@ -3,6 +3,9 @@
 
 #include "problem.h"
 
+/* sdm_fit_opts.max_iterations by default */
+enum { FIT_ITERATIONS_USUAL = 60 };
+
 /* Which unknowns move, how steps are made and when the iterations end. */
 typedef struct fit_newton_opts {
     /* reported to sdm_fit_opts.progress; also sets the initial damping */

@@ -8,6 +8,7 @@
 #include "principal_axes.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/memory.h"
+#include "start_list.h"
 #include "start_search.h"
 
 // values of a parameter that are tried: the middles of this many equal parts of its range, without
@@ -26,21 +27,16 @@
 // a shape that has this Dice coefficient with that of the fit is the same one, found more exactly
 #define ALIKE 0.95
 
-typedef struct value_start {
-    fit_state state;
-    double log_likelihood;
-} value_start;
-
 // *best = the best pose of the shape with the latest map: that of `state`, or shifted along one of
 // the axes (rows, world)
 static void shift_find(const fit_problem *p, const fit_state *state, const double axes[9],
-                       double step, value_start *best)
+                       double step, fit_start *best)
 {
-    *best = (value_start){.state = *state,
-                          .log_likelihood = sdm_fit_likelihood_at(p, state, SAMPLES_RANKED)};
+    *best = (fit_start){.state = *state,
+                        .log_likelihood = sdm_fit_likelihood_at(p, state, SAMPLES_RANKED)};
     for (int a = 0; a < 3; a++)
         for (int i = -N_SHIFTS; i <= N_SHIFTS; i++) {
-            value_start one = {.state = *state};
+            fit_start one = {.state = *state};
             for (int k = 0; k < 3; k++) one.state.translation[k] += i * step * axes[3 * a + k];
             one.log_likelihood =
                 i ? sdm_fit_likelihood_at(p, &one.state, SAMPLES_RANKED) : -INFINITY;
@@ -61,25 +57,15 @@ static sdm_status axes_find(fit_problem *p, double axes[9], sdm_error *err)
     return SDM_OK;
 }
 
-// inserts a start into list[*n], the best first; of more than N_KEPT the worst is left out
-static void kept_insert(value_start *list, size_t *n, const value_start *one)
-{
-    if (*n == N_KEPT && !(one->log_likelihood > list[N_KEPT - 1].log_likelihood)) return;
-    size_t at = *n < N_KEPT ? (*n)++ : N_KEPT - 1;
-    for (; at > 0 && list[at - 1].log_likelihood < one->log_likelihood; at--)
-        list[at] = list[at - 1];
-    list[at] = *one;
-}
-
 // list[N_KEPT] = the best starts with another value of one parameter, at most one for each; *n: how
 // many
-static sdm_status values_rank(fit_problem *p, const double axes[9], double step, value_start *list,
+static sdm_status values_rank(fit_problem *p, const double axes[9], double step, fit_start *list,
                               size_t *n, sdm_error *err)
 {
     const fit_state from = p->state;
     *n = 0;
     for (size_t k = 0; k < p->n_params; k++) {
-        value_start of_param = {.log_likelihood = -INFINITY};
+        fit_start of_param = {.log_likelihood = -INFINITY};
         for (int i = 0; i < N_PARTS; i++) {
             const double part = (p->high[k] - p->low[k]) / N_PARTS,
                          value = p->low[k] + (i + 0.5) * part;
@@ -90,11 +76,11 @@ static sdm_status values_rank(fit_problem *p, const double axes[9], double step,
             const sdm_status s = sdm_fit_log_likelihood(p, state.params, &log_likelihood, err);
             if (s == SDM_E_NOMEM || s == SDM_E_CANCELLED) return s;
             if (s) continue; // there is no shape with this value
-            value_start best;
+            fit_start best;
             shift_find(p, &state, axes, step, &best);
             if (best.log_likelihood > of_param.log_likelihood) of_param = best;
         }
-        if (of_param.log_likelihood > -INFINITY) kept_insert(list, n, &of_param);
+        if (of_param.log_likelihood > -INFINITY) sdm_fit_start_insert(list, n, N_KEPT, &of_param);
     }
     return SDM_OK;
 }
@@ -122,7 +108,7 @@ sdm_status sdm_fit_other_values(fit_problem *p, bool *found, sdm_error *err)
 {
     const fit_state given = p->state;
     fit_state wide = given, best = given;
-    value_start list[N_KEPT];
+    fit_start list[N_KEPT];
     bool *inside = NULL;
     double axes[9];
     size_t n = 0;
@@ -147,7 +133,6 @@ sdm_status sdm_fit_other_values(fit_problem *p, bool *found, sdm_error *err)
     for (size_t i = 0; i < n && !s; i++) {
         p->state = list[i].state;
         s = sdm_fit_start_continue(p, &given, true, err);
-        if (!s) s = sdm_fit_evaluate(p, err);
         if (!s && sdm_fit_objective(p) > least && !is_alike(p, inside))
             *found = true, least = sdm_fit_objective(p), best = p->state;
         if (s != SDM_E_NOMEM && s != SDM_E_CANCELLED) s = SDM_OK; // else it leads nowhere

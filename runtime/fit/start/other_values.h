@@ -4,10 +4,11 @@
 
 #include "fit/solver/problem.h"
 
-/* Looks for a better maximum than the one at problem->state, the end of a fit. A long shape may
-   stop with one end on the data and the other one beyond them: no small change of its length then
-   changes the likelihood. So several values of every parameter are compared, each in the pose of
-   the fit and shifted along the axes of the shape; iterations follow from the best few.
+/* Looks for a higher maximum of the posterior density than the one at problem->state, where a fit
+   has ended. The fit of a long shape may end with one end of the shape on the data and the other
+   one beyond them: no small change of its length then changes the likelihood. So several values of
+   every parameter are compared, each in the pose of the fit and shifted along the axes of the
+   shape; iterations follow from the best few.
 
    *found = true: problem->state is the best of these maxima, and it explains the data better than
    the fit does. false: problem->state is as before. Samples, maps and information are those of the

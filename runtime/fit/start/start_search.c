@@ -197,7 +197,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
     sdm_fit_start_widen(p, &start);
     p->state = start;
 
-    // fit each turn
+    // fit the shape from each turn of the start pose
     const fit_newton_opts newton = search_steps(p, TURN_STEPS);
     fit_newton_end end;
     found_turns found = {.n = n == 1, .state = {start}};

@@ -9,8 +9,6 @@
 #include "fit/data/source_params.h"
 #include "fit/solver/newton.h"
 
-// iterations by default; more of them are no advice to who has given more
-#define ITERATIONS_USUAL 60
 // an unknown has converged when it moves by no more than this share of its sd
 #define UNREST_MAX 0.1
 
@@ -58,8 +56,8 @@ static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_err
         snprintf(moves, sizeof moves,
                  "; %.100s still moves by %.2g of its standard deviation, need %.2g", name, most,
                  UNREST_MAX);
-    // more iterations have been given already
-    const bool many = p->opts->max_iterations > ITERATIONS_USUAL;
+    // whoever has allowed more iterations already is not told to allow more
+    const bool many = p->opts->max_iterations > FIT_ITERATIONS_USUAL;
     sdm_fail(err, SDM_E_QUALITY,
              "not converged after %zu iterations (%s%s): %sa nearer start, or data that determine "
              "what still moves",

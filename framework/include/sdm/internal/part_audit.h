@@ -72,6 +72,10 @@ void sdm_part_audit_dispose(sdm_part_audit *a);
 void sdm_triangle_add(const sdm_mesh *m, size_t t, const double apex[3], double *area,
                       double *volume);
 
+/* *volume (mm^3) and *area (mm^2) = the sums over all triangles of the mesh; overlaps count twice.
+ */
+void sdm_mesh_sums(const sdm_mesh *m, double *volume, double *area);
+
 /* The smallest distance, mm, of a vertex of part `index` from the surface of the other parts. NaN:
  * it is the only part, numbers of its vertices lie among those of another part, or the engine
  * refuses the other parts. [any thread] */

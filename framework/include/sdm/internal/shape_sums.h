@@ -7,8 +7,8 @@
 extern "C" {
 #endif
 
-/* *volume (mm^3) and *area (mm^2) = the sums over all triangles of the mesh at p; overlaps count
- * twice. The errors of sdm_instance_mesh(). [any thread] */
+/* The sums of sdm_mesh_sums() of the mesh at p; 0 after an error, which is one of
+ * sdm_instance_mesh(). [any thread] */
 sdm_status sdm_shape_sums(const sdm_instance *shape, const double *p, double *volume, double *area,
                           sdm_error *err);
 

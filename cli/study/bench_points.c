@@ -23,22 +23,21 @@
 // "near the surface": up to this fraction of the diagonal away from it along each axis
 #define NEAR 0.015
 
-enum { BATCH, ONE_BY_ONE, BRUTE_FORCE };
+enum { BATCH, WHOLE, ONE_BY_ONE, BRUTE_FORCE };
 
 static const struct {
     const char *name;
     int kind;
     size_t n;
-} rows[] = {{"batch of 1000", BATCH, 1000},
-            {"batch of 10000", BATCH, 10000},
-            {"batch of 100000", BATCH, MOST},
-            {"one by one", ONE_BY_ONE, SINGLE},
-            {"naive", BRUTE_FORCE, NAIVE}};
+} rows[] = {{"batch of 1000", BATCH, 1000},     {"batch of 10000", BATCH, 10000},
+            {"batch of 100000", BATCH, MOST},   {"and preparation", WHOLE, MOST},
+            {"one by one", ONE_BY_ONE, SINGLE}, {"naive", BRUTE_FORCE, NAIVE}};
 enum { N_ROWS = sizeof rows / sizeof *rows };
 
 typedef struct bench_points {
     const sdm_mesh *mesh;
     sdm_exact *engine, *all_cores;
+    int n_threads;        /* of all_cores */
     double *x, *distance; /* [MOST][3], [MOST] */
 } bench_points;
 
@@ -88,6 +87,20 @@ static void draw_points(const bench_points *b, bool near)
     }
 }
 
+/* Does a row use all cores, too? */
+static bool is_parallel(int row) { return rows[row].kind == BATCH || rows[row].kind == WHOLE; }
+
+/* Prepares the mesh and computes the distances at all points. */
+static sdm_status run_whole(const bench_points *b, int n_threads, sdm_error *err)
+{
+    sdm_exact *engine = NULL;
+    sdm_status s =
+        sdm_exact_create(b->mesh, &(sdm_exact_opts){.n_threads = n_threads}, &engine, err);
+    if (!s) s = sdm_exact_points(engine, b->x, MOST, &(sdm_exact_at){.distance = b->distance}, err);
+    sdm_exact_free(engine);
+    return s;
+}
+
 /* Seconds of one run of a row. */
 static sdm_status run_row(const bench_points *b, int row, const sdm_exact *engine, double *seconds,
                           sdm_error *err)
@@ -97,6 +110,7 @@ static sdm_status run_row(const bench_points *b, int row, const sdm_exact *engin
     if (rows[row].kind == BATCH)
         s = sdm_exact_points(engine, b->x, rows[row].n, &(sdm_exact_at){.distance = b->distance},
                              err);
+    if (rows[row].kind == WHOLE) s = run_whole(b, engine == b->engine ? 1 : b->n_threads, err);
     for (size_t i = 0; i < rows[row].n && rows[row].kind == ONE_BY_ONE; i++)
         b->distance[i] = sdm_exact_point(engine, b->x + 3 * i, NULL, NULL, NULL);
     for (size_t i = 0; i < rows[row].n && rows[row].kind == BRUTE_FORCE; i++)
@@ -192,7 +206,7 @@ static sdm_status measure(const bench_points *b, size_t repeat, times *t, sdm_er
         for (int row = 0; row < N_ROWS && !s; row++) {
             s = measure_row(b, row, b->engine, repeat, &t->one[near][row], err);
             t->all[near][row] = NAN;
-            if (!s && rows[row].kind == BATCH)
+            if (!s && is_parallel(row))
                 s = measure_row(b, row, b->all_cores, repeat, &t->all[near][row], err);
         }
         if (!s && t->peers.n)
@@ -242,7 +256,7 @@ static void print_times(const cli_bench_case *c, double ms_build, const times *t
     printf("  %-16s %9s %9s   %9s %9s\n", "", "random", "near", "random", "near");
     for (int row = 0; row < N_ROWS; row++) {
         printf("  %-16s %9.3f %9.3f", rows[row].name, t->one[0][row], t->one[1][row]);
-        if (rows[row].kind == BATCH) printf("   %9.3f %9.3f", t->all[0][row], t->all[1][row]);
+        if (is_parallel(row)) printf("   %9.3f %9.3f", t->all[0][row], t->all[1][row]);
         printf("\n");
     }
     printf("\nrandom: in twice the bounding box; near: up to %g of its diagonal from the surface "
@@ -297,6 +311,7 @@ sdm_status cli_bench_points(const cli_args *args, sdm_error *err)
     if (!s) s = sdm_exact_create(&c.mesh, &(sdm_exact_opts){.n_threads = 1}, &b.engine, err);
     if (!s)
         s = sdm_exact_create(&c.mesh, &(sdm_exact_opts){.n_threads = c.threads}, &b.all_cores, err);
+    b.n_threads = c.threads;
     if (!s) s = SDM_ALLOC(&b.x, 3 * (size_t)MOST, "points", err);
     if (!s) s = SDM_ALLOC(&b.distance, MOST, "distances", err);
     if (!s) s = open_others(&c, args, &t, err);

@@ -131,8 +131,6 @@ static sdm_point_keys *keys_choose(void)
 static void scratch_free(sdm_point_scratch *s)
 {
     if (!s) return;
-    sdm_free(s->node);
-    sdm_free(s->away);
     sdm_free(s->candidate);
     sdm_free(s);
 }
@@ -140,9 +138,7 @@ static void scratch_free(sdm_point_scratch *s)
 /* Bytes of a thread's scratch memory. */
 static size_t scratch_bytes(const sdm_features *f)
 {
-    return sizeof(sdm_point_scratch) +
-           f->edge_base * (sizeof(uint32_t) + sizeof(float[SDM_POINT_VECTORS])) +
-           (f->end + 1) * sizeof(sdm_point_candidate);
+    return sizeof(sdm_point_scratch) + (f->end + 1) * sizeof(sdm_point_candidate);
 }
 
 static sdm_status scratch_start(const sdm_features *f, sdm_point_scratch **out, sdm_error *err)
@@ -150,13 +146,9 @@ static sdm_status scratch_start(const sdm_features *f, sdm_point_scratch **out, 
     sdm_status st = SDM_ALLOC(out, 1, "points of a block", err);
     if (st) return st;
     sdm_point_scratch *s = *out;
-    // every cluster has a face; every feature is a candidate at most once
-    st = sdm_alloc_unset((void **)&s->node, f->edge_base, sizeof *s->node, "clusters", err);
-    if (!st)
-        st = sdm_alloc_unset((void **)&s->away, f->edge_base, sizeof *s->away, "clusters", err);
-    if (!st)
-        st = sdm_alloc_unset((void **)&s->candidate, (size_t)f->end + 1, sizeof *s->candidate,
-                             "candidates", err);
+    // every feature is a candidate at most once
+    st = sdm_alloc_unset((void **)&s->candidate, (size_t)f->end + 1, sizeof *s->candidate,
+                         "candidates", err);
     for (int a = 0; a < 3; a++)
         for (int i = 0; i < 8; i++) s->reference.x[a][i] = f->centroid[0][a];
     return st;

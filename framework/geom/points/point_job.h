@@ -10,6 +10,10 @@
 /* Points of a vector, vectors of a block, points of a block. */
 enum { SDM_LANES = 8, SDM_POINT_VECTORS = 8, SDM_POINT_BLOCK = SDM_LANES * SDM_POINT_VECTORS };
 
+/* Pairs of a vector and a cluster beyond which a search for each of the points of a block takes
+   less time. */
+#define SDM_PAIRS_MAX 704
+
 /* A candidate of the current vector. bit i of `lanes`: the feature may be the nearest one of point
    i. */
 typedef struct sdm_point_candidate {
@@ -28,12 +32,14 @@ typedef struct sdm_point_scratch {
     /* result: side of each point by sdm_feature_side(); unknown without sdm_features.side, and
        where features that are nearest up to rounding differ */
     int8_t side[SDM_POINT_BLOCK];
-    /* clusters of the block: indices of their nodes, and the distances of their boxes from the
-       centres of the vectors, [cluster][vector], scaled; INFINITY: the cluster does not hold the
-       nearest feature of a point of the vector */
-    uint32_t *node;
-    float (*away)[SDM_POINT_VECTORS];
-    size_t n_node;
+    /* clusters that may hold the nearest feature of a point of a vector: the distances of their
+       boxes from the centre of the vector, scaled, rounded down to a float whose lowest bits hold
+       the index into node[]; [vector][near_end[vector]], INFINITY from there to the next multiple
+       of eight */
+    _Alignas(32) float near[SDM_POINT_VECTORS][SDM_PAIRS_MAX + 8];
+    size_t near_end[SDM_POINT_VECTORS];
+    /* nodes of these clusters */
+    uint32_t node[SDM_PAIRS_MAX];
     /* candidates of the current vector */
     sdm_point_candidate *candidate;
     size_t n_candidate;

@@ -79,6 +79,16 @@ static void add_word(sdm_text *command, const char *word)
     cli_add_shell_word(command, word);
 }
 
+/* Appends an option with a number that is 0 where it was not given. */
+static void add_number(sdm_text *command, const char *option, double value)
+{
+    char number[32];
+    if (!(value > 0)) return;
+    snprintf(number, sizeof number, "%.15g", value);
+    add_word(command, option);
+    add_word(command, number);
+}
+
 /* Prints the command that follows the advice of the verdict. */
 static void print_next(const cli_args *args, const sdm_train_report *r)
 {
@@ -86,9 +96,9 @@ static void print_next(const cli_args *args, const sdm_train_report *r)
     const char *slash = strrchr(r->model_path, '/');
     char change[80], folder[sizeof r->model_path + 8];
     sdm_text command = {0};
-    // options for many processes, files of maps or plug-ins that crash are the user's to repeat
-    if (!v->key[0] || !args->files.n || !slash || args->ranks || args->dataset || args->isolate)
-        return;
+    // the maps of another grid are not in --dataset
+    const bool other_maps = args->dataset && !strncmp(v->key, "grid.", 5);
+    if (!v->key[0] || !args->files.n || !slash || other_maps) return;
     // a grid.size of the configuration, with other voxels, would cut the shapes
     if (strcmp(v->key, "grid.spacing"))
         snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
@@ -100,6 +110,14 @@ static void print_next(const cli_args *args, const sdm_train_report *r)
     for (size_t i = 0; i < args->plugins.n; i++) {
         add_word(&command, "--plugin");
         add_word(&command, args->plugins.items[i]);
+    }
+    if (args->isolate) add_word(&command, "--isolate");
+    add_number(&command, "--isolate-seconds", args->isolate_seconds);
+    add_number(&command, "--isolate-memory", args->isolate_memory);
+    add_number(&command, "--ranks", (double)args->ranks);
+    if (args->dataset) {
+        add_word(&command, "--dataset");
+        add_word(&command, args->dataset);
     }
     add_word(&command, "--out");
     add_word(&command, folder);

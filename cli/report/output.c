@@ -62,7 +62,7 @@ sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
     if (kind == KIND_NONE)
         return sdm_fail(
             err, SDM_E_ARG,
-            "output '%s': its name must end in .vdb .nii .nii.gz .nrrd .mha .npy .ply .stl "
+            "output '%s': its name must end in .vdb .nii .nii.gz .nrrd .seg.nrrd .mha .npy .ply .stl "
             ".obj .off .vtk .vtp .png .svg or .pdf",
             path);
 #ifndef SDM_HAVE_VDB

@@ -30,9 +30,7 @@ sdm_status cli_fit_make_map(cli_fit *f, sdm_error *err)
 {
     const sdm_fit_result *r = &f->result;
     f->map_source = f->source;
-    // exact maps inside the trained range come from the polish, which is the last phase: so the
-    // exact engine is the source of the last iterations
-    if (f->source.model && r->n_exact > r->n_exact_outside) {
+    if (r->polished) {
         f->map_source.grid = sdm_model_get_info(f->model)->grid;
         f->map_source.model = NULL;
     }

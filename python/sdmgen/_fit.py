@@ -101,6 +101,8 @@ class FitResult:
     iterations: int
     #: how often a refused fit went on from another value of a parameter
     restarts: int
+    #: with a network: the last iterations took exact maps
+    polished: bool
     #: log-posterior density after each iteration, up to a constant
     objective: Float64
     log_likelihood: float
@@ -614,6 +616,7 @@ def _result_of(
         reason=c.reason.decode(),
         iterations=c.n_iterations,
         restarts=c.n_restarts,
+        polished=c.polished,
         objective=copied(c.objective, (c.n_iterations,), np.float64),
         log_likelihood=c.log_likelihood,
         evidence=c.evidence,

@@ -466,6 +466,7 @@ static void report(fit_problem *p, sdm_fit_result *out)
     sdm_rotation_vector(s->rotation, out->pose.rotation);
     memcpy(out->pose.translation, s->translation, sizeof out->pose.translation);
     out->n_exact_outside = p->maps.n_outside;
+    out->polished = p->source->model && p->maps.exact;
     out->n_iterations = p->n_iterations;
     out->objective = p->objective;
     p->objective = NULL;

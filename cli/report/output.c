@@ -60,11 +60,10 @@ sdm_status cli_check_type(const char *path, bool meshes_only, sdm_error *err)
                         "or .vtp",
                         path);
     if (kind == KIND_NONE)
-        return sdm_fail(
-            err, SDM_E_ARG,
-            "output '%s': its name must end in .vdb .nii .nii.gz .nrrd .seg.nrrd .mha .npy .ply .stl "
-            ".obj .off .vtk .vtp .png .svg or .pdf",
-            path);
+        return sdm_fail(err, SDM_E_ARG,
+                        "output '%s': its name must end in .vdb .nii .nii.gz .nrrd .seg.nrrd .mha "
+                        ".npy .ply .stl .obj .off .vtk .vtp .png .svg or .pdf",
+                        path);
 #ifndef SDM_HAVE_VDB
     if (kind == KIND_VDB)
         return sdm_fail(err, SDM_E_UNSUPPORTED, "output '%s': built without OpenVDB", path);

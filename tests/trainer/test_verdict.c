@@ -76,6 +76,8 @@ static void largest_part_limits(void **state)
         {NULL, SDM_CAUSE_BASES, 0, 0, "raise network.rank from 8 to 16"},
         {"network.rank=200", SDM_CAUSE_BASES, 0, 0, "lower network.block from 4 to 2"},
         {NULL, SDM_CAUSE_NETWORK, 0.5, 0, "raise train.steps from 1000 to 2000"},
+        {"train.learning_rate=0.3", SDM_CAUSE_NETWORK, 0.5, 0,
+         "lower train.learning_rate from 0.3 to 0.003"},
         {NULL, SDM_CAUSE_NETWORK, 0.02, 0, "raise network.width from 32 to 64"},
         {NULL, SDM_CAUSE_NETWORK, NAN, 7e-5, "raise network.modes from 64 to 128"},
         {"network.depth=0", SDM_CAUSE_NETWORK, NAN, 0, "raise network.depth from 0 to 3"},

@@ -18,6 +18,10 @@ static const double STILL_FALLING = 0.1;
 /* With fewer steps than this no network has converged, whether the error still falls or not. */
 static const double FEW_STEPS = 500;
 
+/* With a higher learning rate than this, ten times the largest default, steps undo each other; the
+   default of most kinds of network. */
+static const double RATE_HIGH = 0.03, RATE_USUAL = 3e-3;
+
 /* The grid limits the surface if interpolation between its voxels errs by this multiple of the
    error of the model, and by more than this fraction of a voxel: only then does a finer grid, of
    eight times as many voxels, take away most of the error of the surface. */
@@ -69,6 +73,10 @@ static const char *advise_network(const verdict_input *in, sdm_verdict *v)
     if (has_bases(c) && !c->network.depth) {
         advise(v, "network.depth", 0, 3);
         return "Polynomials alone limit it";
+    }
+    if (c->train.learning_rate > RATE_HIGH) {
+        advise(v, "train.learning_rate", c->train.learning_rate, RATE_USUAL);
+        return "The learning rate is too high";
     }
     if (in->steps < FEW_STEPS) {
         advise_budget(in, v);

@@ -112,6 +112,11 @@ static void draw_contours(sdm_canvas *c, const layout *l, sdm_box box, const sdm
     }
 }
 
+static void draw_dot(sdm_canvas *c, double x, double y)
+{
+    sdm_canvas_line(c, x, y, x, y, 3, DARK); // lines have round ends
+}
+
 /* Dots where the points of the map lie, those within a voxel of the slice. */
 static void draw_points(sdm_canvas *c, const layout *l, sdm_box box, const sdm_picture_map *map,
                         int axis)
@@ -124,7 +129,7 @@ static void draw_points(sdm_canvas *c, const layout *l, sdm_box box, const sdm_p
         if (!(fabs(at[axis] - (double)l->sections.at[axis]) <= 1)) continue;
         const double x = box.x + (at[right] + 0.5) / (double)l->g->n[right] * box.w,
                      y = box.y + (1 - (at[up] + 0.5) / (double)l->g->n[up]) * box.h;
-        sdm_canvas_line(c, x, y, x, y, 3, DARK); // lines have round ends
+        draw_dot(c, x, y);
     }
     sdm_canvas_unclip(c);
 }
@@ -146,24 +151,30 @@ static void draw_panel(sdm_canvas *c, const layout *l, size_t column, int axis)
     draw_points(c, l, box, map, axis);
 }
 
-/* The legend, centred at x: a sample of each contour's line with its level. The first pass
- * measures, the second draws. */
-static void draw_legend(sdm_canvas *c, const layout *l, double x, double y)
+/* The legend, centred at x: a sample of each contour's line with its level, and a dot if the map
+ * has points. The first pass measures, the second draws. */
+static void draw_legend(sdm_canvas *c, const layout *l, const sdm_picture_map *map, double x,
+                        double y)
 {
     char text[48];
     const sdm_type type = {.size = 9, .colour = SDM_INK};
+    const size_t n = l->n_levels + (map->n_points > 0);
     double total = 0;
     for (int pass = 0; pass < 2; pass++) {
         double at = x - total / 2;
-        for (size_t i = 0; i < l->n_levels; i++) {
-            snprintf(text, sizeof text, "%g mm", (double)l->levels[i]);
+        for (size_t i = 0; i < n; i++) {
+            const bool points = i == l->n_levels;
+            if (points)
+                snprintf(text, sizeof text, "points of the data");
+            else
+                snprintf(text, sizeof text, "%g mm", (double)l->levels[i]);
             const double w = sdm_canvas_text_width(c, 9, false, text);
-            if (pass) {
+            if (pass && points) draw_dot(c, at + 9, y - 4.5);
+            if (pass && !points)
                 sdm_contour_sample(c, at, y - 4.5, 18, level_colour(i), i ? DARK : SDM_WHITE);
-                sdm_canvas_text(c, at + 25, y, type, text);
-            }
+            if (pass) sdm_canvas_text(c, at + 25, y, type, text);
             at += 25 + w + 18;
-            if (!pass) total += 25 + w + (i + 1 < l->n_levels ? 18 : 0);
+            if (!pass) total += 25 + w + (i + 1 < n ? 18 : 0);
         }
     }
 }
@@ -187,7 +198,7 @@ static void draw_column(sdm_canvas *c, const layout *l, size_t column, int foot)
                                            : "error (mm)";
     sdm_colour_bar(c, bar, map_of(l, map->error), l->low[e] * l->unit[e], l->high[e] * l->unit[e],
                    caption);
-    if (!e) draw_legend(c, l, x + l->column / 2.0, foot + 72);
+    if (!e) draw_legend(c, l, map, x + l->column / 2.0, foot + 72);
 }
 
 static sdm_status check_arguments(const char *path, const sdm_grid *grid,

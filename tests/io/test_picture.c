@@ -175,18 +175,18 @@ static int dark_pixels(const sdm_grid *g, const float *v, const double *points, 
 }
 
 /* A point in the middle of the ball lies on all three slices, one above it on two, one beside all
- * slices on none. */
+ * slices on none. The legend names points, if there are any. */
 static void test_points_on_slices(void **state)
 {
     (void)state;
     sdm_grid g;
     float *v = ball_map(&g, 3);
     const double middle[3] = {0, 7, 13}, above[3] = {0, 7, 16}, beside[3] = {2, 9, 16};
-    const int none = dark_pixels(&g, v, NULL, 0);
+    const int none = dark_pixels(&g, v, beside, 1);
     const int three = dark_pixels(&g, v, middle, 1) - none,
               two = dark_pixels(&g, v, above, 1) - none;
     if (!(three > two && two >= 2)) fail_msg("%d %d of %d", three, two, none);
-    assert_int_equal(dark_pixels(&g, v, beside, 1), none);
+    assert_true(none > dark_pixels(&g, v, NULL, 0) + 2);
     free(v);
 }
 

@@ -6,6 +6,7 @@
 #include "sdm/internal/shape_box.h"
 #include "sdm/memory.h"
 #include "state/export_model.h"
+#include "state/progress.h"
 #include "template/template_kind.h"
 
 const train_kind *trainer_kind_find(sdm_network_kind kind)
@@ -42,6 +43,12 @@ sdm_status trainer_set_up(trainer *t, sdm_error *err)
     d->n_voxels = sdm_grid_count(grid);
     // before the blocks: for a grid that is too large its message names the memory needed
     if ((s = trainer_dataset_size(d, c, err))) return s;
+    if ((int64_t)d->n_start < c->data.start && !d->only_holdout)
+        trainer_message(t,
+                        "data.memory_gb is %g: of %lld random maps (data.start) on %.3g voxels the "
+                        "training starts with %zu, and keeps the latest ones (raise it for more)",
+                        c->data.memory_gb, (long long)c->data.start, (double)d->n_voxels,
+                        d->n_start);
 
     // block edge 0 means map order: one block as large as the grid
     size_t block = t->kind->block(c);

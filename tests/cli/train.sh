@@ -86,13 +86,18 @@ cat >link.yaml <<'YAML'
 shape: {name: linkage, options: {links: 1, motion: planar, limit: 0.5, edge: 0.5}}
 grid: {size: [21, 19, 22], spacing: 0.34, origin: [-2.13, -3.07, -4.98]}
 network: {width: 16, modes: 24, rank: 6, degree: 3}
-data: {static: 0, static_share: 0, start: 100000, online: 20, holdout: 12, memory_gb: 0.05}
+data: {static: 0, static_share: 0, start: 100000, online: 20, holdout: 12, memory_gb: 0.0085}
 train: {steps: 60, batch: 16, refine_batch: 8}
 YAML
 expect 0 'warning: auto: template is kept, because pod failed: ' sdmgen train link.yaml --out link --quiet
 # a template keeps held-out maps alone: the others do not count among those that need too much memory
 expect 2 'data.static \(0 maps\), data.start \(0\) and data.holdout \(500\) on .* need 0\.0[0-9]+ GB, data.memory_gb is 0\.001' \
     sdmgen train link.yaml network.kind=template data.holdout=500 data.memory_gb=0.001 --out vain --quiet
+
+# Fewer maps than data.start fit into the memory: the training begins with these, and says so.
+sdmgen train link.yaml network.kind=pod data.start=700 data.memory_gb=0.012 --out full >out 2>err || bad "full: $(cat err)"
+grep -q '^sdmgen: data.memory_gb is 0.012: of 700 random maps (data.start) on 8.78e+03 voxels the training starts with 659, ' err ||
+    bad "the memory for maps: $(cat err)"
 
 # Keys that a template without a correction does not need: told, by kind.
 sdmgen train link.yaml network.kind=template --out vain >out 2>err || bad "vain: $(cat err)"

@@ -52,6 +52,10 @@ void trainer_dataset_random_params(const dataset *d, uint64_t k, double *p)
     sdm_sample_params(d->seed, STREAM_TRAIN, k, d->min, d->max, d->distribution, d->n_params, p);
 }
 
+// Random maps with which a training begins at least, if data.start asks for more than fit into the
+// memory.
+#define FEWEST 512
+
 /* Numbers of the maps that a training keeps from its start on. */
 typedef struct kept_maps {
     double fixed, start, holdout; // of the static grid, random, held out (twice as large)
@@ -73,14 +77,28 @@ static sdm_status refuse_memory(const sdm_config *c, kept_maps n, size_t n_voxel
         c->data.memory_gb);
 }
 
-sdm_status sdm_train_check_memory(const sdm_config *c, size_t n_params, const sdm_grid *g,
-                                  sdm_error *err)
+static kept_maps maps_of(const sdm_config *c, size_t n_params)
 {
     kept_maps n = {1, (double)c->data.start, (double)c->data.holdout};
     for (size_t i = 0; i < n_params; i++)
         n.fixed *= (double)sdm_config_static_count(c, n_params, i);
+    return n;
+}
+
+bool sdm_train_fits_memory(const sdm_config *c, size_t n_params, const sdm_grid *g)
+{
+    return kept_gb(maps_of(c, n_params), sdm_grid_count(g)) <= c->data.memory_gb;
+}
+
+sdm_status sdm_train_check_memory(const sdm_config *c, size_t n_params, const sdm_grid *g,
+                                  sdm_error *err)
+{
+    const kept_maps n = maps_of(c, n_params);
     const size_t n_voxels = sdm_grid_count(g);
-    return kept_gb(n, n_voxels) <= c->data.memory_gb ? SDM_OK : refuse_memory(c, n, n_voxels, err);
+    kept_maps least = n;
+    least.start = fmin(n.start, FEWEST);
+    return kept_gb(least, n_voxels) <= c->data.memory_gb ? SDM_OK
+                                                         : refuse_memory(c, n, n_voxels, err);
 }
 
 sdm_status trainer_dataset_size(dataset *d, const sdm_config *config, sdm_error *err)
@@ -95,14 +113,18 @@ sdm_status trainer_dataset_size(dataset *d, const sdm_config *config, sdm_error 
     if (d->only_holdout) d->n_static = d->n_start = d->n_online = 0;
 
     // the memory holds the static grid and the held-out maps in any case (these as floats: two
-    // units each), and as many random maps as fit into the rest
+    // units each), and as many random maps as fit into the rest; those of data.start that do not
+    // fit are made during the training
     const double map_bytes = 2.0 * (double)d->n_voxels;
     const double room = bytes / map_bytes - (double)d->n_static - 2.0 * (double)d->n_holdout;
-    if (room < (double)d->n_start || (room < 1 && !d->only_holdout))
+    const double least = fmin((double)d->n_start, FEWEST);
+    if (room < least || (room < 1 && !d->only_holdout))
         return refuse_memory(
             config, (kept_maps){(double)d->n_static, (double)d->n_start, (double)d->n_holdout},
             d->n_voxels, err);
     const size_t n_random = d->n_start + d->n_online;
+    if (room < (double)d->n_start) d->n_start = (size_t)room;
+    d->n_online = n_random - d->n_start;
     d->n_ring = room < (double)n_random ? (size_t)room : n_random;
     d->n_slots = d->n_static + d->n_ring;
     if (d->n_static + d->n_start == 0 && !d->only_holdout)

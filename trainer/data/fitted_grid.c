@@ -48,7 +48,7 @@ static sdm_status refine_for_thin(const sdm_config *config, const sdm_instance *
         if (isnan(*thick) || THIN_VOXELS * sdm_grid_coarsest(grid) <= *thick) break;
         s = sdm_grid_around(f->low, f->high, n, NULL, &finer, err);
         if (s || (double)sdm_grid_count(&finer) > COUNT_MOST ||
-            sdm_train_check_memory(config, n_params, &finer, NULL))
+            !sdm_train_fits_memory(config, n_params, &finer))
             break;
         *grid = finer;
     }

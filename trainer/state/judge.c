@@ -106,6 +106,10 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
         advise_budget(in, v);
         return "The number of maps limits it, which the time for them limits";
     }
+    if (in->full) {
+        advise_double(v, "data.memory_gb", c->data.memory_gb, INFINITY);
+        return "The number of maps limits it, which the memory for them limits";
+    }
     // `start` counts for bases and polynomials, too
     if (c->data.online > c->data.start)
         advise(v, "data.online", (double)c->data.online, 2 * (double)c->data.online);
@@ -212,7 +216,7 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
         snprintf(also, sizeof also, " with network.kind: template");
     // maps of two bytes a voxel; twice as many for this key
     const double gb = 2e-9 * (double)sdm_grid_count(&c->grid) * (in->maps + v->to);
-    if (v->limit == SDM_CAUSE_MAPS && !in->cut && gb > c->data.memory_gb)
+    if (v->limit == SDM_CAUSE_MAPS && !in->cut && !in->full && gb > c->data.memory_gb)
         snprintf(also, sizeof also, " and data.memory_gb to %.0f", ceil(gb));
     if (v->limit == SDM_CAUSE_MAPS && !in->cut && c->train.minutes > 0)
         snprintf(time, sizeof time, ", and train.minutes by the time that they take");
@@ -377,13 +381,15 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
     for (int i = 0; i < SDM_CAUSES; i++) out->part_mm2[i] = NAN;
     out->part_mm2[SDM_CAUSE_GRID] = surface.rms_mm * surface.rms_mm;
     set_parts(&m, errors, t->accuracy.mse_mm2, out);
-    const verdict_input in = {
-        .config = t->config,
-        .maps = (double)(d->n_static + d->n_taken),
-        .cut = trainer_by_time(t) && !d->only_holdout &&
-               (int64_t)d->n_start<t->config->data.start, .ended_early = t->saved_seconds> 0,
-        .steps = (double)t->step,
-        .budget = t->turns->budget};
+    const bool fewer = !d->only_holdout && (int64_t)d->n_start < t->config->data.start,
+               full = fewer && d->n_slots < d->n_static + (size_t)t->config->data.start;
+    const verdict_input in = {.config = t->config,
+                              .maps = (double)(d->n_static + d->n_taken),
+                              .cut = fewer && !full && trainer_by_time(t),
+                              .full = full,
+                              .ended_early = t->saved_seconds > 0,
+                              .steps = (double)t->step,
+                              .budget = t->turns->budget};
     set_derivatives(t, &errors->derivatives, out);
     trainer_verdict_decide(&in, out);
     trainer_history_dispose(&h);

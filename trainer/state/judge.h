@@ -27,6 +27,7 @@ typedef struct verdict_input {
     const sdm_config *config;
     double maps;      /* training maps made by the run */
     bool cut;         /* the time of the budget ended before all maps of data.start were made */
+    bool full;        /* data.memory_gb did not hold all of them */
     bool ended_early; /* by train.patience */
     double steps;     /* of the optimiser */
     double budget;    /* of the run, in the unit of the key that gives it; with `auto` this training

@@ -126,9 +126,13 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
 sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance *shape,
                                    sdm_text *out, sdm_error *err);
 
-/* SDM_E_CONFIG, and how much memory is needed, if the maps that a training on this grid keeps from
-   its start on (data.static, data.start and, twice as large, data.holdout) do not fit into
-   data.memory_gb. A template without a correction keeps fewer. */
+/* Do the maps that a training on this grid keeps from its start on (data.static, data.start and,
+   twice as large, data.holdout) fit into data.memory_gb? A template without a correction keeps
+   fewer. */
+bool sdm_train_fits_memory(const sdm_config *c, size_t n_params, const sdm_grid *g);
+
+/* SDM_E_CONFIG, and how much memory is needed, if they do not fit even with 512 maps in place of a
+   larger data.start: a training makes as many of data.start before its first step as fit. */
 sdm_status sdm_train_check_memory(const sdm_config *c, size_t n_params, const sdm_grid *g,
                                   sdm_error *err);
 

@@ -89,24 +89,47 @@ static void add_number(sdm_text *command, const char *option, double value)
     add_word(command, number);
 }
 
+/* Is the argument "key=value" or "key.member=value", so that the change of this key replaces it? */
+static bool sets_key(const char *argument, const char *key)
+{
+    const size_t n = strlen(key);
+    return !strncmp(argument, key, n) && (argument[n] == '=' || argument[n] == '.');
+}
+
+/* Appends the files and keys of the command line but those that `v` replaces, and its changes. */
+static void add_changes(sdm_text *command, const cli_args *args, const sdm_verdict *v)
+{
+    // a grid.size or grid.origin of the configuration, with other voxels, would cut the shapes
+    const bool grid = !strncmp(v->key, "grid", 4), budget = v->minutes > 0;
+    char change[80];
+    for (size_t i = 0; i < args->files.n; i++) {
+        const char *word = args->files.items[i];
+        if (!sets_key(word, grid ? "grid" : v->key) && !(budget && sets_key(word, "train.minutes")))
+            add_word(command, word);
+    }
+    if (grid) add_word(command, "grid=auto");
+    if (!grid || strchr(v->key, '.')) {
+        snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
+        add_word(command, change);
+    }
+    if (budget) {
+        snprintf(change, sizeof change, "train.minutes=%.6g", v->minutes);
+        add_word(command, change);
+    }
+}
+
 /* Prints the command that follows the advice of the verdict. */
 static void print_next(const cli_args *args, const sdm_train_report *r)
 {
     const sdm_verdict *v = &r->verdict;
     const char *slash = strrchr(r->model_path, '/');
-    char change[80], folder[sizeof r->model_path + 8];
+    char folder[sizeof r->model_path + 8];
     sdm_text command = {0};
     // the maps of another grid are not in --dataset
-    const bool other_maps = args->dataset && !strncmp(v->key, "grid.", 5);
+    const bool other_maps = args->dataset && !strncmp(v->key, "grid", 4);
     if (!v->key[0] || !args->files.n || !slash || other_maps) return;
-    // a grid.size of the configuration, with other voxels, would cut the shapes
-    if (strcmp(v->key, "grid.spacing"))
-        snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
-    else
-        snprintf(change, sizeof change, "grid={spacing: %.6g}", v->to);
     snprintf(folder, sizeof folder, "%.*s-2", (int)(slash - r->model_path), r->model_path);
-    for (size_t i = 0; i < args->files.n; i++) add_word(&command, args->files.items[i]);
-    add_word(&command, change);
+    add_changes(&command, args, v);
     for (size_t i = 0; i < args->plugins.n; i++) {
         add_word(&command, "--plugin");
         add_word(&command, args->plugins.items[i]);
@@ -181,8 +204,11 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     // print as text
     char steps[32], maps[32];
     printf("%s\n", r->model_path);
-    printf("  trained     %.1f s, %s steps, %s exact maps", r->seconds,
-           cli_format_count(r->steps, steps), cli_format_count(r->samples, maps));
+    if (r->steps || r->samples)
+        printf("  trained     %.1f s, %s steps, %s exact maps", r->seconds,
+               cli_format_count(r->steps, steps), cli_format_count(r->samples, maps));
+    else
+        printf("  made        in %.1f s: this kind of network needs no training", r->seconds);
     if (r->verdict.saved_seconds > 0)
         printf("; train.patience saved %.0f s", r->verdict.saved_seconds);
     printf("\n  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within %g mm of the surface "
@@ -195,9 +221,10 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     cli_print_verdict(&r->verdict);
     print_next(args, r);
     if (cli_warnings() > 0)
-        printf("  warnings    %zu, at the beginning of the output: what they name the verdict does "
-               "not see\n",
-               cli_warnings());
+        printf("  warnings    %zu, at the beginning of the output%s\n", cli_warnings(),
+               r->verdict.cut > 0 || r->verdict.inside_out > 0
+                   ? ""
+                   : ": the verdict does not know what they name, mend it first");
     return SDM_OK;
 }
 

@@ -8,6 +8,20 @@
 #include "report/report_audit.h"
 #include "sdm/memory.h"
 
+/* Warns if --plugin names a shape that was changed after the training of the model: the fit takes
+ * the network alone and would not notice. */
+static void warn_changed(const cli_fit *f)
+{
+    sdm_registry *registry = NULL;
+    sdm_instance *shape = NULL;
+    sdm_error why = {0};
+    if (!cli_open_registry(f->args, &registry, &why) &&
+        sdm_runtime_instance(f->model, registry, &shape, &why) == SDM_E_PLUGIN)
+        cli_warn("%s", why.text);
+    sdm_instance_free(shape);
+    sdm_registry_free(registry);
+}
+
 static sdm_status open_model(cli_fit *f, sdm_error *err)
 {
     const cli_args *args = f->args;
@@ -29,6 +43,7 @@ static sdm_status open_model(cli_fit *f, sdm_error *err)
                                : args->measure    ? "measure"
                                                   : "policy exact");
     }
+    if (!f->registry && args->plugins.n) warn_changed(f);
     if (!args->fit.exact) {
         f->source.model = f->model;
         f->n_params = info->n_params;

@@ -1,6 +1,7 @@
 /* The true parameters of a test image, from the file of `sdmgen phantom --truth`, to compare the
  * fitted ones with. */
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "fit_command.h"
@@ -9,6 +10,14 @@
 #include "sdm/memory.h"
 
 enum { TRUTH_BYTES_MAX = 1 << 20 };
+
+/* Is the string at index i the name of a parameter of the shape? */
+static bool is_parameter(const cli_fit *f, const sdm_json_document *d, size_t i)
+{
+    for (size_t k = 0; k < f->n_params; k++)
+        if (sdm_json_is(d, i, f->params[k].name)) return true;
+    return false;
+}
 
 /* f->truth[n_params] = the parameters of the document; those that it lacks are NaN. */
 static sdm_status take_truth(cli_fit *f, const char *path, const sdm_json_document *d,
@@ -24,6 +33,11 @@ static sdm_status take_truth(cli_fit *f, const char *path, const sdm_json_docume
         f->truth[i] = NAN;
         found += at && sdm_json_number(d, at, &f->truth[i]);
     }
+    const size_t end = list && d->values[list].kind == '{' ? d->values[list].next : 0;
+    for (size_t key = list + 1; key < end; key = d->values[key + 1].next)
+        if (!is_parameter(f, d, key))
+            return sdm_fail(err, SDM_E_ARG, "%s: '%s' has no parameter '%.*s'", path, f->shape_name,
+                            (int)d->values[key].size, d->values[key].at);
     return found ? SDM_OK
                  : sdm_fail(err, SDM_E_FORMAT,
                             "%s: no object `parameters` with a parameter of '%s', as `sdmgen "

@@ -222,6 +222,21 @@ void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
                  p->met ? " and overlaps another" : "");
 }
 
+bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text)
+{
+    size_t most = 0;
+    for (size_t i = 1; i < a->n; i++)
+        if (a->part[i].folded > a->part[most].folded) most = i;
+    if (!a->n || !(a->part[most].folded > SDM_PART_FOLDED_MIN)) return false;
+    cli_name_part(a, most, text);
+    sdm_text_add(text,
+                 "passes through itself, and %.2g %% of its surface faces the wrong way: what lies "
+                 "behind that is missing; is a fillet larger than half of the part is thick, or a "
+                 "wall thicker than the part is wide?",
+                 100 * a->part[most].folded);
+    return true;
+}
+
 void cli_describe_thin(const sdm_part_audit *a, size_t index, double voxel, sdm_text *text)
 {
     const sdm_part *p = &a->part[index];
@@ -268,6 +283,14 @@ static void warn_inside_out(const sdm_part_audit *audit, const char *mend)
         cli_warn("%zu more parts are inside out", audit->inside_out - told);
 }
 
+static void warn_folded(const sdm_part_audit *audit)
+{
+    sdm_text text = {0};
+    if (!audit->inside_out && cli_describe_folded(audit, &text) && !text.failed)
+        cli_warn("%s", text.data);
+    sdm_text_dispose(&text);
+}
+
 bool cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend)
 {
     sdm_part_audit audit;
@@ -275,6 +298,7 @@ bool cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend)
     warn_open(&audit);
     cli_warn_audit(&audit.mesh);
     warn_inside_out(&audit, mend);
+    warn_folded(&audit);
     const bool thin = warn_thin(&audit, voxel);
     sdm_part_audit_dispose(&audit);
     return thin;
@@ -312,6 +336,13 @@ sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_erro
         sdm_text_dispose(&text);
         return s;
     }
+    sdm_text text = {0};
+    if (cli_describe_folded(a, &text)) {
+        const sdm_status s = sdm_fail(err, SDM_E_QUALITY, "%s", text.failed ? "folded" : text.data);
+        sdm_text_dispose(&text);
+        return s;
+    }
+    sdm_text_dispose(&text);
     if (!encloses) return sdm_fail(err, SDM_E_QUALITY, "the mesh encloses no volume");
     return SDM_OK;
 }

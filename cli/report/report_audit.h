@@ -31,6 +31,10 @@ void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text);
  * edge is, and what to do; nothing if the mesh is closed. */
 void cli_describe_open(const sdm_part_audit *a, sdm_text *text);
 
+/* Writes one line about the part of which the largest share faces the wrong way to `text`. false:
+ * there is none; `text` stays as it was. */
+bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text);
+
 /* Writes one line about part `index`, whose thickness is known and too small for voxels of this
  * size (mm), to `text`: where it is, what becomes of it, and which spacing shows it. */
 void cli_describe_thin(const sdm_part_audit *a, size_t index, double voxel, sdm_text *text);

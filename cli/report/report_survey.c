@@ -130,6 +130,29 @@ static void tell_turned(teller *t)
     tell(t, SDM_E_QUALITY, &text);
 }
 
+static void tell_crossing(teller *t)
+{
+    const sdm_survey_count *c = &t->s->found.crossing;
+    sdm_mesh mesh = {0};
+    sdm_part_audit audit = {0};
+    if (!c->shapes || t->s->found.inside_out.shapes > 0) return;
+    if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
+        sdm_text text = {0};
+        if (cli_describe_folded(&audit, &text)) {
+            sdm_text_add(&text, " (");
+            add_share(t->s, c, &text);
+            sdm_text_add(&text, ", most at ");
+            add_params(t->s, c->worst, SIZE_MAX, &text);
+            sdm_text_add(&text, ")");
+            tell(t, SDM_E_QUALITY, &text);
+        } else {
+            sdm_text_dispose(&text);
+        }
+    }
+    sdm_part_audit_dispose(&audit);
+    sdm_mesh_dispose(&mesh);
+}
+
 /* Inner walls that pass through each other, and where they begin to. */
 static void tell_folded(teller *t)
 {
@@ -435,11 +458,13 @@ static void tell_notes(teller *t)
         if (!n || (notes[i].count == &f->overlaps && t->s->brief && n == f->n)) continue;
         add_count(t->s, notes[i].count, notes[i].what, &text);
         sdm_text_add(&text, "%s", notes[i].after);
+        const bool twins = notes[i].count == &f->duplicate && sdm_survey_has_twins(f);
+        if (twins) sdm_text_add(&text, "; do two parts lie in the same place?");
         // the first shape with overlaps is not the default shape
         if (notes[i].count == &f->overlaps && f->overlaps_begin)
             sdm_text_add(&text,
                          "; the default shape has none: look at slices there (exact -o x.png)");
-        tell(t, SDM_OK, &text);
+        tell(t, twins ? SDM_E_QUALITY : SDM_OK, &text);
     }
 }
 
@@ -462,6 +487,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_failed(&t);
     tell_open(&t);
     tell_inside_out(&t);
+    tell_crossing(&t);
     tell_turned(&t);
     tell_folded(&t);
     tell_flat(&t);

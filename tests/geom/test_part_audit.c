@@ -1,5 +1,5 @@
 /* Audits of the parts of a mesh: boxes whose volumes, unions and orientations are known.
- * Tests: part_audit.c part_gap.c part_thickness.c */
+ * Tests: part_audit.c part_fold.c part_gap.c part_thickness.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -279,6 +279,60 @@ static void test_refusals(void **state)
     sdm_mesh_dispose(&m);
 }
 
+/* A solid of revolution: the outline of n points (radius, z), from the axis to the axis. */
+static sdm_mesh revolve(const double (*outline)[2], size_t n)
+{
+    enum { SECTORS = 24 };
+    static double vert[8 * SECTORS][3];
+    static uint32_t tri[16 * SECTORS][3];
+    size_t n_tri = 0;
+    const double turn = 2 * acos(-1) / SECTORS;
+    // ring i has the vertices SECTORS * i ...; those of the ends on the axis are used once
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < SECTORS; k++) {
+            double *v = vert[i * SECTORS + k];
+            v[0] = outline[i][0] * cos(turn * (double)k);
+            v[1] = outline[i][0] * sin(turn * (double)k);
+            v[2] = outline[i][1];
+        }
+    for (size_t i = 0; i + 1 < n; i++)
+        for (size_t k = 0; k < SECTORS; k++) {
+            const uint32_t low = (uint32_t)(i ? i * SECTORS + k : 0),
+                           low2 = (uint32_t)(i ? i * SECTORS + (k + 1) % SECTORS : 0),
+                           end = (uint32_t)((n - 1) * SECTORS);
+            const bool last = i + 2 == n;
+            const uint32_t high = last ? end : (uint32_t)((i + 1) * SECTORS + k),
+                           high2 = last ? end : (uint32_t)((i + 1) * SECTORS + (k + 1) % SECTORS);
+            if (i) memcpy(tri[n_tri++], (uint32_t[]){low, low2, high}, sizeof *tri);
+            if (!last) memcpy(tri[n_tri++], (uint32_t[]){low2, high2, high}, sizeof *tri);
+        }
+    return (sdm_mesh){vert[0], tri[0], n * SECTORS, n_tri, n * SECTORS, n_tri};
+}
+
+// The rim of a disc whose two edges cross: the tip beyond the crossing is a loop that runs the
+// wrong way round.
+static void test_outline_that_crosses_itself(void **state)
+{
+    (void)state;
+    for (int crossed = 0; crossed < 2; crossed++) {
+        const double z = crossed ? 1 : -1,
+                     outline[8][2] = {{0, -1},      {2, -1},       {2.8, 0.12 * z},
+                                      {3, 0.4 * z}, {3, -0.4 * z}, {2.8, -0.12 * z},
+                                      {2, 1},       {0, 1}};
+        sdm_mesh m = revolve(outline, 8);
+        sdm_part_audit a;
+        if (sdm_part_audit_make(&m, true, &a, &err)) fail_msg("%s", err.text);
+        assert_int_equal(a.n, 1);
+        assert_int_equal(a.part[0].state, SDM_PART_SOLID);
+        // beyond radius 2.8: 27.6 of 94.2 mm^2
+        if (crossed)
+            assert_true(a.part[0].crossed > 0 && fabs(a.part[0].folded - 0.293) < 0.02);
+        else
+            assert_true(a.part[0].crossed == 0 && a.part[0].folded == 0);
+        sdm_part_audit_dispose(&a);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -288,6 +342,7 @@ int main(void)
         cmocka_unit_test(test_cavity_and_parts_apart),
         cmocka_unit_test(test_open_and_flat_parts),
         cmocka_unit_test(test_thickness),
+        cmocka_unit_test(test_outline_that_crosses_itself),
         cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

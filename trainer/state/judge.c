@@ -194,11 +194,23 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
     return largest > 0 || *limit == SDM_CAUSE_GRID;
 }
 
+/* The minutes that a training needs after the change, if they limit it and the key is another; else
+ * 0. */
+static double minutes_for(const verdict_input *in, const sdm_verdict *v)
+{
+    const sdm_config *c = in->config;
+    double factor = 1;
+    if (!strcmp(v->key, "grid.spacing")) factor = pow(v->from / v->to, 3);
+    if (v->limit == SDM_CAUSE_MAPS && !in->cut) factor = 2;
+    if (v->limit == SDM_CAUSE_NETWORK && !strncmp(v->key, "network.", 8)) factor = 2;
+    return c->train.minutes > 0 && factor > 1 ? ceil(10 * factor * c->train.minutes) / 10 : 0;
+}
+
 /* The sentence, with the other keys that must change together with v->key. */
 static void write_sentence(const verdict_input *in, const char *what, sdm_verdict *v)
 {
     const sdm_config *c = in->config;
-    char change[200] = "", also[96] = "", time[64] = "", result[96] = "", share[96] = "";
+    char change[200] = "", also[96] = "", time[96] = "", result[96] = "", share[96] = "";
     if (v->key[0])
         snprintf(change, sizeof change, ": %s %s from %.6g to %.6g",
                  v->to < v->from ? "lower" : "raise", v->key, v->from, v->to);
@@ -218,10 +230,13 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
     const double gb = 2e-9 * (double)sdm_grid_count(&c->grid) * (in->maps + v->to);
     if (v->limit == SDM_CAUSE_MAPS && !in->cut && !in->full && gb > c->data.memory_gb)
         snprintf(also, sizeof also, " and data.memory_gb to %.0f", ceil(gb));
-    if (v->limit == SDM_CAUSE_MAPS && !in->cut && c->train.minutes > 0)
-        snprintf(time, sizeof time, ", and train.minutes by the time that they take");
-    if (v->limit == SDM_CAUSE_NETWORK && !strncmp(v->key, "network.", 8) && c->train.minutes > 0)
-        snprintf(time, sizeof time, ", and train.minutes: a larger network trains more slowly");
+    v->minutes = minutes_for(in, v);
+    if (v->minutes > 0)
+        snprintf(time, sizeof time, ", and train.minutes from %.3g to %.3g for %s",
+                 c->train.minutes, v->minutes,
+                 v->limit == SDM_CAUSE_MAPS      ? "the maps"
+                 : v->limit == SDM_CAUSE_NETWORK ? "a larger network"
+                                                 : "more voxels");
     if (v->limit == SDM_CAUSE_GRID)
         snprintf(result, sizeof result,
                  "; between its voxels exact maps miss the surface by %.2g mm",
@@ -260,6 +275,9 @@ static void tell_cut(sdm_verdict *v)
 {
     char rest[sizeof v->sentence], share[32] = "all";
     memcpy(rest, v->sentence, sizeof rest);
+    // the key that is changed first
+    snprintf(v->key, sizeof v->key, "grid");
+    v->minutes = 0;
     if (v->cut < 1) snprintf(share, sizeof share, "%.2g %% of the", fmin(99, 100 * v->cut));
     snprintf(v->sentence, sizeof v->sentence,
              "The grid cuts %s shapes, their surfaces end open: grid: auto holds them. %.400s",
@@ -286,6 +304,8 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
     // the maps lack these parts: however exact the network is, it has learned another shape
     const bool lacks = v->inside_out > 0 || lacks_thin_part(v);
     if (lacks && v->grade == SDM_GRADE_GOOD) v->grade = SDM_GRADE_USABLE;
+    // whole parts are missing: who has only the model file must be warned
+    if (v->inside_out > 0) v->grade = SDM_GRADE_POOR;
     if (v->thickness_mm < MISSING * v->coarse_mm) v->grade = SDM_GRADE_POOR;
     if (v->inside_out > 0)
         tell_inside_out(v);

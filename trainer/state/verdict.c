@@ -82,6 +82,7 @@ void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
     sdm_json_text(j, "key", v->key);
     sdm_json_real(j, "from", v->from);
     sdm_json_real(j, "to", v->to);
+    sdm_json_real(j, "minutes", v->minutes);
     sdm_json_real(j, "at_best_mm", v->at_best_mm);
     sdm_json_text(j, "sentence", v->sentence);
 }

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "part_fold.h"
 #include "part_thickness.h"
 #include "parts.h"
 #include "sdm/internal/vec3.h"
@@ -260,12 +261,14 @@ static sdm_status find_parts(job *j, sdm_error *err)
     return SDM_OK;
 }
 
+/* Thickness and folds of the parts. */
 static sdm_status measure_thickness(job *j, sdm_error *err)
 {
     sdm_part_audit *a = j->out;
+    const size_t n = a->n < MEASURED ? a->n : MEASURED;
     if (!a->mesh.closed) return SDM_OK;
-    return sdm_part_thickness(&j->turned, &j->survey.tree, j->part_of, a->part,
-                              a->n < MEASURED ? a->n : MEASURED, err);
+    sdm_part_folds(&j->turned, &j->survey.tree, j->part_of, a->part, n);
+    return sdm_part_thickness(&j->turned, &j->survey.tree, j->part_of, a->part, n, err);
 }
 
 static void job_dispose(job *j)

@@ -15,7 +15,7 @@
 #define RIGHT 22
 #define TOP (46 + SDM_SECTION_ABOVE)
 #define NOTE 32 /* two lines below the title */
-#define GAP 24
+#define GAP 36
 #define BELOW SDM_SECTION_BELOW
 #define BAR 14
 #define FOOT 84 /* colour bars with numbers and captions */
@@ -146,9 +146,9 @@ static void draw_panel(sdm_canvas *c, const layout *l, size_t column, int axis)
     sdm_box box = l->row[axis];
     box.x += (int)column * (l->column + GAP);
     sdm_panel_colours(c, box, &s, map_of(l, map->error), l->low[map->error], l->high[map->error]);
+    draw_points(c, l, box, map, axis);
     draw_contours(c, l, box, map, axis);
     sdm_section_draw_frame(c, &l->sections, box, axis, column == 0);
-    draw_points(c, l, box, map, axis);
 }
 
 /* The legend, centred at x: a sample of each contour's line with its level, and a dot if the map

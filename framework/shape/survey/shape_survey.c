@@ -33,6 +33,7 @@ typedef struct finding {
     uint64_t crc_vert, crc_tri;
     size_t open, inside_out, turned, apart, flat, overlaps, crossed, degenerate, duplicate;
     double volume, area, min[3], max[3];
+    double turned_over;  /* largest share of the area of a part that faces the wrong way */
     double thick;        /* of the thinnest part, mm; NaN: not known */
     double beyond[3][2]; /* mm */
 } finding;
@@ -98,6 +99,7 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
         out->apart += audit.n > 1 && audit.part[i].state == SDM_PART_SOLID && !audit.part[i].met;
         out->crossed += audit.part[i].crossed;
         out->flat += sdm_survey_part_is_flat(&audit, i);
+        out->turned_over = fmax(out->turned_over, audit.part[i].folded);
     }
     out->thick = sdm_part_audit_thickness(&audit);
     out->inside_out = audit.inside_out;
@@ -257,6 +259,7 @@ static void sum_up(survey *v)
         }
         count(&s->open, i, (double)f->open);
         count(&s->inside_out, i, (double)f->inside_out);
+        if (f->turned_over > SDM_PART_FOLDED_MIN) count(&s->crossing, i, f->turned_over);
         count(&s->turned, i, (double)f->turned);
         count(&s->apart, i, (double)f->apart);
         count(&s->flat, i, (double)f->flat);
@@ -505,15 +508,21 @@ size_t sdm_survey_samples(const sdm_instance *shape, size_t samples)
     return n < 8 ? 8 : n;
 }
 
+bool sdm_survey_has_twins(const sdm_shape_survey *s)
+{
+    return s->duplicate.amount > 0.1 * (double)s->n_tri;
+}
+
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
 {
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
-    bool bad = s->inside_out.shapes || s->folded.shapes || s->turned.shapes || s->resized.shapes ||
-               s->rewired.shapes || s->cut.shapes || s->thin.shapes || s->flat.shapes ||
-               s->narrow || s->unlike || s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT ||
-               s->scale.odd_size || s->scale.odd_speed || s->scale.odd_angle;
+    bool bad = s->inside_out.shapes || s->crossing.shapes || s->folded.shapes || s->turned.shapes ||
+               s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->thin.shapes ||
+               s->flat.shapes || s->narrow || s->unlike ||
+               s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
+               s->scale.odd_speed || s->scale.odd_angle;
     for (size_t k = 0; k < s->n_params && s->jump; k++)
         bad = bad || s->jump[k].kind != SDM_BREAK_NONE;
-    bad = bad || s->slow;
+    bad = bad || s->slow || sdm_survey_has_twins(s);
     return bad ? SDM_E_QUALITY : SDM_OK;
 }

@@ -303,7 +303,7 @@ static void check_tissues(const fit_problem *p, const fit_residuals *s, const sd
             v, side ? SDM_FIT_CHECK_INSIDE : SDM_FIT_CHECK_OUTSIDE, wider <= WIDER_MAX,
             SDM_FIT_DOUBTFUL, wider, WIDER_MAX,
             "the values %s spread by %.3g, but most of them by %.3g only: a second material lies "
-            "there",
+            "there, or the maps are too coarse for the walls",
             side ? "inside" : "outside", law[side]->sd, s->spread[side]);
     }
     const sdm_fit_law *near[2] = {nearest_law(&p->opts->appearance, law[0]->mean), given};

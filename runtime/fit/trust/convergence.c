@@ -73,6 +73,6 @@ void sdm_fit_name_restless(const fit_problem *p, sdm_fit_result *r, sdm_error *e
         sdm_error named = {0};
         not_converged(p, r, &named);
         if (err && !strcmp(err->text, f->text)) *err = named;
-        snprintf(f->text, sizeof f->text, "%.239s", named.text);
+        snprintf(f->text, sizeof f->text, "%.511s", named.text);
     }
 }

@@ -45,7 +45,14 @@ typedef struct sdm_part {
      * the mesh is open, the part is not solid or lies inside others, or it is not one of the first
      * 1000 parts. */
     double thick;
+    /* share of the area, of a solid part that meets itself, that faces the wrong way: an outline
+     * that crosses itself, or a wall thicker than the part is wide. What lies behind it counts as
+     * outside. 0 in an open mesh and for parts after the first 1000 */
+    double folded;
 } sdm_part;
+
+/* A larger share is a mistake; tubes that bend sharply have a smaller one. */
+#define SDM_PART_FOLDED_MIN 0.03
 
 /* Zero-initialise; sdm_part_audit_dispose() frees. */
 typedef struct sdm_part_audit {

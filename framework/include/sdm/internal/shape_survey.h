@@ -88,8 +88,11 @@ typedef struct sdm_shape_survey {
     sdm_survey_count open;       /* edges on which not as many triangles run each way: not closed */
     sdm_survey_count inside_out; /* parts of state SDM_PART_INSIDE_OUT (part_audit.h) */
     sdm_survey_count turned;     /* parts that are inside out and that the exact engine turns */
-    sdm_survey_count overlaps;   /* pairs of triangles that meet: the union counts */
-    bool overlaps_begin;         /* some shapes overlap themselves, but not shape 0 */
+    /* parts that pass through themselves (sdm_part.folded); amount: the share that faces the wrong
+     * way */
+    sdm_survey_count crossing;
+    sdm_survey_count overlaps;              /* pairs of triangles that meet: the union counts */
+    bool overlaps_begin;                    /* some shapes overlap themselves, but not shape 0 */
     sdm_survey_count degenerate, duplicate; /* triangles */
     size_t n_vert, n_tri;                   /* of the first mesh */
     sdm_survey_count resized;  /* other numbers of vertices or triangles; amount: of vertices */
@@ -147,15 +150,19 @@ void sdm_shape_survey_dispose(sdm_shape_survey *s);
  * ones, at least 8. */
 size_t sdm_survey_samples(const sdm_instance *shape, size_t samples);
 
+/* Are so many triangles given twice, over a tenth of the first mesh, that whole parts are likely to
+ * lie in the same place? */
+bool sdm_survey_has_twins(const sdm_shape_survey *s);
+
 /* Does part i of an audited mesh count for sdm_shape_survey.flat? */
 bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i);
 
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
  * are usable, but a training or derivatives would suffer: parts that are inside out (also those
- * that the engine turns), parts without thickness, walls that pass through each other, sizes,
- * triangles or vertices that jump, a grid that cuts or is too coarse for a part, wrong velocities,
- * results that differ from call to call, or an odd size or speed (another unit than mm, or a
- * parameter that does nothing). Else SDM_OK. */
+ * that the engine turns), parts without thickness, walls that pass through each other or outlines
+ * that cross themselves, sizes, triangles or vertices that jump, a grid that cuts or is too coarse
+ * for a part, wrong velocities, results that differ from call to call, or an odd size or speed
+ * (another unit than mm, or a parameter that does nothing). Else SDM_OK. */
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 
 /* A smaller share of the area may turn over: slivers at a tip, rings of a tube that bends sharply

@@ -80,6 +80,8 @@ typedef struct sdm_verdict {
     /* The key to change, its value in the run and the value to try; "": none. */
     char key[40];
     double from, to;
+    /* train.minutes for the training with this change; 0: as many as now, or other budgets */
+    double minutes;
     double at_best_mm;  /* root mean square error without the part that limits; NaN: not known */
     char sentence[512]; /* what limits the model and what to do, one sentence */
 } sdm_verdict;

@@ -6,6 +6,7 @@
 #include "inputs/model_grade.h"
 #include "inputs/setup.h"
 #include "report/report_audit.h"
+#include "report/terminal.h"
 #include "sdm/memory.h"
 
 /* Warns if --plugin names a shape that was changed after the training of the model: the fit takes

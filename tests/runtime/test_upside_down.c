@@ -1,10 +1,12 @@
 /* A pin, a shaft with a ball on either end, one a little larger than the other: upside down it has
  * almost the same surface. A fit to labels that starts upside down is refused, because the right
- * pose explains them better; a pin with equal balls has two right poses. Tests: next_pose.c */
+ * pose explains them better; a pin with equal balls has two right poses. A knob with three lobes
+ * has three, and the turn between them is named. Tests: next_pose.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -64,7 +66,6 @@ static const sdm_fit_finding *next_pose(const sdm_fit_result *r)
     for (size_t i = 0; i < r->verdict.n_findings; i++)
         if (r->verdict.findings[i].kind == SDM_FIT_CHECK_NEXT_POSE) return &r->verdict.findings[i];
     return NULL;
-    return NULL;
 }
 
 static void check(double lower, bool turned, bool accepted)
@@ -93,11 +94,58 @@ static void test_both_ways_of_a_symmetric_pin_pass(void **state)
     check(UPPER, false, true);
 }
 
+static const sdm_param knob_params[1] = {{"radius", "mm", 4, 8, 6, "of the upper end"}};
+
+static void knob_ring(const double *p, int i, double *r, double *z)
+{
+    const double t = (double)i / (RINGS - 1);
+    *z = 10 * t;
+    *r = p[0] * (0.6 + 0.4 * t);
+}
+
+static int knob_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                     const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    const int s = revolved_mesh(host, out, RINGS, 48, knob_ring, p, -0.5, 10.5);
+    for (size_t v = 0; v < out->n_vert && !s; v++) {
+        double *x = out->vert + 3 * v;
+        const double lobe = 1 + 0.3 * cos(3 * atan2(x[1], x[0]));
+        x[0] *= lobe, x[1] *= lobe;
+    }
+    return s;
+}
+
+static const sdm_shape knob = {.abi = SDM_SHAPE_ABI,
+                               .size = sizeof(sdm_shape),
+                               .name = "knob",
+                               .summary = "a knob with three lobes",
+                               .params = knob_params,
+                               .n_params = 1,
+                               .mesh = knob_mesh};
+
+static void test_third_of_a_turn_is_named(void **state)
+{
+    (void)state;
+    const double truth[1] = {6};
+    const sdm_grid g = sdm_grid_centred((int64_t[3]){45, 45, 32}, 0.5, (double[3]){0, 0, 5});
+    sdm_fit_opts o = sdm_fit_defaults();
+    sdm_fit_result r;
+    sdm_error err;
+    o.polish_eps = 1e-3;
+    const sdm_status s = fit_labels_of(&knob, truth, &g, &o, &r, &err);
+    const sdm_fit_finding *f = next_pose(&r);
+    if (s || !f || !strstr(f->text, "turned by 120 degrees about"))
+        fail_msg("%s (%s); %s", sdm_status_name(s), err.text, f ? f->text : "no next pose");
+    sdm_fit_dispose(&r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_upside_down_is_refused),
         cmocka_unit_test(test_both_ways_of_a_symmetric_pin_pass),
+        cmocka_unit_test(test_third_of_a_turn_is_named),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

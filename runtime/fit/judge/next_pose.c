@@ -44,9 +44,12 @@
 #define STEPS_OF_FIT 2
 // rotations from which the fit may return to its own pose before the search is given up
 #define TRIES_MAX 3
-// turns that are tried: the rotations of a cube, and those evenly over all rotations
+// turns that are tried: the rotations of a cube, by a third and a fifth of a turn about each of its
+// axes (fins, petals), and those evenly over all rotations
 #define N_CUBE 24
+#define N_FOLD 6
 #define N_EVEN 72
+#define N_TURNS (N_CUBE + N_FOLD + N_EVEN)
 // values of a parameter that are tried: the middles of this many equal parts of its range, without
 // those nearer to the value of the fit than half of a part
 #define N_PARTS 3
@@ -148,8 +151,8 @@ static void cube_rotation(size_t i, double r[9])
     for (int row = 0; row < 3; row++) r[3 * row + order[which][row]] = sign[row];
 }
 
-// *to = the fit turned about its centre: by rotation i of the cube of its axes, or by one of the
-// others
+// *to = the fit turned about its centre: by turn i of the cube of its axes, about one of these axes,
+// or by one of the others
 static void turned(const own_fit *own, size_t i, fit_state *to)
 {
     const double *v = own->axes, back[9] = {v[0], v[3], v[6], v[1], v[4], v[7], v[2], v[5], v[8]};
@@ -158,8 +161,13 @@ static void turned(const own_fit *own, size_t i, fit_state *to)
         cube_rotation(i, cube);
         m3_product(back, cube, half);
         m3_product(half, v, q);
+    } else if (i < N_CUBE + N_FOLD) {
+        const size_t k = i - N_CUBE, axis = k / 2;
+        const double angle = (k % 2 ? 0.4 : 2.0 / 3) * acos(-1), *by = v + 3 * axis;
+        const sdm_pose about = {.rotation = {angle * by[0], angle * by[1], angle * by[2]}};
+        sdm_pose_matrix(&about, q);
     } else {
-        sdm_fit_turn(SDM_FIT_TURNS_SPHERE, i - N_CUBE, N_EVEN, q);
+        sdm_fit_turn(SDM_FIT_TURNS_SPHERE, i - N_CUBE - N_FOLD, N_EVEN, q);
     }
     *to = own->state;
     m3_product(own->state.rotation, q, to->rotation);
@@ -170,7 +178,7 @@ static void turned(const own_fit *own, size_t i, fit_state *to)
 
 /* The turns from which rivals start, the best first. */
 typedef struct turns {
-    fit_start other[N_CUBE + N_EVEN]; // to other surfaces, with the parameters of the fit
+    fit_start other[N_TURNS];     // to other surfaces, with the parameters of the fit
     fit_start alike[ALIKE_TRIED];     // to surfaces that are nearly that of the fit, all free
     size_t n_other, n_alike;
     // the turn by at least SYMMETRIC_MIN to the most similar surface, if it is the same; same.dice
@@ -197,7 +205,7 @@ static void turns_rank(const own_fit *own, turns *t)
 {
     t->n_other = t->n_alike = 0;
     t->same.dice = 0;
-    for (size_t i = 0; i < N_CUBE + N_EVEN; i++) {
+    for (size_t i = 0; i < N_TURNS; i++) {
         fit_start one = {0};
         turned(own, i, &one.state);
         const double dice = likeness(own, own->distance, own->volume, &one.state);
@@ -208,7 +216,7 @@ static void turns_rank(const own_fit *own, turns *t)
         one.log_likelihood = sdm_fit_likelihood_at(own->p, &one.state, SAMPLES_RANKED);
         one.keep_params = dice <= ALIKE;
         if (one.keep_params)
-            sdm_fit_start_insert(t->other, &t->n_other, N_CUBE + N_EVEN, &one);
+            sdm_fit_start_insert(t->other, &t->n_other, N_TURNS, &one);
         else
             sdm_fit_start_insert(t->alike, &t->n_alike, ALIKE_TRIED, &one);
     }

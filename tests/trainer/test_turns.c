@@ -201,7 +201,7 @@ static void resume_is_bit_exact(void **state)
 static void refused_resume_loses_nothing(void **state)
 {
     (void)state;
-    static const char *const wrong[] = {"network.width=24", "data.start=100000"};
+    static const char *const wrong[] = {"network.width=24", "data.holdout=40000"};
     const sdm_config c = parse_config(link_text, NULL, 0);
     train(&c);
     const uint64_t whole = hash_of("model.sdm");
@@ -273,7 +273,7 @@ static void second_model_cannot_be_written(void **state)
 static void template_remains(void **state)
 {
     (void)state;
-    static const char *const much[] = {"data.start=100000", "data.memory_gb=0.02"},
+    static const char *const much[] = {"data.start=100000", "data.memory_gb=0.004"},
                              *const short_time[] = {"train.steps=0", "train.minutes=0.0001"};
     const sdm_config large = parse_config(link_text, much, 2),
                      brief = parse_config(link_text, short_time, 2);

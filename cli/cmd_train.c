@@ -99,16 +99,17 @@ static bool sets_key(const char *argument, const char *key)
 /* Appends the files and keys of the command line but those that `v` replaces, and its changes. */
 static void add_changes(sdm_text *command, const cli_args *args, const sdm_verdict *v)
 {
-    // a grid.size or grid.origin of the configuration, with other voxels, would cut the shapes
-    const bool grid = !strncmp(v->key, "grid", 4), budget = v->minutes > 0;
+    // a grid.size or grid.origin of the configuration cuts the shapes, or would with other voxels
+    const bool grid = v->cut > 0 || !strncmp(v->key, "grid.", 5), budget = v->minutes > 0;
     char change[80];
     for (size_t i = 0; i < args->files.n; i++) {
         const char *word = args->files.items[i];
-        if (!sets_key(word, grid ? "grid" : v->key) && !(budget && sets_key(word, "train.minutes")))
+        if (!(grid && sets_key(word, "grid")) && !(v->key[0] && sets_key(word, v->key)) &&
+            !(budget && sets_key(word, "train.minutes")))
             add_word(command, word);
     }
     if (grid) add_word(command, "grid=auto");
-    if (!grid || strchr(v->key, '.')) {
+    if (v->key[0]) {
         snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
         add_word(command, change);
     }
@@ -126,8 +127,8 @@ static void print_next(const cli_args *args, const sdm_train_report *r)
     char folder[sizeof r->model_path + 8];
     sdm_text command = {0};
     // the maps of another grid are not in --dataset
-    const bool other_maps = args->dataset && !strncmp(v->key, "grid", 4);
-    if (!v->key[0] || !args->files.n || !slash || other_maps) return;
+    const bool other_maps = args->dataset && (v->cut > 0 || !strncmp(v->key, "grid.", 5));
+    if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || !slash || other_maps) return;
     snprintf(folder, sizeof folder, "%.*s-2", (int)(slash - r->model_path), r->model_path);
     add_changes(&command, args, v);
     for (size_t i = 0; i < args->plugins.n; i++) {

@@ -275,9 +275,6 @@ static void tell_cut(sdm_verdict *v)
 {
     char rest[sizeof v->sentence], share[32] = "all";
     memcpy(rest, v->sentence, sizeof rest);
-    // the key that is changed first
-    snprintf(v->key, sizeof v->key, "grid");
-    v->minutes = 0;
     if (v->cut < 1) snprintf(share, sizeof share, "%.2g %% of the", fmin(99, 100 * v->cut));
     snprintf(v->sentence, sizeof v->sentence,
              "The grid cuts %s shapes, their surfaces end open: grid: auto holds them. %.400s",

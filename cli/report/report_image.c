@@ -26,7 +26,8 @@ static void print_grid(const sdm_grid *g)
 
 bool cli_is_distance_map(const sdm_volume *v)
 {
-    return strstr(v->text, ": " SDM_MAP_TEXT) && v->n_layers == 1 && !v->n_nan;
+    // a segmentation keeps the description of the map of which it is the inside
+    return strstr(v->text, ": " SDM_MAP_TEXT) && v->n_layers == 1 && !v->n_nan && !v->n_segments;
 }
 
 /* Volume inside the zero level set, mm^3; NaN: the file is no distance map of this program. */
@@ -36,6 +37,16 @@ static double map_volume(const sdm_volume *v)
     return !cli_is_distance_map(v) || sdm_map_volume(&v->grid, v->values, 0, &volume, NULL)
                ? NAN
                : volume;
+}
+
+/* Volume of the voxels of a segment, mm^3; NaN: there are several layers. */
+static double segment_volume(const sdm_volume *v, const sdm_segment *s)
+{
+    const double *h = v->grid.spacing;
+    size_t n = 0;
+    for (size_t i = 0; i < sdm_grid_count(&v->grid) && v->n_layers == 1; i++)
+        n += (double)v->values[i] == (double)s->value;
+    return v->n_layers == 1 ? (double)n * h[0] * h[1] * h[2] : NAN;
 }
 
 void cli_print_volume(const char *path, const sdm_volume *v)
@@ -54,8 +65,10 @@ void cli_print_volume(const char *path, const sdm_volume *v)
         cli_print("             %zu are NaN, %zu infinite\n", v->n_nan, v->n_inf);
     for (size_t i = 0; i < v->n_segments; i++) {
         const sdm_segment *s = &v->segments[i];
-        cli_print("%s '%s' (%s): value %lld in layer %zu\n", i ? "            " : "segments    ",
+        const double mm3 = segment_volume(v, s);
+        cli_print("%s '%s' (%s): value %lld in layer %zu", i ? "            " : "segments    ",
                   s->name, s->id, (long long)s->value, s->layer);
+        cli_print(isfinite(mm3) ? ", its voxels have %.6g mm^3\n" : "\n", mm3);
     }
     if (v->text[0]) cli_print("description  %s\n", v->text);
 }
@@ -82,6 +95,7 @@ void cli_json_volume(sdm_json *j, const char *path, const sdm_volume *v)
         sdm_json_text(j, "id", v->segments[i].id);
         sdm_json_int(j, "value", v->segments[i].value);
         sdm_json_int(j, "layer", (int64_t)v->segments[i].layer);
+        sdm_json_real(j, "volume_mm3", segment_volume(v, &v->segments[i]));
         sdm_json_close(j, '}');
     }
     sdm_json_close(j, ']');

@@ -41,6 +41,11 @@ documented 'train --plan' sdmgen train "$source_folder/tests/cli/tiny.yaml" --pl
 documented verify sdmgen verify map.nrrd --json
 documented phantom sdmgen phantom --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 --spacing 0.8 -o ct.nii --label label.nii --json
 sdmgen info ct.nii --json | grep -q volume_mm3 && bad 'an image of a scanner has a volume'
+# the labels 0 and 1 of a segmentation are no distances: its volume is that of its voxels
+sdmgen exact --shape ellipsoid -p rx=3 -p ry=2 -p rz=1.5 --spacing 0.21 -o part.seg.nrrd -q
+sdmgen info part.seg.nrrd >out
+grep -q 'inside the surface' out && bad "labels as distances: $(cat out)"
+near "$(sed -n 's/.*, its voxels have \(.*\) mm^3$/\1/p' out)" 37.7 1
 documented fit sdmgen fit --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 label.nii --label 1 --rotation 0,0,0 --spacing 0.8 --measure --json
 printf 'id,image,label\na,label.nii,1\n' >cohort.csv
 documented 'fit --cases' sdmgen fit --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 --rotation 0,0,0 --spacing 0.8 --cases cohort.csv -o cohort --json

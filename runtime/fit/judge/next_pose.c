@@ -151,8 +151,8 @@ static void cube_rotation(size_t i, double r[9])
     for (int row = 0; row < 3; row++) r[3 * row + order[which][row]] = sign[row];
 }
 
-// *to = the fit turned about its centre: by turn i of the cube of its axes, about one of these axes,
-// or by one of the others
+// *to = the fit turned about its centre: by turn i of the cube of its axes, about one of these
+// axes, or by one of the others
 static void turned(const own_fit *own, size_t i, fit_state *to)
 {
     const double *v = own->axes, back[9] = {v[0], v[3], v[6], v[1], v[4], v[7], v[2], v[5], v[8]};
@@ -179,7 +179,7 @@ static void turned(const own_fit *own, size_t i, fit_state *to)
 /* The turns from which rivals start, the best first. */
 typedef struct turns {
     fit_start other[N_TURNS];     // to other surfaces, with the parameters of the fit
-    fit_start alike[ALIKE_TRIED];     // to surfaces that are nearly that of the fit, all free
+    fit_start alike[ALIKE_TRIED]; // to surfaces that are nearly that of the fit, all free
     size_t n_other, n_alike;
     // the turn by at least SYMMETRIC_MIN to the most similar surface, if it is the same; same.dice
     // 0: there is none

@@ -146,7 +146,9 @@ sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err)
     if (network && f->args->spacing[0] > 0)
         return sdm_fail(
             err, SDM_E_ARG,
-            "fit: --spacing applies to exact maps (--exact, --shape); a model has its own grid");
+            "fit: --spacing applies to exact maps (--exact, --shape); a model has its own grid: "
+            "for "
+            "finer maps fit again with --exact from the parameters and the pose of its result");
     if (!network && f->args->fit.polish)
         return sdm_fail(
             err, SDM_E_ARG,

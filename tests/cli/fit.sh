@@ -95,6 +95,8 @@ has '^  rx .* \+- .* mm +truth 3\.5, off by [0-9.]+ sd$'
 expect 2 'truth\.json: the truth of another shape than .torus.: ellipsoid' sdmgen fit --shape torus ct.nii.gz $near_truth --truth truth.json
 echo '{"shape": "ellipsoid"}' >empty.json
 expect 3 'empty\.json: no object .parameters. with a parameter of .ellipsoid.' sdmgen fit $fit ct.nii.gz $near_truth --truth empty.json
+echo '{"shape": "ellipsoid", "parameters": {"rx": 3.5, "laenge": 2}}' >odd.json
+expect 2 "odd\.json: 'ellipsoid' has no parameter 'laenge'\$" sdmgen fit $fit ct.nii.gz $near_truth --truth odd.json
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --blur 0.3 --keep blur
 has 'point spread 0.3 mm'
 ! grep -q 'are coarse' out || bad 'maps of 0.35 mm are fine beside a point spread of 0.3 mm'

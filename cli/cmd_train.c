@@ -79,14 +79,19 @@ static void add_word(sdm_text *command, const char *word)
     cli_add_shell_word(command, word);
 }
 
-/* Appends an option with a number that is 0 where it was not given. */
+/* Appends an option and its value. */
+static void add_option(sdm_text *command, const char *option, const char *value)
+{
+    add_word(command, option);
+    add_word(command, value);
+}
+
+/* The same with a number, which is 0 where the option was not given. */
 static void add_number(sdm_text *command, const char *option, double value)
 {
     char number[32];
-    if (!(value > 0)) return;
     snprintf(number, sizeof number, "%.15g", value);
-    add_word(command, option);
-    add_word(command, number);
+    if (value > 0) add_option(command, option, number);
 }
 
 /* Is the argument "key=value" or "key.member=value", so that the change of this key replaces it? */
@@ -131,20 +136,14 @@ static void print_next(const cli_args *args, const sdm_train_report *r)
     if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || !slash || other_maps) return;
     snprintf(folder, sizeof folder, "%.*s-2", (int)(slash - r->model_path), r->model_path);
     add_changes(&command, args, v);
-    for (size_t i = 0; i < args->plugins.n; i++) {
-        add_word(&command, "--plugin");
-        add_word(&command, args->plugins.items[i]);
-    }
+    for (size_t i = 0; i < args->plugins.n; i++)
+        add_option(&command, "--plugin", args->plugins.items[i]);
     if (args->isolate) add_word(&command, "--isolate");
     add_number(&command, "--isolate-seconds", args->isolate_seconds);
     add_number(&command, "--isolate-memory", args->isolate_memory);
     add_number(&command, "--ranks", (double)args->ranks);
-    if (args->dataset) {
-        add_word(&command, "--dataset");
-        add_word(&command, args->dataset);
-    }
-    add_word(&command, "--out");
-    add_word(&command, folder);
+    if (args->dataset) add_option(&command, "--dataset", args->dataset);
+    add_option(&command, "--out", folder);
     if (!command.failed)
         printf("  %-11s sdmgen train%s\n", v->grade == SDM_GRADE_GOOD ? "better" : "next",
                command.data);

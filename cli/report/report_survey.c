@@ -82,29 +82,37 @@ static void tell_failed(teller *t)
     tell(t, SDM_E_MESH, &text);
 }
 
+/* Audits the parts of the shape of which the finding is the worst. false: there is no mesh; *out is
+ * disposed of by the caller in any case. */
+static bool audit_worst(const teller *t, const sdm_survey_count *c, sdm_part_audit *out)
+{
+    sdm_mesh mesh = {0};
+    *out = (sdm_part_audit){0};
+    const bool made =
+        make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, out, NULL);
+    sdm_mesh_dispose(&mesh);
+    return made;
+}
+
 static void tell_open(teller *t)
 {
     sdm_text text = {0};
     const sdm_survey_count *c = &t->s->found.open;
-    sdm_mesh mesh = {0};
-    sdm_part_audit audit = {0};
+    sdm_part_audit audit;
     if (!c->shapes) return;
     add_count(t->s, c, "open or badly oriented edges", &text);
     sdm_text_add(&text, ": ");
-    if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL))
-        cli_describe_open(&audit, &text);
+    if (audit_worst(t, c, &audit)) cli_describe_open(&audit, &text);
     tell(t, SDM_E_MESH, &text);
     sdm_part_audit_dispose(&audit);
-    sdm_mesh_dispose(&mesh);
 }
 
 static void tell_inside_out(teller *t)
 {
     const sdm_survey_count *c = &t->s->found.inside_out;
-    sdm_mesh mesh = {0};
-    sdm_part_audit audit = {0};
+    sdm_part_audit audit;
     if (!c->shapes) return;
-    if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
+    if (audit_worst(t, c, &audit)) {
         for (size_t i = 0; i < audit.n; i++) {
             sdm_text text = {0};
             if (audit.part[i].state != SDM_PART_INSIDE_OUT) continue;
@@ -117,7 +125,6 @@ static void tell_inside_out(teller *t)
         }
     }
     sdm_part_audit_dispose(&audit);
-    sdm_mesh_dispose(&mesh);
 }
 
 static void tell_turned(teller *t)
@@ -133,10 +140,9 @@ static void tell_turned(teller *t)
 static void tell_crossing(teller *t)
 {
     const sdm_survey_count *c = &t->s->found.crossing;
-    sdm_mesh mesh = {0};
-    sdm_part_audit audit = {0};
+    sdm_part_audit audit;
     if (!c->shapes || t->s->found.inside_out.shapes > 0) return;
-    if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
+    if (audit_worst(t, c, &audit)) {
         sdm_text text = {0};
         if (cli_describe_folded(&audit, &text)) {
             sdm_text_add(&text, " (");
@@ -150,7 +156,6 @@ static void tell_crossing(teller *t)
         }
     }
     sdm_part_audit_dispose(&audit);
-    sdm_mesh_dispose(&mesh);
 }
 
 /* Inner walls that pass through each other, and where they begin to. */

@@ -287,7 +287,8 @@ static sdm_mesh revolve(const double (*outline)[2], size_t n)
     static uint32_t tri[16 * SECTORS][3];
     size_t n_tri = 0;
     const double turn = 2 * acos(-1) / SECTORS;
-    // ring i has the vertices SECTORS * i ...; those of the ends on the axis are used once
+    // vertices of ring i: SECTORS * i and the following; an end of the outline, on the axis, is a
+    // point: of its ring the triangles use the first vertex only
     for (size_t i = 0; i < n; i++)
         for (size_t k = 0; k < SECTORS; k++) {
             double *v = vert[i * SECTORS + k];

@@ -18,14 +18,19 @@ static inline v8f length8(point8 w, point8 *unit)
     return v8_mul(d2, inverse);
 }
 
-/* Vectors from the nearest points of a node's box to eight points. */
-static inline point8 vector_from_box(const sdm_cluster_node *node, point8 p)
+/* Vectors from the nearest points of eight boxes with the corners lo and hi to eight points. */
+static inline point8 vector_from_boxes(point8 lo, point8 hi, point8 p)
 {
-    const point8 lo = p8_all(node->lo[0], node->lo[1], node->lo[2]),
-                 hi = p8_all(node->hi[0], node->hi[1], node->hi[2]);
     const point8 nearest = {v8_min(v8_max(p.x, lo.x), hi.x), v8_min(v8_max(p.y, lo.y), hi.y),
                             v8_min(v8_max(p.z, lo.z), hi.z)};
     return p8_sub(p, nearest);
+}
+
+/* The same for the box of one node. */
+static inline point8 vector_from_box(const sdm_cluster_node *node, point8 p)
+{
+    return vector_from_boxes(p8_all(node->lo[0], node->lo[1], node->lo[2]),
+                             p8_all(node->hi[0], node->hi[1], node->hi[2]), p);
 }
 
 /* For each of eight points the nearest triangle centroid so far: its squared distance, and the slot

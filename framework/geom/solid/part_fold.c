@@ -43,7 +43,7 @@ void sdm_part_folds(const sdm_mesh *m, const sdm_bvh *tree, const uint32_t *part
         if (part[i].state != SDM_PART_SOLID || !part[i].crossed) continue;
         const size_t each = (part[i].n_tri + TRIANGLES - 1) / TRIANGLES;
         double area = 0, folded = 0;
-        for (size_t t = 0, k = 0; t < m->n_tri; t++)
+        for (size_t t = part[i].first_tri, k = 0; t < m->n_tri && k < part[i].n_tri; t++)
             if (part_of[t] == i && k++ % each == 0)
                 triangle_add(m, tree, t, IN_FRONT * size, &area, &folded);
         if (area > 0) part[i].folded = folded / area;

@@ -33,7 +33,7 @@ typedef struct finding {
     uint64_t crc_vert, crc_tri;
     size_t open, inside_out, turned, apart, flat, overlaps, crossed, degenerate, duplicate;
     double volume, area, min[3], max[3];
-    double turned_over;  /* largest share of the area of a part that faces the wrong way */
+    double turned_over;  /* the largest of sdm_part.folded */
     double thick;        /* of the thinnest part, mm; NaN: not known */
     double beyond[3][2]; /* mm */
 } finding;

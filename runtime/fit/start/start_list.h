@@ -6,7 +6,7 @@
 typedef struct fit_start {
     fit_state state;
     double log_likelihood;
-    /* the iterations from here keep the parameters */
+    /* iterations that begin at this state do not change its parameters */
     bool keep_params;
     /* the parameter that has another value than in the fit, from 1; 0: none has */
     size_t param;

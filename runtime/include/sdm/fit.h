@@ -490,9 +490,8 @@ typedef struct sdm_fit_result {
     /* how often a refused fit went on from another value of a parameter, see
        sdm_fit_opts.max_restarts; the result is that of the last of these fits */
     size_t n_restarts;
-    /* true: with a network, the last iterations took exact maps
-     * (sdm_fit_opts.max_polish_iterations)
-     */
+    /* true: the fit began with a network and ended with exact maps, see
+       sdm_fit_opts.max_polish_iterations */
     bool polished;
 } sdm_fit_result;
 

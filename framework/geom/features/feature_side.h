@@ -37,8 +37,9 @@ static inline double sdm_tied_distance2(const sdm_features *f, const double p[3]
 static inline int sdm_feature_side(const sdm_features *f, uint32_t number, const double p[3])
 {
     const int8_t side = f->side[number];
-    if (side != SDM_SIDE_OF_OWNER) return (int)side;
     const double *a = f->exact[number].a, *n = f->exact[f->owner[number]].u;
     const double height = (p[0] - a[0]) * n[0] + (p[1] - a[1]) * n[1] + (p[2] - a[2]) * n[2];
-    return height > 0 ? SDM_SIDE_OUTSIDE : height < 0 ? SDM_SIDE_INSIDE : SDM_SIDE_UNKNOWN;
+    // without branches: the sides of neighbours differ too often to be foreseen
+    const int of_owner = (height > 0) - (height < 0);
+    return side == SDM_SIDE_OF_OWNER ? of_owner : (int)side;
 }

@@ -13,6 +13,7 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/processor.h"
 #include "sdm/internal/threads.h"
+#include "simd/lanes_two.h"
 
 #define CHUNK ((size_t)1 << 22) // points that are sorted together; bounds the memory
 #define BLOCKS 16               // blocks of points that a thread takes at a time
@@ -168,6 +169,27 @@ typedef struct chunk {
     const sdm_exact_at *out;
 } chunk;
 
+/* The side of point i of a block, whose nearest feature does not tell it. d: its distance, mm. No
+   surface lies within the distance of a point from it, so all points there are on one side: this is
+   the side of a point of the block that is close enough; SDM_SIDE_UNKNOWN: there is none. */
+static int8_t side_by_neighbour(const chunk *c, const sdm_point_scratch *s, size_t i, double d)
+{
+    for (size_t k = 0; k < SDM_POINT_BLOCK; k++) {
+        // those of the same vector first
+        const size_t other = i ^ k;
+        if (s->side[other] == SDM_SIDE_UNKNOWN) continue;
+        const double free = fmax(d, sqrt(s->d2[other])) - c->certain;
+        double away2 = 0;
+        for (int a = 0; a < 3; a++) {
+            const double t = s->x[i / 8][a][i % 8] - s->x[other / 8][a][other % 8];
+            away2 += t * t;
+        }
+        if (s->d2[other] > c->certain * c->certain && free > 0 && away2 < free * free)
+            return s->side[other];
+    }
+    return SDM_SIDE_UNKNOWN;
+}
+
 /* Stores the answers for the block of sorted points key[n] that are in the scratch memory. */
 static void block_finish(const sdm_points_job *job, const chunk *c, const sdm_point_scratch *s,
                          const sdm_point_key *key, size_t n)
@@ -175,10 +197,13 @@ static void block_finish(const sdm_points_job *job, const chunk *c, const sdm_po
     for (size_t i = 0; i < n; i++) {
         const size_t index = key[i].index;
         const double *p = c->x + 3 * index, d = sqrt(s->d2[i]);
-        if (c->plain && s->side[i] != SDM_SIDE_UNKNOWN && d > c->certain)
-            c->out->distance[index] = s->side[i] == SDM_SIDE_INSIDE ? -d : d;
+        int8_t side = s->side[i];
+        if (side == SDM_SIDE_UNKNOWN && job->surface->features.side && d > c->certain)
+            side = side_by_neighbour(c, s, i, d);
+        if (c->plain && side != SDM_SIDE_UNKNOWN && d > c->certain)
+            c->out->distance[index] = (double)side * d;
         else if (c->usable || is_point(p))
-            point_finish(job, p, s->number[i], s->d2[i], s->side[i], c->out, index);
+            point_finish(job, p, s->number[i], s->d2[i], (int)side, c->out, index);
         else
             point_refuse(c->out, index);
     }
@@ -205,23 +230,42 @@ static void block_find(const sdm_points_job *job, const chunk *c, sdm_point_kern
     block_finish(job, c, s, key, n);
 }
 
+/* Sets lo and hi to the box of the points x[n][3], without coordinates that are NaN; *usable: all
+   points are usable. Two points at a time. */
+static void points_box(const double *x, size_t n, double lo[3], double hi[3], bool *usable)
+{
+    // (x, y), (z, x), (y, z)
+    v2d low[3], high[3], sum = d2_all(0);
+    for (int k = 0; k < 3; k++) {
+        low[k] = d2_all(INFINITY);
+        high[k] = d2_all(-INFINITY);
+    }
+    double last[6];
+    for (size_t k = 0; k < 6; k++) last[k] = x[3 * (n - 1) + k % 3];
+    for (size_t i = 0; i < n; i += 2) {
+        const double *p = i + 1 < n ? x + 3 * i : last;
+        for (int k = 0; k < 3; k++) {
+            const v2d v = d2_load(p + 2 * k);
+            low[k] = d2_lesser(v, low[k]);
+            high[k] = d2_greater(v, high[k]);
+            sum += v * 0; // NaN from the first coordinate on that is not finite
+        }
+    }
+    *usable = sum[0] == 0 && sum[1] == 0;
+    for (int a = 0; a < 3; a++) {
+        lo[a] = fmin(low[a / 2][a % 2], low[(a + 3) / 2][(a + 3) % 2]);
+        hi[a] = fmax(high[a / 2][a % 2], high[(a + 3) / 2][(a + 3) % 2]);
+    }
+    *usable = *usable && is_point(lo) && is_point(hi);
+}
+
 /* Describes the points x[n][3]. */
 static chunk chunk_start(const sdm_points_job *job, const double *x, size_t n,
                          const sdm_exact_at *out)
 {
     const sdm_features *f = &job->surface->features;
-    chunk c = {.x = x, .out = out, .usable = true};
-    for (size_t a = 0; a < 3; a++) {
-        c.lo[a] = INFINITY;
-        c.hi[a] = -INFINITY;
-    }
-    for (size_t i = 0; i < n; i++) {
-        c.usable &= is_point(x + 3 * i);
-        for (size_t a = 0; a < 3; a++) {
-            c.lo[a] = x[3 * i + a] < c.lo[a] ? x[3 * i + a] : c.lo[a];
-            c.hi[a] = x[3 * i + a] > c.hi[a] ? x[3 * i + a] : c.hi[a];
-        }
-    }
+    chunk c = {.x = x, .out = out};
+    points_box(x, n, c.lo, c.hi, &c.usable);
     double largest = 0;
     for (size_t a = 0; a < 3; a++) {
         largest = fmax(largest, fmax(fabs(c.lo[a]), fabs(c.hi[a])));

@@ -1,4 +1,5 @@
-/* sdmgen eval: measures the accuracy and speed of a network on new random shapes. */
+/* sdmgen eval: measures the accuracy and speed of a network on new random shapes, or at given
+   parameters. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 #include "sdm/internal/file.h"
 #include "sdm/internal/near.h"
 #include "sdm/internal/threads.h"
+#include "sdm/memory.h"
 #include "sdm/picture.h"
 #include "study/evaluate.h"
 
@@ -23,13 +25,25 @@ static void print_time(const char *name, double ms, double ms_network, const cha
     printf("%s\n", note);
 }
 
+/* The shapes that are measured: random ones, or one at given parameters. */
+typedef struct subjects {
+    uint64_t seed;
+    size_t n;
+    double *at;     /* [n_params] given by -p; NULL: random shapes */
+    sdm_text named; /* `at` as text */
+} subjects;
+
 static void print_table(const char *file, const sdm_model_info *info, const cli_eval *e,
-                        const cli_timing *t, uint64_t seed)
+                        const cli_timing *t, const subjects *of)
 {
     printf("%s: %s, %zu parameters, %lld x %lld x %lld voxels\n", file, info->shape, info->n_params,
            (long long)info->grid.n[0], (long long)info->grid.n[1], (long long)info->grid.n[2]);
-    printf("%zu random shapes that the training did not use (seed %llu), against exact maps\n\n",
-           e->n, (unsigned long long)seed);
+    if (of->at)
+        printf("at %s, against the exact map\n\n", of->named.data);
+    else
+        printf(
+            "%zu random shapes that the training did not use (seed %llu), against exact maps\n\n",
+            e->n, (unsigned long long)of->seed);
     printf("  %-22s %10.3g mm^2\n", "MSE", e->mse_mm2);
     printf("  %-22s %10.5f mm\n", "RMSE", e->rmse_mm);
     char near[48];
@@ -54,13 +68,14 @@ static void print_table(const char *file, const sdm_model_info *info, const cli_
 }
 
 static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info, const cli_eval *e,
-                      const cli_timing *t, uint64_t seed, int workers)
+                      const cli_timing *t, const subjects *of, int workers)
 {
     sdm_json_open(j, NULL, '{');
     sdm_json_text(j, "model", file);
     sdm_json_text(j, "shape", info->shape);
     sdm_json_int(j, "samples", (int64_t)e->n);
-    sdm_json_uint(j, "seed", seed);
+    if (of->at) sdm_json_text(j, "parameters", of->named.data);
+    sdm_json_uint(j, "seed", of->seed);
     // errors of the distance
     sdm_json_real(j, "mse_mm2", e->mse_mm2);
     sdm_json_real(j, "rmse_mm", e->rmse_mm);
@@ -91,49 +106,90 @@ static void fill_json(sdm_json *j, const char *file, const sdm_model_info *info,
 }
 
 static sdm_status write_pictures(const cli_args *args, const sdm_model *m,
-                                 const sdm_instance *shape, uint64_t seed, const cli_eval *e,
+                                 const sdm_instance *shape, const subjects *of, const cli_eval *e,
                                  sdm_error *err)
 {
     const struct {
         const char *name;
         size_t index;
-    } pictures[] = {{"worst", e->worst}, {"median", e->median}};
+    } pictures[] = {{of->at ? "compare" : "worst", e->worst}, {"median", e->median}};
     sdm_status s = SDM_OK;
-    for (size_t i = 0; i < 2 && !s; i++) {
+    for (size_t i = 0; i < (of->at ? 1 : 2) && !s; i++) {
         char path[SDM_PATH_TEXT_MAX];
         if (snprintf(path, sizeof path, "%s/%s.png", args->pictures, pictures[i].name) >=
             (int)sizeof path)
             return sdm_fail(err, SDM_E_ARG, "--pictures '%.100s...': the name is too long",
                             args->pictures);
-        s = cli_picture_compare(m, shape, seed, pictures[i].index, NULL, path, err);
+        s = cli_picture_compare(m, shape, of->seed, pictures[i].index, of->at, path, err);
     }
     return s;
+}
+
+/* Reads which shapes are measured. sdm_free(of->at) and sdm_text_dispose(&of->named) end it. */
+static sdm_status subjects_read(const cli_args *args, const sdm_model *m, subjects *of,
+                                sdm_error *err)
+{
+    const sdm_model_info *info = sdm_model_get_info(m);
+    sdm_param *params = NULL;
+    of->seed = args->seed < 0 ? 1 : (uint64_t)args->seed;
+    of->n = args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples;
+    if (!args->params.n) return SDM_OK;
+    of->n = 1;
+    if (args->samples >= 0 || args->seed >= 0)
+        return sdm_fail(err, SDM_E_ARG,
+                        "-p measures one shape, --samples and --seed random ones: give one kind");
+    sdm_status s = cli_model_params(info, &params, err);
+    if (!s) s = SDM_ALLOC(&of->at, info->n_params, "parameters", err);
+    if (!s) s = cli_read_params(params, info->n_params, &args->params, of->at, err);
+    if (!s) s = cli_check_range(params, info->n_params, of->at, err);
+    if (!s) {
+        cli_add_params(params, info->n_params, of->at, &of->named);
+        if (of->named.failed) s = sdm_fail(err, SDM_E_NOMEM, "out of memory for the parameters");
+    }
+    sdm_free(params);
+    return s;
+}
+
+static sdm_status subjects_evaluate(const subjects *of, const sdm_model *m,
+                                    const sdm_instance *shape, cli_eval *e, sdm_error *err)
+{
+    if (!of->at) return cli_evaluate(m, shape, of->seed, of->n, true, e, err);
+    cli_map_maker maker = cli_maker_of_model(m, shape);
+    // ranges without width: every random shape is this one
+    for (size_t i = 0; i < maker.n_params; i++) {
+        maker.min[i] = maker.max[i] = of->at[i];
+        maker.distribution[i] = (sdm_distribution){.kind = SDM_DISTRIBUTION_UNIFORM};
+    }
+    return cli_evaluate_maps(&maker, of->seed, 1, true, e, err);
 }
 
 static sdm_status measure_model(const cli_args *args, const sdm_model *m, const sdm_instance *shape,
                                 sdm_error *err)
 {
-    const uint64_t seed = args->seed < 0 ? 1 : (uint64_t)args->seed;
-    const size_t n = args->samples < 0 ? DEFAULT_SAMPLES : (size_t)args->samples;
     const sdm_model_info *info = sdm_model_get_info(m);
+    subjects of = {0};
     cli_eval e = {0};
     cli_timing t = {0};
     sdm_json json = {0};
-    sdm_status s = args->pictures ? sdm_picture_check("worst.png", err) : SDM_OK;
+    sdm_status s = subjects_read(args, m, &of, err);
+    if (!s && args->pictures) s = sdm_picture_check("worst.png", err);
     if (!s && args->pictures) s = sdm_make_folder(args->pictures, err);
-    if (!s) s = cli_evaluate(m, shape, seed, n, true, &e, err);
-    if (!s) s = cli_time_maps(m, shape, seed, false, (size_t)args->naive, &t, err);
-    if (!s && args->pictures) s = write_pictures(args, m, shape, seed, &e, err);
+    if (!s) s = subjects_evaluate(&of, m, shape, &e, err);
+    const size_t n_naive = of.at ? 0 : (size_t)args->naive;
+    if (!s) s = cli_time_maps(m, shape, of.seed, false, n_naive, &t, err);
+    if (!s && args->pictures) s = write_pictures(args, m, shape, &of, &e, err);
     if (!s && args->json) {
-        fill_json(&json, args->files.items[0], info, &e, &t, seed, sdm_threads((int)args->threads));
+        fill_json(&json, args->files.items[0], info, &e, &t, &of, sdm_threads((int)args->threads));
         s = cli_print_json(&json, err);
     } else if (!s) {
-        print_table(args->files.items[0], info, &e, &t, seed);
+        print_table(args->files.items[0], info, &e, &t, &of);
     }
     if (!s && !(e.mse_mm2 <= args->max_mse))
         s = sdm_fail(err, SDM_E_QUALITY, "MSE %.3g mm^2, --max-mse allows %.3g mm^2", e.mse_mm2,
                      args->max_mse);
     cli_eval_dispose(&e);
+    sdm_text_dispose(&of.named);
+    sdm_free(of.at);
     return s;
 }
 

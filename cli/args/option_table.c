@@ -67,8 +67,9 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
     {"eval", "MODEL", "measure a network on new random shapes",
      "Draws random shapes that the training did not use and compares the network with the\n"
      "exact engine: errors of the distance, overlap of the volumes inside (Dice), distances\n"
-     "between the zero surfaces, and the time per map on one core.",
-     "sdmgen eval runs/cochlea/model.sdm --samples 100 --json", 1, 1},
+     "between the zero surfaces, and the time per map on one core. With -p: the same for one\n"
+     "shape.",
+     "sdmgen eval runs/cochlea/model.sdm -p a=4.2 --pictures compare", 1, 1},
     {"report", "MODEL | RUN | FIT.json -o FILE.html",
      "make a page of a model or of a fit, for a browser",
      "Writes one HTML file that needs no network and no other file. It holds the model and\n"
@@ -210,6 +211,9 @@ const cli_option cli_options[] = {
      AT(params), "value of a shape parameter; may be repeated"},
     {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_FIT), AT(params),
      "start value of a shape parameter (default: the shape's); may be repeated"},
+    {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_EVAL), AT(params),
+     "measure one shape instead of random ones: its parameters; those without -p have the "
+     "default; may be repeated"},
     {"option", 'O', CLI_LIST, "name=value", NULL, 0, 0,
      ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES) | ON(CLI_BENCH) | ON(CLI_PHANTOM) | ON(CLI_FIT) |
          ON(CLI_EXPORT),
@@ -400,7 +404,8 @@ const cli_option cli_options[] = {
     {"max-mse", 0, CLI_REAL, "MM2", NULL, 0, 1e12, ON(CLI_EVAL), AT(max_mse),
      "exit code 4 when the mean squared error is larger"},
     {"pictures", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_EVAL), AT(pictures),
-     "write slices of the shapes with the largest and the median error: worst.png, median.png"},
+     "write slices of exact map, network and error: worst.png and median.png, the shapes with the "
+     "largest and the median error; with -p compare.png"},
 
     {"grid", 0, CLI_CHOICE, NULL, "g1|g2", 0, 0, ON(CLI_BENCH), AT(grid),
      "exact: 60 x 50 x 50 voxels of 0.2 mm (g1, default for the cochlea) or 256 x 256 x 192 of "

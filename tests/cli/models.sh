@@ -109,6 +109,16 @@ expect 0 - sdmgen eval $model --samples 3 --naive 0 --json --quiet --threads 1
 [ "$mse" = "$(json mse_mm2)" ] || bad 'eval depends on the number of threads'
 expect 0 - sdmgen eval $model --samples 2 --naive 0 --quiet
 has '^  RMSE +[0-9.]+ mm$'
+# one shape: the figures of its map against the exact one, computed from files
+expect 0 - sdmgen generate $model -p a=4.2 -o n.npy --quiet
+expect 0 - sdmgen exact --shape cochlea -p a=4.2 --like $model -o e.npy --quiet
+rmse=$(paste <(od -An -v -t f4 -w4 -j 128 n.npy) <(od -An -v -t f4 -w4 -j 128 e.npy) | awk '{ s += ($1 - $2) ^ 2 } END { print sqrt(s / NR) }')
+expect 0 - sdmgen eval $model -p a=4.2 --json --quiet --pictures one
+present one/compare.png
+has '"samples": 1, "parameters": "a=4.2 '
+near "$(json rmse_mm)" "$rmse" 1e-5
+expect 2 '-p measures one shape, --samples and --seed random ones' sdmgen eval $model -p a=4.2 --samples 3
+expect 5 "parameter 'a' = 7" sdmgen eval $model -p a=7
 expect 4 'MSE .* --max-mse allows' sdmgen eval $model --samples 2 --naive 0 --quiet --max-mse 1e-12
 expect 0 - sdmgen bench network $model --json
 awk -v v="$(json ms_network)" 'BEGIN { exit !(v > 0) }' || bad 'bench: no ms_network'

@@ -119,6 +119,7 @@ static sdm_status make_image(const cli_phantom *p, sdm_error *err)
     if (!s && args->phantom.label)
         s = cli_write_labels(args->phantom.label, &p->grid, label, args->shape, text, err);
     if (!s) s = write_truth(p, inside, err);
+    if (!s) cli_phantom_summary(p, inside);
     sdm_free(label);
     sdm_free(values);
     return s;

@@ -26,5 +26,10 @@ sdm_status cli_phantom_setup(cli_phantom *p, sdm_error *err);
  * pose, or points on it. Errors of sdm_instance_mesh(), sdm_fit_surface_points() and of writing. */
 sdm_status cli_phantom_surface(const cli_phantom *p, sdm_error *err);
 
+/* Prints in one line on stdout what the image or, without one, the labels show, and the files that
+ * were written with it: unless quiet, with --json, or without an image and labels. inside: as
+ * below. */
+void cli_phantom_summary(const cli_phantom *p, size_t inside);
+
 /* Adds the truth as one JSON object; inside: the number of voxels with label 1. */
 void cli_phantom_truth(const cli_phantom *p, size_t inside, sdm_json *json);

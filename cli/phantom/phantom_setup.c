@@ -7,6 +7,7 @@
 #include "report/files.h"
 #include "report/report_audit.h"
 #include "report/terminal.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/memory.h"
 
 /* True when one of the arguments "name=value" has this name. */
@@ -234,8 +235,9 @@ sdm_status cli_phantom_setup(cli_phantom *p, sdm_error *err)
     if (!s) s = draw_params(p, err);
     if (!s) s = read_pose(p, err);
     if (!s) s = sdm_instance_mesh(p->shape.instance, p->shape.values, &mesh, err);
-    if (!s) cli_warn_mesh(&mesh, 0, CLI_MEND_SHAPE);
     if (!s) s = grid_make(p, &mesh, err);
+    const bool drawn = p->args->outputs.n || p->args->phantom.label;
+    if (!s) cli_warn_mesh(&mesh, drawn ? sdm_grid_coarsest(&p->grid) : 0, CLI_MEND_SHAPE);
     sdm_mesh_dispose(&mesh);
     return s;
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen phantom: image, labels, truth; mistakes; no partial files.
-# Tests: cmd_phantom.c phantom_setup.c phantom_surface.c phantom_truth.c
+# Tests: cmd_phantom.c phantom_setup.c phantom_summary.c phantom_surface.c phantom_truth.c
 . "$(dirname "$0")/common.sh"
 
 # values FILE: all float32 values of a .npy file, one per line.
@@ -26,6 +26,14 @@ for file in ct.nii ct.nii.gz ct.nrrd ct.mha; do
 done
 expect 0 - sdmgen info label.nrrd
 has 'uint8'
+
+# The line on stdout.
+expect 0 - sdmgen phantom $small -o told.nii --label told_label.nii --truth told.json --white-noise
+has '^told.nii: ellipsoid, 21 x 17 x 13 voxels of 0.5 x 0.5 x 0.5 mm, [0-9]+ of them inside; values inside 40, outside 1300 \(texture 80 and 225\), noise 150 \(white\), blur 0.15 x 0.15 x 0.15 mm; labels in told_label.nii; truth in told.json$'
+expect 0 - sdmgen phantom $small --label told_label.nii
+has '^told_label.nii: ellipsoid, 21 x 17 x 13 voxels of 0.5 x 0.5 x 0.5 mm, [0-9]+ of them inside$'
+expect 0 - sdmgen phantom $small -o told.nii -q
+[ ! -s out ] || bad '-q must be quiet'
 
 # Without texture and noise the image is known: 40 at the centre, 1300 in the corner.
 quiet_tissue='--inside 40,0 --outside 1300,0 --noise 0'
@@ -127,7 +135,10 @@ done
 expect 0 'the surface leaves the grid' sdmgen phantom --shape ellipsoid --like frame.nrrd --translation 3,0,0 -o far.nrrd
 expect 2 'like and --frame exclude each other' sdmgen phantom --shape ellipsoid --like frame.nrrd --frame 0,0,1 -o x.nii
 expect 2 'like and --crop exclude each other' sdmgen phantom --shape ellipsoid --like frame.nrrd --crop 0,0,0.5 -o x.nii
-# Images that show hardly any shape, or none.
+# Images that show hardly any shape, or none; parts that are too thin for the voxels.
+expect 0 'warning: part 1 of 1 .* is [0-9.]+ mm thick, too thin for voxels of 3 mm' sdmgen phantom --shape torus --spacing 3 -o thin.nii -q
+expect 0 - sdmgen phantom --shape torus --spacing 1 -o thick.nii -q
+expect 0 - sdmgen phantom --shape torus --spacing 3 --surface thin.stl -q # no voxels
 expect 0 'warning: only [0-9]+ voxels are inside the shape' sdmgen phantom --shape ellipsoid --spacing 2 -o few.nii -q
 expect 0 'warning: --inside and --outside have the same mean' sdmgen phantom --shape ellipsoid --spacing 1 --inside 9,1 --outside 9,2 -o none.nii -q
 # Work of long duration stops on SIGTERM.

@@ -68,7 +68,8 @@ static void test_contour_is_subpixel(void **state)
     const sdm_box box = {20, 10, 400, 300};
     sdm_canvas *c;
     assert_int_equal(sdm_canvas_create("test_picture_c.png", 440, 320, &c, NULL), SDM_OK);
-    sdm_panel_contour(c, box, &s, 0, 2, (sdm_colour){255, 0, 0}, (sdm_colour){255, 255, 255});
+    const sdm_contour_line line = {.width = 2, .colour = {255, 0, 0}, .rim = {255, 255, 255}};
+    sdm_panel_contour(c, box, &s, 0, &line);
     assert_int_equal(sdm_canvas_finish(c, NULL), SDM_OK);
     picture p = read_png("test_picture_c.png");
     bool seen[360] = {false};
@@ -160,6 +161,50 @@ static void test_slices_show_equal_circles(void **state)
     free(e);
 }
 
+/* Number of pixels of a colour above the legend of an overlay, and their box. */
+static int find_colour(const picture *p, int from, int to, sdm_colour want, sdm_box *box)
+{
+    int n = 0, low[2] = {p->w, p->h}, high[2] = {-1, -1};
+    for (int y = 0; y < p->h - 40; y++)
+        for (int x = from; x < to; x++) {
+            const unsigned char *pixel = p->rgb + 3 * ((size_t)y * (size_t)p->w + (size_t)x);
+            if (!is_colour(pixel, want.r, want.g, want.b)) continue;
+            n++;
+            low[0] = x < low[0] ? x : low[0], high[0] = x > high[0] ? x : high[0];
+            low[1] = y < low[1] ? y : low[1], high[1] = y > high[1] ? y : high[1];
+        }
+    *box = (sdm_box){low[0], low[1], high[0] + 1 - low[0], high[1] + 1 - low[1]};
+    return n;
+}
+
+/* In the column of a second map the contour is dashed, and that of the first map lies below it. */
+static void test_second_map_shows_the_first(void **state)
+{
+    (void)state;
+    sdm_grid g;
+    float *v = ball_map(&g, 3), *w = ball_map(&g, 3.5);
+    const float level = 0;
+    const sdm_picture_map maps[3] = {{.title = "exact", .values = v},
+                                     {.title = "network", .values = w},
+                                     {.title = "error", .values = w, .error = true}};
+    assert_int_equal(sdm_picture_slices("test_picture_d.png", &g, maps, 3, &level, 1, NULL),
+                     SDM_OK);
+    picture p = read_png("test_picture_d.png");
+    const sdm_colour red = {214, 28, 36}, dark = {40, 40, 48};
+    sdm_box box, below;
+    const int third = p.w / 3, whole = find_colour(&p, 0, third, red, &box),
+              dashed = find_colour(&p, third + 10, 2 * third, red, &box);
+    assert_true(dashed > whole / 4 && dashed < 3 * whole / 4);
+    // the circle of the exact map is the smaller one; numbers and frames lie beside both
+    int inner = 0;
+    for (int x = box.x + box.w / 2 - 5; x < box.x + box.w / 2 + 5; x++)
+        inner += find_colour(&p, x, x + 1, dark, &below) > 0;
+    assert_true(inner > 5);
+    free(p.rgb);
+    free(v);
+    free(w);
+}
+
 /* Pixels with the ink of points, in a picture of the ball with these points. */
 static int dark_pixels(const sdm_grid *g, const float *v, const double *points, size_t n)
 {
@@ -217,6 +262,8 @@ static void test_slices_of_odd_maps(void **state)
         }
 }
 
+static const sdm_colour FIRST = {232, 40, 44}, SECOND = {255, 214, 10};
+
 /* A bright ball on a dark ground with two contours. The first contour gives three circles side
  * by side, white inside and black outside. */
 static void test_overlay_shows_contours_on_the_image(void **state)
@@ -233,39 +280,43 @@ static void test_overlay_shows_contours_on_the_image(void **state)
     assert_int_equal(sdm_picture_overlay("test_picture_w.png", &g, image, maps, 2, "a ball", NULL),
                      SDM_OK);
     picture p = read_png("test_picture_w.png");
-    int circles = 0, left = -1, yellow = 0;
-    for (int x = 0; x < p.w; x++) {
-        int bottom = -1;
-        for (int y = 0; y < p.h; y++) {
-            const unsigned char *pixel = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)x);
-            yellow += is_colour(pixel, 255, 214, 10);
-            if (!is_colour(pixel, 232, 40, 44)) continue;
-            // The legend is below.
-            if (y < p.h - 40) bottom = y;
+    int circles = 0, from = 0, gap = 0;
+    sdm_box all, box;
+    assert_true(find_colour(&p, 0, p.w, SECOND, &all) > 500);
+    find_colour(&p, 0, p.w, FIRST, &all);
+    for (int x = all.x; x <= all.x + all.w + 40; x++) {
+        gap = x < p.w && find_colour(&p, x, x + 1, FIRST, &box) ? 0 : gap + 1;
+        if (gap < 40) continue; // the slices are farther apart, the dashes are not
+        if (find_colour(&p, from, x < p.w ? x : p.w, FIRST, &box) > 0) {
+            const int column = box.x + box.w / 2, row = box.y + box.h / 2;
+            const unsigned char *inside = p.rgb + 3 * ((size_t)row * (size_t)p.w + (size_t)column),
+                                *outside = inside + 3 * (size_t)p.w * (size_t)(box.h / 2 + 8);
+            assert_true(abs(box.h - box.w) <= 6);
+            /* A diameter of 6 mm; the longest axis, 12.5 mm, has 340 or 420 pixels. */
+            assert_true(box.w > 6 * 26 && box.w < 6 * 38);
+            assert_true(is_colour(inside, 255, 255, 255));
+            assert_true(is_colour(outside, 0, 0, 0));
+            circles++;
         }
-        if (bottom >= 0 && left < 0) left = x;
-        if (bottom >= 0 || left < 0) continue;
-        const int width = x - left, middle = left + width / 2;
-        int low = p.h, high = -1;
-        for (int y = 0; y < p.h - 40; y++) {
-            const unsigned char *pixel = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)middle);
-            if (is_colour(pixel, 232, 40, 44)) low = y < low ? y : low, high = y;
-        }
-        const unsigned char *inside = p.rgb + 3 * ((size_t)((low + high) / 2) * (size_t)p.w +
-                                                   (size_t)middle),
-                            *outside =
-                                p.rgb + 3 * ((size_t)(high + 8) * (size_t)p.w + (size_t)middle);
-        assert_true(abs(high + 1 - low - width) <= 3);
-        /* A diameter of 6 mm; the longest axis, 12.5 mm, has 340 or 420 pixels. */
-        assert_true(width > 6 * 26 && width < 6 * 38);
-        assert_true(is_colour(inside, 255, 255, 255));
-        assert_true(is_colour(outside, 0, 0, 0));
-        circles++;
-        left = -1;
+        from = x;
     }
     assert_int_equal(circles, 3);
-    assert_true(yellow > 500);
     free(p.rgb);
+
+    /* Two contours in one place are both in sight; under a single one, half of the edge is. */
+    const sdm_picture_map same[2] = {maps[0], {.title = "reference", .values = v}};
+    int red[2];
+    for (size_t n = 1; n <= 2; n++) {
+        assert_int_equal(sdm_picture_overlay("test_picture_w.png", &g, image, same, n, "", NULL),
+                         SDM_OK);
+        p = read_png("test_picture_w.png");
+        red[n - 1] = find_colour(&p, 0, p.w, FIRST, &box);
+        const int yellow = find_colour(&p, 0, p.w, SECOND, &box);
+        if (n == 2 && !(yellow > red[1] / 4 && red[1] > yellow / 4))
+            fail_msg("%d and %d pixels", red[1], yellow);
+        free(p.rgb);
+    }
+    assert_true(red[0] > 400 && abs(red[0] - red[1]) < red[0] / 4);
 
     /* An image of NaN only, and an image of a single voxel. */
     for (size_t i = 0; i < sdm_grid_count(&g); i++) image[i] = NAN;
@@ -506,6 +557,7 @@ int main(void)
         cmocka_unit_test(test_image_is_exact),
         cmocka_unit_test(test_contour_is_subpixel),
         cmocka_unit_test(test_slices_show_equal_circles),
+        cmocka_unit_test(test_second_map_shows_the_first),
         cmocka_unit_test(test_points_on_slices),
         cmocka_unit_test(test_slices_of_odd_maps),
         cmocka_unit_test(test_overlay_shows_contours_on_the_image),

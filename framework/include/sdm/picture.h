@@ -35,18 +35,22 @@ typedef struct sdm_picture_map {
     size_t n_points;
 } sdm_picture_map;
 
-/* Draws slices of maps[n_maps], 1 to 16 on the same grid: a row for each of the three orthogonal
-   slices through the middle of the region where the first map is negative, a column for each map,
-   with contours at levels[n_levels] mm (0 to 16; the first in red, the second in yellow), titles,
-   axes in mm and colour bars. */
+/* Draws slices of maps[n_maps], 1 to 16 on the same grid: a row for each of three orthogonal
+   slices, a column for each map, with contours at levels[n_levels] mm (0 to 16; the first in red,
+   the second in yellow), titles, axes in mm and colour bars. A slice lies in the middle of the
+   region where the first map is negative, unless another place shows parts or holes of it that the
+   other two slices miss; a note says how many of its pieces no slice cuts. From the second map of
+   distances on, the red contour is dashed and that of the first map lies below it; an error map
+   has the contours of the first map, in white. */
 SDM_API sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid,
                                       const sdm_picture_map *maps, size_t n_maps,
                                       const float *levels, size_t n_levels, sdm_error *err);
 
-/* Draws the three orthogonal slices of image[nz][ny][nx], side by side, through the middle of the
-   region where the first map is negative. The image is grey, from the 1st to the 99th percentile of
-   the slices. Over it lie the zero contours of maps[n_maps] (1 to 4, the first in red, the second
-   in yellow; `error` is not used). A legend lists the titles of the maps; the picture has axes in
+/* Draws three orthogonal slices of image[nz][ny][nx], side by side, placed by the first map as in
+   sdm_picture_slices(). The image is grey, from the 1st to the 99th percentile of the slices. Over
+   it lie the zero contours of maps[n_maps] (1 to 4, the first in red, the second in yellow; `error`
+   is not used): the last of several is whole, the others are dashed, so that what lies below them
+   remains visible. A legend lists the titles of the maps; the picture has axes in
    mm and a `title` (may be NULL). */
 SDM_API sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const float *image,
                                        const sdm_picture_map *maps, size_t n_maps,

@@ -13,12 +13,26 @@ enum {
     TOP = 46 + SDM_SECTION_ABOVE,
     FOOT = 100, /* grey bar with numbers and caption, then the legend of the contours */
     BAR = 14,
-    RIGHT = 22
+    RIGHT = 22,
+    SAMPLE = 48 /* length of a line in the legend */
 };
 
 static const sdm_colour LINES[MAPS_MAX] = {
     {232, 40, 44}, {255, 214, 10}, {30, 190, 130}, {190, 110, 230}};
 static const sdm_colour RIM = {20, 20, 26};
+
+/* The line of map m of n: the last of several lies below and is whole; the others are dashed and
+   leave in sight what lies below them, a line or the edge in the image. */
+static sdm_contour_line line_of(size_t m, size_t n)
+{
+    return (sdm_contour_line){.width = 1.6,
+                              .colour = LINES[m],
+                              .rim = RIM,
+                              .turn = (int)m,
+                              .turns = n == 1      ? 2
+                                       : m + 1 < n ? (int)n
+                                                   : 0};
+}
 
 /* The data and where everything lies on the canvas. */
 typedef struct overlay {
@@ -71,7 +85,8 @@ static void draw_panel(sdm_canvas *c, const overlay *o, sdm_box box, int axis)
     sdm_panel_colours(c, box, &grey, SDM_MAP_GREY, o->low, o->high);
     for (size_t m = o->n_maps; m-- > 0;) {
         const sdm_slice s = sdm_section_of(&o->sections, o->maps[m].values, axis);
-        sdm_panel_contour(c, box, &s, 0, m ? 1.6 : 2, LINES[m], RIM);
+        const sdm_contour_line line = line_of(m, o->n_maps);
+        sdm_panel_contour(c, box, &s, 0, &line);
     }
     sdm_section_draw_frame(c, &o->sections, box, axis, true);
 }
@@ -82,9 +97,10 @@ static void draw_legend(sdm_canvas *c, const overlay *o, double x, double y)
     const sdm_type type = {.size = 10, .colour = SDM_INK};
     for (size_t m = 0; m < o->n_maps; m++) {
         const char *title = o->maps[m].title ? o->maps[m].title : "";
-        sdm_contour_sample(c, x, y - 4.5, 22, LINES[m], RIM);
-        sdm_canvas_text(c, x + 30, y, type, title);
-        x += 30 + sdm_canvas_text_width(c, 10, false, title) + 30;
+        const sdm_contour_line line = line_of(m, o->n_maps);
+        sdm_contour_sample(c, x, y - 4.5, SAMPLE, &line);
+        sdm_canvas_text(c, x + SAMPLE + 8, y, type, title);
+        x += SAMPLE + 8 + sdm_canvas_text_width(c, 10, false, title) + 30;
     }
 }
 
@@ -99,9 +115,11 @@ static void draw_overlay(sdm_canvas *c, const overlay *o, int height, const char
         draw_panel(c, o, (sdm_box){x, TOP, s->w[axis], s->h[axis]}, axis);
         x += s->w[axis] + SDM_SECTION_LEFT;
     }
-    draw_legend(c, o, SDM_SECTION_LEFT, height - 16);
-    sdm_colour_bar(c, (sdm_box){SDM_SECTION_LEFT, height - FOOT, 260, BAR}, SDM_MAP_GREY, o->low,
-                   o->high, "value of the image");
+    const int foot = height - FOOT - (s->n_hidden ? SDM_SECTIONS_HIDDEN : 0);
+    sdm_colour_bar(c, (sdm_box){SDM_SECTION_LEFT, foot, 260, BAR}, SDM_MAP_GREY, o->low, o->high,
+                   "value of the image");
+    draw_legend(c, o, SDM_SECTION_LEFT, foot + FOOT - 16);
+    sdm_sections_draw_hidden(c, s, SDM_SECTION_LEFT, foot + FOOT + 6, false);
 }
 
 static sdm_status check_arguments(const char *path, const sdm_grid *grid, const float *image,
@@ -124,7 +142,8 @@ sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const flo
     sdm_status s = check_arguments(path, grid, image, maps, n_maps, err);
     if (s) return s;
     overlay o = {.image = image, .maps = maps, .n_maps = n_maps};
-    sdm_sections_place(&o.sections, grid, maps[0].values);
+    s = sdm_sections_place(&o.sections, grid, maps[0].values, err);
+    if (s) return s;
     s = find_grey_range(&o, err);
     if (s) return s;
     int w = SDM_SECTION_LEFT, tall = 0;
@@ -133,7 +152,8 @@ sdm_status sdm_picture_overlay(const char *path, const sdm_grid *grid, const flo
         if (o.sections.h[axis] > tall) tall = o.sections.h[axis];
     }
     sdm_canvas *c = NULL;
-    const int height = TOP + tall + SDM_SECTION_BELOW + FOOT;
+    const int height =
+        TOP + tall + SDM_SECTION_BELOW + FOOT + (o.sections.n_hidden ? SDM_SECTIONS_HIDDEN : 0);
     s = sdm_canvas_create(path, w < 480 ? 480 : w, height, &c, err);
     if (s || !c) return s;
     draw_overlay(c, &o, height, title);

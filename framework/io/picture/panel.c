@@ -8,8 +8,10 @@
 /* Number of colours in the table for a slice. */
 #define SHADES 2048
 /* A contour's rim is this much wider than its line, in pixels. */
-#define RIM 2.2
+#define RIM 1.6
 #define RIM_ALPHA 0.55
+/* Length of a dash in pixels. */
+#define DASH 8.0
 
 /* The value at column i, -1 <= i <= n[0], of row j, 0 <= j < n[1]; one column outside of the slice
    it is extrapolated linearly. */
@@ -85,9 +87,32 @@ static void find_crossing(const corner *from, const corner *to, double at[2])
     at[1] = from->y + t * (to->y - from->y);
 }
 
+/* Adds the line from a to b to the path, or its dashes: the parts of it where x (y, for a line that
+ * is steeper than 45 degrees) lies in every turns-th interval of length DASH. */
+static void trace_line(sdm_canvas *c, const double a[2], const double b[2],
+                       const sdm_contour_line *line)
+{
+    const int d = fabs(b[1] - a[1]) > fabs(b[0] - a[0]);
+    const double *low = a[d] < b[d] ? a : b, *high = a[d] < b[d] ? b : a;
+    if (line->turns < 2) {
+        sdm_canvas_move_to(c, a[0], a[1]);
+        sdm_canvas_line_to(c, b[0], b[1]);
+        return;
+    }
+    for (double q = floor(low[d] / DASH); q * DASH < high[d]; q++) {
+        if (q - line->turns * floor(q / line->turns) != line->turn) continue;
+        const double end[2] = {fmax(low[d], q * DASH), fmin(high[d], (q + 1) * DASH)};
+        for (int i = 0; i < 2; i++) {
+            const double t = (end[i] - low[d]) / (high[d] - low[d]),
+                         x = low[0] + t * (high[0] - low[0]), y = low[1] + t * (high[1] - low[1]);
+            (i ? sdm_canvas_line_to : sdm_canvas_move_to)(c, x, y);
+        }
+    }
+}
+
 /* Adds the contour's lines in one cell to the path. Four crossings are paired by the sign of the
  * bilinear saddle. */
-static void trace_cell(sdm_canvas *c, const corner k[4])
+static void trace_cell(sdm_canvas *c, const corner k[4], const sdm_contour_line *line)
 {
     double at[4][2];
     int n = 0, first = 0;
@@ -102,15 +127,13 @@ static void trace_cell(sdm_canvas *c, const corner k[4])
         const bool cut_off_even = (k[0].v < 0) == (odd > even);
         first = cut_off_even ? 3 : 0;
     }
-    for (int i = 0; i + 1 < n; i += 2) {
-        const double *a = at[(first + i) % n], *b = at[(first + i + 1) % n];
-        sdm_canvas_move_to(c, a[0], a[1]);
-        sdm_canvas_line_to(c, b[0], b[1]);
-    }
+    for (int i = 0; i + 1 < n; i += 2)
+        trace_line(c, at[(first + i) % n], at[(first + i + 1) % n], line);
 }
 
 /* Adds the contour of the slice to the path. */
-static void trace_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level)
+static void trace_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level,
+                          const sdm_contour_line *line)
 {
     // cells between voxel centres, and one more on each side for the half voxel up to the border
     for (int64_t j = -1; j < s->n[1]; j++) {
@@ -123,28 +146,31 @@ static void trace_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double
                                 box.y + (1 - v / (double)s->n[1]) * box.h,
                                 value_at(s, p[0], p[1]) - level};
             }
-            trace_cell(c, k);
+            trace_cell(c, k, line);
         }
     }
 }
 
-void sdm_panel_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level, double width,
-                       sdm_colour colour, sdm_colour rim)
+static void stroke_line(sdm_canvas *c, const sdm_contour_line *line)
+{
+    sdm_canvas_stroke_keep(c, line->width + RIM, line->rim, RIM_ALPHA);
+    sdm_canvas_stroke(c, line->width, line->colour);
+}
+
+void sdm_panel_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level,
+                       const sdm_contour_line *line)
 {
     sdm_canvas_clip(c, box);
-    trace_contour(c, box, s, level);
-    sdm_canvas_stroke_keep(c, width + RIM, rim, RIM_ALPHA);
-    sdm_canvas_stroke(c, width, colour);
+    trace_contour(c, box, s, level, line);
+    stroke_line(c, line);
     sdm_canvas_unclip(c);
 }
 
-void sdm_contour_sample(sdm_canvas *c, double x, double y, double length, sdm_colour colour,
-                        sdm_colour rim)
+void sdm_contour_sample(sdm_canvas *c, double x, double y, double length,
+                        const sdm_contour_line *line)
 {
-    sdm_canvas_move_to(c, x, y);
-    sdm_canvas_line_to(c, x + length, y);
-    sdm_canvas_stroke_keep(c, 2 + RIM, rim, RIM_ALPHA);
-    sdm_canvas_stroke(c, 2, colour);
+    trace_line(c, (const double[]){x, y}, (const double[]){x + length, y}, line);
+    stroke_line(c, line);
 }
 
 /* A line of a title holds at most this many bytes. */

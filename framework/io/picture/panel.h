@@ -16,10 +16,19 @@ typedef struct sdm_slice {
 void sdm_panel_colours(sdm_canvas *c, sdm_box box, const sdm_slice *s, sdm_colour_map map,
                        double low, double high);
 
-/* Draws the line where the slice crosses `level`, by marching squares: `width` pixels of `colour`
-   over a wider, translucent line of `rim`. Cells with a value that is not finite are left out. */
-void sdm_panel_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level, double width,
-                       sdm_colour colour, sdm_colour rim);
+/* How a contour is drawn: `width` pixels of `colour` over a wider, translucent line of `rim`. */
+typedef struct sdm_contour_line {
+    double width;
+    sdm_colour colour, rim;
+    /* 2 or more: dashed, such that `turns` lines in one place, with turn = 0 .. turns - 1, show one
+       after the other; 0: not dashed */
+    int turn, turns;
+} sdm_contour_line;
+
+/* Draws the line where the slice crosses `level`, by marching squares. Cells with a value that is
+   not finite are left out. */
+void sdm_panel_contour(sdm_canvas *c, sdm_box box, const sdm_slice *s, double level,
+                       const sdm_contour_line *line);
 
 /* Is the title, as one large line, at most as wide as the box? */
 bool sdm_panel_title_fits(sdm_canvas *c, sdm_box box, const char *title);
@@ -37,8 +46,8 @@ void sdm_colour_bar(sdm_canvas *c, sdm_box box, sdm_colour_map map, double low, 
                     const char *caption);
 
 /* Draws a sample of a contour's line for a legend, from (x, y) to the right. */
-void sdm_contour_sample(sdm_canvas *c, double x, double y, double length, sdm_colour colour,
-                        sdm_colour rim);
+void sdm_contour_sample(sdm_canvas *c, double x, double y, double length,
+                        const sdm_contour_line *line);
 
 #define SDM_INK ((sdm_colour){38, 40, 46})
 #define SDM_INK_LIGHT ((sdm_colour){120, 124, 132})

@@ -18,7 +18,8 @@
 #define GAP 36
 #define BELOW SDM_SECTION_BELOW
 #define BAR 14
-#define FOOT 84 /* colour bars with numbers and captions */
+#define SAMPLE 26 /* length of a line in the legend */
+#define FOOT 84   /* colour bars with numbers and captions */
 
 /* The data and where everything lies on the canvas. */
 typedef struct layout {
@@ -30,6 +31,7 @@ typedef struct layout {
     sdm_sections sections;
     sdm_box row[3];         /* panels of the first column; row r is normal to axis r */
     int top, column;        /* of the first row; width of a column */
+    int foot;               /* upper end of the colour bars */
     double low[2], high[2]; /* colour scales: [0] distances, [1] errors, mm */
     double unit[2];         /* printed number per mm: 1, or 1000 for micrometres */
 } layout;
@@ -69,14 +71,15 @@ static const char *note_of(const sdm_picture_map *map)
     return end ? end + 1 : NULL;
 }
 
-/* The boxes of the first column and the size of the canvas. */
-static void layout_place(layout *l, int *width, int *height)
+/* Chooses the slices, the boxes of the first column and the size of the canvas. */
+static sdm_status layout_place(layout *l, int *width, int *height, sdm_error *err)
 {
+    const sdm_status s = sdm_sections_place(&l->sections, l->g, l->maps[0].values, err);
+    if (s) return s;
     l->top = TOP;
     for (size_t m = 0; m < l->n_maps; m++)
         if (note_of(&l->maps[m])) l->top = TOP + NOTE;
     int y = l->top;
-    sdm_sections_place(&l->sections, l->g, l->maps[0].values);
     l->column = l->sections.widest;
     for (int r = 0; r < 3; r++) {
         const int w = l->sections.w[r], h = l->sections.h[r];
@@ -84,7 +87,9 @@ static void layout_place(layout *l, int *width, int *height)
         y += h + BELOW;
     }
     *width = LEFT + (int)l->n_maps * (l->column + GAP) - GAP + RIGHT;
-    *height = y + FOOT;
+    l->foot = y;
+    *height = y + FOOT + (l->sections.n_hidden ? SDM_SECTIONS_HIDDEN : 0);
+    return SDM_OK;
 }
 
 static const sdm_colour DARK = {40, 40, 48};
@@ -96,19 +101,46 @@ static sdm_colour level_colour(size_t i)
     return known[i % (sizeof known / sizeof *known)];
 }
 
-/* A map of distances shows its own contours; a map of errors shows those of the first map, thin and
- * white, to mark the surface. */
-static void draw_contours(sdm_canvas *c, const layout *l, sdm_box box, const sdm_picture_map *map,
-                          int axis)
+/* One line of a panel with its entry in the legend. */
+typedef struct mark {
+    const sdm_picture_map *map;
+    float level;
+    sdm_contour_line line;
+} mark;
+
+/* The number of lines in a panel of column `column`. */
+static size_t count_marks(const layout *l, size_t column)
 {
-    const sdm_slice s =
-        sdm_section_of(&l->sections, map->error ? l->maps[0].values : map->values, axis);
-    for (size_t i = l->n_levels; i-- > 0;) {
-        if (map->error)
-            sdm_panel_contour(c, box, &s, (double)l->levels[i], i ? 0.9 : 1.4, SDM_WHITE, DARK);
-        else
-            sdm_panel_contour(c, box, &s, (double)l->levels[i], i ? 1.6 : 2, level_colour(i),
-                              i ? DARK : SDM_WHITE);
+    const bool compared = column && !l->maps[column].error && l->n_levels;
+    return l->n_levels + compared;
+}
+
+/* Line i of a panel. A map of distances has its own contours; under that of the first level, which
+ * is then dashed, lies that of the first map, to compare. A map of errors has the contours of the
+ * first map, to mark the surface: they are thin and white, so that they hide few errors. */
+static mark mark_of(const layout *l, size_t column, size_t i)
+{
+    const sdm_picture_map *map = &l->maps[column];
+    const bool compared = count_marks(l, column) > l->n_levels;
+    if (i == l->n_levels)
+        return (mark){l->maps, l->levels[0], {.width = 1.6, .colour = DARK, .rim = SDM_WHITE}};
+    if (map->error)
+        return (mark){
+            l->maps, l->levels[i], {.width = i ? 0.6 : 0.9, .colour = SDM_WHITE, .rim = DARK}};
+    return (mark){map,
+                  l->levels[i],
+                  {.width = i ? 1.4 : 1.8,
+                   .colour = level_colour(i),
+                   .rim = i ? DARK : SDM_WHITE,
+                   .turns = compared && !i ? 2 : 0}};
+}
+
+static void draw_contours(sdm_canvas *c, const layout *l, sdm_box box, size_t column, int axis)
+{
+    for (size_t i = count_marks(l, column); i-- > 0;) {
+        const mark m = mark_of(l, column, i);
+        const sdm_slice s = sdm_section_of(&l->sections, m.map->values, axis);
+        sdm_panel_contour(c, box, &s, (double)m.level, &m.line);
     }
 }
 
@@ -147,58 +179,67 @@ static void draw_panel(sdm_canvas *c, const layout *l, size_t column, int axis)
     box.x += (int)column * (l->column + GAP);
     sdm_panel_colours(c, box, &s, map_of(l, map->error), l->low[map->error], l->high[map->error]);
     draw_points(c, l, box, map, axis);
-    draw_contours(c, l, box, map, axis);
+    draw_contours(c, l, box, column, axis);
     sdm_section_draw_frame(c, &l->sections, box, axis, column == 0);
+}
+
+/* The length of what a title holds in its first line. */
+static int first_line(const char *title) { return title ? (int)strcspn(title, "\n") : 0; }
+
+/* The text of a line in the legend of a column. */
+static void mark_text(const layout *l, size_t column, const mark *m, char text[80])
+{
+    const char *title = l->maps[0].title;
+    if (m->map == &l->maps[column] || !title)
+        snprintf(text, 80, "%g mm", (double)m->level);
+    else
+        snprintf(text, 80, "%.*s: %g mm", first_line(title) < 24 ? first_line(title) : 24, title,
+                 (double)m->level);
 }
 
 /* The legend, centred at x: a sample of each contour's line with its level, and a dot if the map
  * has points. The first pass measures, the second draws. */
-static void draw_legend(sdm_canvas *c, const layout *l, const sdm_picture_map *map, double x,
-                        double y)
+static void draw_legend(sdm_canvas *c, const layout *l, size_t column, double x, double y)
 {
-    char text[48];
+    char text[80];
     const sdm_type type = {.size = 9, .colour = SDM_INK};
-    const size_t n = l->n_levels + (map->n_points > 0);
+    const size_t lines = count_marks(l, column), n = lines + (l->maps[column].n_points > 0);
     double total = 0;
     for (int pass = 0; pass < 2; pass++) {
         double at = x - total / 2;
         for (size_t i = 0; i < n; i++) {
-            const bool points = i == l->n_levels;
-            if (points)
-                snprintf(text, sizeof text, "points of the data");
-            else
-                snprintf(text, sizeof text, "%g mm", (double)l->levels[i]);
+            const mark m = i < lines ? mark_of(l, column, i) : (mark){0};
+            snprintf(text, sizeof text, "points of the data");
+            if (i < lines) mark_text(l, column, &m, text);
             const double w = sdm_canvas_text_width(c, 9, false, text);
-            if (pass && points) draw_dot(c, at + 9, y - 4.5);
-            if (pass && !points)
-                sdm_contour_sample(c, at, y - 4.5, 18, level_colour(i), i ? DARK : SDM_WHITE);
-            if (pass) sdm_canvas_text(c, at + 25, y, type, text);
-            at += 25 + w + 18;
-            if (!pass) total += 25 + w + (i + 1 < n ? 18 : 0);
+            if (pass && i == lines) draw_dot(c, at + 9, y - 4.5);
+            if (pass && i < lines) sdm_contour_sample(c, at, y - 4.5, SAMPLE, &m.line);
+            if (pass) sdm_canvas_text(c, at + SAMPLE + 7, y, type, text);
+            at += SAMPLE + 7 + w + 18;
+            if (!pass) total += SAMPLE + 7 + w + (i + 1 < n ? 18 : 0);
         }
     }
 }
 
-static void draw_column(sdm_canvas *c, const layout *l, size_t column, int foot)
+static void draw_column(sdm_canvas *c, const layout *l, size_t column)
 {
     const sdm_picture_map *map = &l->maps[column];
     const int x = LEFT + (int)column * (l->column + GAP), e = map->error;
     const sdm_type title = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
     const char *note = note_of(map);
     char first[160];
-    snprintf(first, sizeof first, "%.*s", map->title ? (int)strcspn(map->title, "\n") : 0,
-             map->title ? map->title : "");
+    snprintf(first, sizeof first, "%.*s", first_line(map->title), map->title ? map->title : "");
     sdm_canvas_text(c, x + l->column / 2.0, TOP - SDM_SECTION_ABOVE - 16, title, first);
     const sdm_box under = {x, l->top - SDM_SECTION_ABOVE, l->column, 0};
     if (note) sdm_panel_title(c, under, false, note);
     for (int axis = 0; axis < 3; axis++) draw_panel(c, l, column, axis);
-    const sdm_box bar = {x + l->column / 10, foot, l->column - 2 * (l->column / 10), BAR};
+    const sdm_box bar = {x + l->column / 10, l->foot, l->column - 2 * (l->column / 10), BAR};
     const char *caption = !e               ? "signed distance (mm)"
                           : l->unit[1] > 1 ? "error (\xC2\xB5m)"
                                            : "error (mm)";
     sdm_colour_bar(c, bar, map_of(l, map->error), l->low[e] * l->unit[e], l->high[e] * l->unit[e],
                    caption);
-    if (!e) draw_legend(c, l, map, x + l->column / 2.0, foot + 72);
+    draw_legend(c, l, column, x + l->column / 2.0, l->foot + 72);
 }
 
 static sdm_status check_arguments(const char *path, const sdm_grid *grid,
@@ -227,10 +268,12 @@ sdm_status sdm_picture_slices(const char *path, const sdm_grid *grid, const sdm_
     int w, h;
     layout_range(&l, false);
     layout_range(&l, true);
-    layout_place(&l, &w, &h);
+    s = layout_place(&l, &w, &h, err);
+    if (s) return s;
     sdm_canvas *c = NULL;
     s = sdm_canvas_create(path, w, h, &c, err);
     if (s || !c) return s;
-    for (size_t m = 0; m < n_maps; m++) draw_column(c, &l, m, h - FOOT);
+    for (size_t m = 0; m < n_maps; m++) draw_column(c, &l, m);
+    sdm_sections_draw_hidden(c, &l.sections, LEFT + l.column / 2.0, l.foot + FOOT + 12, true);
     return sdm_canvas_finish(c, err);
 }

@@ -110,7 +110,7 @@ static sdm_status make_image(const cli_phantom *p, sdm_error *err)
     if (!s) s = cli_check_interrupt(err);
     for (size_t i = 0; i < n && !s; i++) inside += label[i];
     if (!s && !inside) cli_warn("no voxel is inside the shape: does the grid cover it?");
-    if (!s && inside > 0 && inside < FEW_INSIDE)
+    if (!s && inside > 0 && inside < FEW_INSIDE && !p->thin)
         cli_warn("only %zu voxel%s inside the shape: smaller ones (--spacing) show it", inside,
                  inside == 1 ? " is" : "s are");
     if (!s && p->cut && !isnan(args->phantom.crop[0]))

@@ -12,6 +12,7 @@ typedef struct cli_phantom {
     sdm_pose pose;   /* pose of the shape in the world */
     sdm_grid grid;   /* grid of the image */
     sdm_phantom_opts opts;
+    bool thin; /* a warning has named a part that is too thin for the voxels */
     bool cut; /* the shape extends beyond the box of the voxel centres */
 } cli_phantom;
 

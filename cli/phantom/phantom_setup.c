@@ -237,7 +237,7 @@ sdm_status cli_phantom_setup(cli_phantom *p, sdm_error *err)
     if (!s) s = sdm_instance_mesh(p->shape.instance, p->shape.values, &mesh, err);
     if (!s) s = grid_make(p, &mesh, err);
     const bool drawn = p->args->outputs.n || p->args->phantom.label;
-    if (!s) cli_warn_mesh(&mesh, drawn ? sdm_grid_coarsest(&p->grid) : 0, CLI_MEND_SHAPE);
+    if (!s) p->thin = cli_warn_mesh(&mesh, drawn ? sdm_grid_coarsest(&p->grid) : 0, CLI_MEND_SHAPE);
     sdm_mesh_dispose(&mesh);
     return s;
 }

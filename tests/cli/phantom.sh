@@ -137,7 +137,7 @@ expect 2 'like and --frame exclude each other' sdmgen phantom --shape ellipsoid 
 expect 2 'like and --crop exclude each other' sdmgen phantom --shape ellipsoid --like frame.nrrd --crop 0,0,0.5 -o x.nii
 # Images that show hardly any shape, or none; parts that are too thin for the voxels.
 expect 0 'warning: part 1 of 1 .* is [0-9.]+ mm thick, too thin for voxels of 3 mm' sdmgen phantom --shape torus --spacing 3 -o thin.nii -q
-expect 0 - sdmgen phantom --shape torus --spacing 1 -o thick.nii -q
+expect 0 - sdmgen phantom --shape torus --spacing 0.8 -o thick.nii -q
 expect 0 - sdmgen phantom --shape torus --spacing 3 --surface thin.stl -q # no voxels
 expect 0 'warning: only [0-9]+ voxels are inside the shape' sdmgen phantom --shape ellipsoid --spacing 2 -o few.nii -q
 expect 0 'warning: --inside and --outside have the same mean' sdmgen phantom --shape ellipsoid --spacing 1 --inside 9,1 --outside 9,2 -o none.nii -q

@@ -373,6 +373,53 @@ static void test_plot_draws_a_straight_line(void **state)
     free(p.rgb);
 }
 
+/* Pixels of the colour of the first curve, in a plot of the curve with or without a legend. */
+static int curve_pixels(const char *title, const double *x, const double *y)
+{
+    const sdm_curve curve = {title, x, y, 2};
+    sdm_box box;
+    assert_int_equal(
+        sdm_picture_plot("test_picture_p.png", NULL, NULL, NULL, false, &curve, 1, NULL), SDM_OK);
+    picture p = read_png("test_picture_p.png");
+    const int n = find_colour(&p, 0, p.w, (sdm_colour){0, 105, 180}, &box);
+    free(p.rgb);
+    return n;
+}
+
+/* The legend lies in a corner without curves: it hides nothing of one that rises or falls. */
+static void test_legend_hides_no_curve(void **state)
+{
+    (void)state;
+    const double x[2] = {0, 1}, ends[2][2] = {{0, 1}, {1, 0}};
+    for (int i = 0; i < 2; i++) {
+        const int plain = curve_pixels("", x, ends[i]);
+        const int named = curve_pixels("a curve", x, ends[i]);
+        if (!(plain > 200 && named > plain)) fail_msg("%d, %d with a legend", plain, named);
+    }
+}
+
+/* A logarithmic axis of 1.7 decades that holds a single power of ten has more numbers than one:
+ * rows of pixels with ink left of the axis, counted in groups. */
+static void test_log_axis_has_numbers(void **state)
+{
+    (void)state;
+    const double x[2] = {0, 1}, y[2] = {0.00015, 0.0045};
+    const sdm_curve curve = {NULL, x, y, 2};
+    assert_int_equal(
+        sdm_picture_plot("test_picture_p.png", NULL, NULL, NULL, true, &curve, 1, NULL), SDM_OK);
+    picture p = read_png("test_picture_p.png");
+    int numbers = 0;
+    for (int row = 0, before = 0; row < p.h - 70; row++) {
+        int ink = 0;
+        for (int column = 0; column < 82; column++)
+            ink += p.rgb[3 * ((size_t)row * (size_t)p.w + (size_t)column)] < 128;
+        numbers += ink && !before;
+        before = ink;
+    }
+    assert_int_equal(numbers, 5); // 0.0002 0.0005 0.001 0.002 0.005
+    free(p.rgb);
+}
+
 static void test_odd_plots_are_drawn(void **state)
 {
     (void)state;
@@ -562,6 +609,8 @@ int main(void)
         cmocka_unit_test(test_slices_of_odd_maps),
         cmocka_unit_test(test_overlay_shows_contours_on_the_image),
         cmocka_unit_test(test_plot_draws_a_straight_line),
+        cmocka_unit_test(test_legend_hides_no_curve),
+        cmocka_unit_test(test_log_axis_has_numbers),
         cmocka_unit_test(test_odd_plots_are_drawn),
         cmocka_unit_test(test_text_is_aligned),
         cmocka_unit_test(test_colours_are_ordered),

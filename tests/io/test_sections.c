@@ -1,6 +1,6 @@
 /* Which sections of a map are drawn: a part or a hole beside the middle moves one, a shape that the
  * middle shows moves none; pieces of the inside, and those that no section cuts.
- * Tests: pieces.c section_choice.c sections.c */
+ * Tests: inside_pieces.c section_choice.c sections.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

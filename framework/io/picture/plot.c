@@ -104,21 +104,22 @@ static void power_of_ten(sdm_canvas *c, double y, int exponent)
 }
 
 /* Draws ticks, with labels at the powers of ten (every second, third ... of them when the axis
-   spans over ten) and, when the axis spans less than 1.6 decades, at 2 and 5 times these powers. */
+   spans over ten) and, when the axis holds fewer than three of these, at 2 and 5 times them. */
 static void draw_log_axis(sdm_canvas *c, const window *w)
 {
     const double decades = w->high[1] - w->low[1];
     const int every = (int)ceil(decades / 10), from = (int)floor(w->low[1]);
+    const bool few = floor(w->high[1]) - ceil(w->low[1]) < 2;
     for (int e = from; e <= w->high[1]; e++) {
         for (int m = 1; m < 10; m++) {
             const double v = e + log10(m);
             char text[32];
             if (v < w->low[1] || v > w->high[1] || (m > 1 && decades > 4)) continue;
             const bool labelled =
-                decades < 1.6 && (m == 2 || m == 5 || (decades < 0.8 && (m == 3 || m == 7)));
+                few && (m == 2 || m == 5 || (decades < 0.8 && (m == 3 || m == 7)));
             snprintf(text, sizeof text, "%g", m * pow(10, e));
             const double y = to_y(w, v);
-            if (m == 1 && decades >= 1.6) {
+            if (m == 1 && !few) {
                 if (e % every != 0) continue;
                 y_tick(c, y, NULL);
                 power_of_ten(c, floor(y) + 0.5, e);
@@ -200,7 +201,47 @@ static void draw_curve(sdm_canvas *c, const window *w, const sdm_curve *curve, s
     draw_markers(c, w, curve, number);
 }
 
-static void draw_legend(sdm_canvas *c, const sdm_curve *curves, size_t n)
+/* How many places of the curves, 16 on each line, the box covers. */
+static size_t count_covered(const window *w, const sdm_curve *curves, size_t n, sdm_box box)
+{
+    enum { PLACES = 16 };
+    double a[2], b[2];
+    size_t covered = 0;
+    for (size_t k = 0; k < n; k++)
+        for (size_t i = 0; i + 1 < curves[k].n; i++) {
+            if (!curve_point(&curves[k], i, w->log_y, a) ||
+                !curve_point(&curves[k], i + 1, w->log_y, b))
+                continue;
+            for (int q = 0; q <= PLACES; q++) {
+                const double t = (double)q / PLACES, x = to_x(w, a[0] + t * (b[0] - a[0])) - box.x,
+                             y = to_y(w, a[1] + t * (b[1] - a[1])) - box.y;
+                covered += x >= 0 && x <= box.w && y >= 0 && y <= box.h;
+            }
+        }
+    return covered;
+}
+
+/* Moves the box of the legend to the corner where it covers least of the curves: upper right, upper
+ * left, lower left or lower right, in this order if equal. */
+static sdm_box choose_corner(const window *w, const sdm_curve *curves, size_t n, sdm_box box)
+{
+    const int left = area.x + 12, right = area.x + area.w - box.w - 12, top = area.y + 12,
+              bottom = area.y + area.h - box.h - 12;
+    const int corner[4][2] = {{right, top}, {left, top}, {left, bottom}, {right, bottom}};
+    size_t least = SIZE_MAX;
+    sdm_box best = box;
+    for (int i = 0; i < 4; i++) {
+        box.x = corner[i][0];
+        box.y = corner[i][1];
+        const size_t covered = count_covered(w, curves, n, box);
+        if (covered >= least) continue;
+        least = covered;
+        best = box;
+    }
+    return best;
+}
+
+static void draw_legend(sdm_canvas *c, const window *view, const sdm_curve *curves, size_t n)
 {
     double widest = 0;
     int rows = 0;
@@ -210,12 +251,12 @@ static void draw_legend(sdm_canvas *c, const sdm_curve *curves, size_t n)
             rows++;
         }
     if (!rows) return;
-    const int w = (int)widest + 66, x = area.x + area.w - w - 12;
-    int y = area.y + 12;
-    const sdm_box box = {x, y, w, 22 * rows + 12};
+    const sdm_box box =
+        choose_corner(view, curves, n, (sdm_box){0, 0, (int)widest + 66, 22 * rows + 12});
+    const int x = box.x;
     sdm_canvas_fill(c, box, SDM_WHITE, 0.88);
     sdm_canvas_frame(c, box, grid_ink);
-    y += 22;
+    int y = box.y + 22;
     for (size_t i = 0; i < n; i++) {
         if (!curves[i].title || !curves[i].title[0]) continue;
         sdm_canvas_line(c, x + 12, y - 5, x + 42, y - 5, 2.4, curve_colour(i));
@@ -256,7 +297,7 @@ sdm_status sdm_picture_plot(const char *path, const char *title, const char *x_l
     draw_y_axis(c, &w);
     for (size_t i = 0; i < n_curves; i++) draw_curve(c, &w, &curves[i], i);
     sdm_canvas_frame(c, area, SDM_INK_LIGHT);
-    draw_legend(c, curves, n_curves);
+    draw_legend(c, &w, curves, n_curves);
     draw_labels(c, title, x_label, y_label);
     return sdm_canvas_finish(c, err);
 }

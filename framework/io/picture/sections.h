@@ -3,7 +3,7 @@
 #pragma once
 
 #include "panel.h"
-#include "pieces.h"
+#include "inside_pieces.h"
 #include "sdm/grid.h"
 
 typedef struct sdm_sections {

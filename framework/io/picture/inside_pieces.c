@@ -1,5 +1,5 @@
 /* Finds the pieces of the inside of a map by union-find over the runs of voxels inside along x. */
-#include "pieces.h"
+#include "inside_pieces.h"
 
 #include "sdm/memory.h"
 

@@ -13,7 +13,7 @@ typedef struct cli_phantom {
     sdm_grid grid;   /* grid of the image */
     sdm_phantom_opts opts;
     bool thin; /* a warning has named a part that is too thin for the voxels */
-    bool cut; /* the shape extends beyond the box of the voxel centres */
+    bool cut;  /* the shape extends beyond the box of the voxel centres */
 } cli_phantom;
 
 /* Opens the shape and derives its parameters, the pose, the grid and the options of the image from

@@ -201,10 +201,9 @@ static void draw_curve(sdm_canvas *c, const window *w, const sdm_curve *curve, s
     draw_markers(c, w, curve, number);
 }
 
-/* How many places of the curves, 16 on each line, the box covers. */
+/* Pixels of the curves, about, that the box covers: counted at every fourth one. */
 static size_t count_covered(const window *w, const sdm_curve *curves, size_t n, sdm_box box)
 {
-    enum { PLACES = 16 };
     double a[2], b[2];
     size_t covered = 0;
     for (size_t k = 0; k < n; k++)
@@ -212,10 +211,12 @@ static size_t count_covered(const window *w, const sdm_curve *curves, size_t n, 
             if (!curve_point(&curves[k], i, w->log_y, a) ||
                 !curve_point(&curves[k], i + 1, w->log_y, b))
                 continue;
-            for (int q = 0; q <= PLACES; q++) {
-                const double t = (double)q / PLACES, x = to_x(w, a[0] + t * (b[0] - a[0])) - box.x,
-                             y = to_y(w, a[1] + t * (b[1] - a[1])) - box.y;
-                covered += x >= 0 && x <= box.w && y >= 0 && y <= box.h;
+            const double x = to_x(w, a[0]) - box.x, y = to_y(w, a[1]) - box.y,
+                         dx = to_x(w, b[0]) - box.x - x, dy = to_y(w, b[1]) - box.y - y;
+            const int steps = 1 + (int)(hypot(dx, dy) / 4);
+            for (int q = 0; q <= steps; q++) {
+                const double u = x + dx * q / steps, v = y + dy * q / steps;
+                covered += u >= 0 && u <= box.w && v >= 0 && v <= box.h;
             }
         }
     return covered;

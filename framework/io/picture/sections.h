@@ -2,8 +2,8 @@
  * mm. */
 #pragma once
 
-#include "panel.h"
 #include "inside_pieces.h"
+#include "panel.h"
 #include "sdm/grid.h"
 
 typedef struct sdm_sections {

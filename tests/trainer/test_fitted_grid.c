@@ -1,5 +1,5 @@
 /* Grids that are fitted to the shapes of a configuration.
- * Tests: fitted_grid.c shape_grid.c shape_box.c shape_thickness.c */
+ * Tests: fitted_grid.c grid_faces.c shape_grid.c shape_box.c shape_thickness.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -160,6 +160,59 @@ static void test_thin(void **state)
     sdm_instance_free(plate);
 }
 
+/* Distance, in voxels, of a plane perpendicular to an axis from the closest voxel centres. */
+static double plane_distance(const sdm_grid *g, int axis, double at)
+{
+    const double index = (at - g->origin[axis]) / g->spacing[axis];
+    return fabs(index - nearbyint(index));
+}
+
+// The faces of the plate at x = -5, x = 5, y = -5, y = 5 and z = 0 stay in place, that at
+// z = thick does not. No plane of voxel centres comes near those that stay, the margin is kept, and
+// a shape without such faces has the grid around its box.
+static void test_faces(void **state)
+{
+    (void)state;
+    static const char *const GRIDS[] = {
+        "auto",         "{voxels: 40}",   "{voxels: 17}",    "{spacing: 0.5}",
+        "{spacing: 2}", "{spacing: 0.4}", "{spacing: 1.25}", "{spacing: [0.5, 1, 0.3]}"};
+    const double low[3] = {-5, -5, 0}, high[3] = {5, 5, 0.5}, range[1][2] = {{0.4, 0.5}};
+    sdm_error e = {0};
+    sdm_instance *plate = NULL;
+    sdm_grid g;
+    size_t moved = 0;
+    assert_int_equal(sdm_instance_create(&plate_shape, NULL, 0, NULL, &plate, &e), SDM_OK);
+    for (size_t k = 0; k < sizeof GRIDS / sizeof *GRIDS; k++) {
+        sdm_config c;
+        char text[256];
+        snprintf(text, sizeof text, "shape: {name: plate}\ngrid: %s\ntrain: {steps: 1}\n",
+                 GRIDS[k]);
+        if (sdm_config_parse("test.yaml", text, strlen(text), NULL, 0, &c, &e) ||
+            sdm_train_complete(&c, plate, NULL, &e))
+            fail_msg("%s", e.text);
+        assert_true(plane_distance(&c.grid, 2, 0) > 0.19);
+        for (int a = 0; a < 3; a++) {
+            const double h = c.grid.spacing[a], last = (double)(c.grid.n[a] - 1);
+            // of two opposite faces one may be closer if the other is farther away
+            const double off = plane_distance(&c.grid, a, low[a]);
+            if (a < 2) assert_true(off + plane_distance(&c.grid, a, high[a]) > 0.3);
+            assert_true((low[a] - c.grid.origin[a]) / h > 2.39);
+            assert_true((c.grid.origin[a] - high[a]) / h + last > 2.39);
+        }
+        if (sdm_grid_around(low, high, 0, c.grid.spacing, &g, &e)) fail_msg("%s", e.text);
+        assert_memory_equal(g.n, c.grid.n, sizeof g.n);
+        moved += memcmp(g.origin, c.grid.origin, sizeof g.origin) != 0;
+    }
+    assert_true(moved > 4);
+
+    const sdm_grid around = g;
+    assert_int_equal(sdm_grid_avoid_faces(capsule, NULL, 8, 1, &g, &e), SDM_OK);
+    assert_memory_equal(&g, &around, sizeof g);
+    assert_int_equal(sdm_grid_avoid_faces(NULL, NULL, 8, 1, &g, &e), SDM_E_ARG);
+    assert_int_equal(sdm_grid_avoid_faces(plate, range, 8, 1, NULL, &e), SDM_E_ARG);
+    sdm_instance_free(plate);
+}
+
 // A proposal keeps the spacing of the configuration and reads as the keys that it names; where the
 // spacing makes too many voxels, it says so.
 static void test_proposal(void **state)
@@ -197,10 +250,8 @@ static void test_proposal(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_around),
-        cmocka_unit_test(test_capsule),
-        cmocka_unit_test(test_thin),
-        cmocka_unit_test(test_proposal),
+        cmocka_unit_test(test_around), cmocka_unit_test(test_capsule),  cmocka_unit_test(test_thin),
+        cmocka_unit_test(test_faces),  cmocka_unit_test(test_proposal),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -5,7 +5,7 @@
 #include "sdm/internal/text.h"
 #include "sdm/internal/train.h"
 
-enum { BOX_SAMPLES = 256, THIN_SAMPLES = 8, BOX_SEED = 1 };
+enum { BOX_SAMPLES = 256, THIN_SAMPLES = 8, FACE_SAMPLES = 8, BOX_SEED = 1 };
 
 /* `grid: auto` makes so many voxels across the thinnest part of the shapes, as long as the longest
  * edge has at most VOXELS_MOST of them and the grid at most COUNT_MOST: maps and training cost as
@@ -55,6 +55,14 @@ static sdm_status refine_for_thin(const sdm_config *config, const sdm_instance *
     return s;
 }
 
+/* Moves the grid off the planes of faces that have the same place in all shapes. */
+static sdm_status avoid_faces(const sdm_instance *shape, const family *f, sdm_grid *grid,
+                              sdm_error *err)
+{
+    return sdm_grid_avoid_faces(shape, (const double(*)[2])f->range, FACE_SAMPLES, BOX_SEED, grid,
+                                err);
+}
+
 static void add_three(sdm_text *out, const double v[3])
 {
     sdm_text_add(out, "[%.10g, %.10g, %.10g]", v[0], v[1], v[2]);
@@ -96,6 +104,7 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
     if (s) return sdm_fail_in(err, SDM_E_CONFIG, "%s: grid", config->file);
     const double usual = grid.spacing[0];
     if (config->grid_auto) s = refine_for_thin(config, shape, &f, &thick, &grid, err);
+    if (!s) s = avoid_faces(shape, &f, &grid, err);
     if (s) return s;
     const bool finer = grid.spacing[0] < usual;
     sdm_config_set_grid(config, &grid);
@@ -125,6 +134,8 @@ sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance 
     s = sdm_grid_around(f.low, f.high, 0, config->grid.spacing, &grid, NULL);
     const double voxels = s ? INFINITY : (double)sdm_grid_count(&grid);
     if (voxels <= PROPOSED_MAX) {
+        s = avoid_faces(shape, &f, &grid, err);
+        if (s) return s;
         sdm_text_add(out, "grid: {spacing: ");
         add_spacing(out, &grid);
         sdm_text_add(out, "} (");
@@ -132,6 +143,7 @@ sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance 
         double thick;
         s = sdm_grid_around(f.low, f.high, SDM_GRID_VOXELS, NULL, &grid, err);
         if (!s) s = refine_for_thin(config, shape, &f, &thick, &grid, err);
+        if (!s) s = avoid_faces(shape, &f, &grid, err);
         if (s) return s;
         sdm_text_add(out, "grid: auto (");
     }

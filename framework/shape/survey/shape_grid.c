@@ -2,21 +2,7 @@
 #include <math.h>
 
 #include "sdm/internal/shape_box.h"
-
-/* Power of ten of the second digit of x > 0: -2 for 0.23. */
-static int second_digit(double x) { return (int)floor(log10(x)) - 1; }
-
-/* count times 10^power, rounded once. */
-static double decimal(double count, int power)
-{
-    return power < 0 ? count / pow(10, -power) : count * pow(10, power);
-}
-
-/* x / 10^power. */
-static double in_units(double x, int power)
-{
-    return power < 0 ? x * pow(10, -power) : x / pow(10, power);
-}
+#include "two_digits.h"
 
 sdm_status sdm_grid_around(const double low[3], const double high[3], int voxels,
                            const double spacing[3], sdm_grid *out, sdm_error *err)
@@ -45,7 +31,6 @@ sdm_status sdm_grid_around(const double low[3], const double high[3], int voxels
         g.n[i] = (int64_t)count;
         g.spacing[i] = h;
         g.origin[i] = decimal(nearbyint(in_units(origin, power)), power);
-        if (g.origin[i] == 0) g.origin[i] = 0; // no negative zero
     }
     *out = g;
     return sdm_grid_check(out, err);

@@ -66,6 +66,13 @@ static double kept_gb(kept_maps n, size_t n_voxels)
     return 2e-9 * (n.fixed + n.start + 2 * n.holdout) * (double)n_voxels;
 }
 
+/* Does the memory hold the static grid, the held-out maps and the fewest random maps? */
+static bool holds_fewest(const sdm_config *c, kept_maps n, size_t n_voxels)
+{
+    n.start = fmin(n.start, FEWEST);
+    return kept_gb(n, n_voxels) <= c->data.memory_gb;
+}
+
 static sdm_status refuse_memory(const sdm_config *c, kept_maps n, size_t n_voxels, sdm_error *err)
 {
     const double gb = kept_gb(n, n_voxels);
@@ -95,10 +102,7 @@ sdm_status sdm_train_check_memory(const sdm_config *c, size_t n_params, const sd
 {
     const kept_maps n = maps_of(c, n_params);
     const size_t n_voxels = sdm_grid_count(g);
-    kept_maps least = n;
-    least.start = fmin(n.start, FEWEST);
-    return kept_gb(least, n_voxels) <= c->data.memory_gb ? SDM_OK
-                                                         : refuse_memory(c, n, n_voxels, err);
+    return holds_fewest(c, n, n_voxels) ? SDM_OK : refuse_memory(c, n, n_voxels, err);
 }
 
 sdm_status trainer_dataset_size(dataset *d, const sdm_config *config, sdm_error *err)
@@ -117,11 +121,9 @@ sdm_status trainer_dataset_size(dataset *d, const sdm_config *config, sdm_error 
     // fit are made during the training
     const double map_bytes = 2.0 * (double)d->n_voxels;
     const double room = bytes / map_bytes - (double)d->n_static - 2.0 * (double)d->n_holdout;
-    const double least = fmin((double)d->n_start, FEWEST);
-    if (room < least || (room < 1 && !d->only_holdout))
-        return refuse_memory(
-            config, (kept_maps){(double)d->n_static, (double)d->n_start, (double)d->n_holdout},
-            d->n_voxels, err);
+    const kept_maps n = {(double)d->n_static, (double)d->n_start, (double)d->n_holdout};
+    if (!holds_fewest(config, n, d->n_voxels) || (room < 1 && !d->only_holdout))
+        return refuse_memory(config, n, d->n_voxels, err);
     const size_t n_random = d->n_start + d->n_online;
     if (room < (double)d->n_start) d->n_start = (size_t)room;
     d->n_online = n_random - d->n_start;

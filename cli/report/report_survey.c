@@ -117,7 +117,10 @@ static void tell_inside_out(teller *t)
             sdm_text text = {0};
             if (audit.part[i].state != SDM_PART_INSIDE_OUT) continue;
             cli_describe_part(&audit, i, &text);
-            sdm_text_add(&text, " (");
+            // in other shapes it may be another part
+            sdm_text_add(&text, " (at ");
+            add_params(t->s, c->worst, SIZE_MAX, &text);
+            sdm_text_add(&text, "; parts are inside out ");
             add_share(t->s, c, &text);
             sdm_text_add(&text, "); " CLI_MEND_SHAPE);
             tell(t, SDM_E_QUALITY, &text);

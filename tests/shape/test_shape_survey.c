@@ -120,6 +120,26 @@ static void broken_meshes(void **state)
     sdm_shape_survey_dispose(&s);
 }
 
+// Two boxes in the same place: each triangle of the second one is given twice.
+static void parts_in_the_same_place(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("twins");
+    assert_int_equal(s.duplicate.shapes, s.n);
+    assert_true(s.duplicate.amount == 12 && s.n_tri == 24);
+    assert_true(sdm_survey_has_twins(&s));
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    // up to a tenth of the triangles may be given twice
+    s.duplicate.amount = 2;
+    assert_false(sdm_survey_has_twins(&s));
+    s.duplicate.amount = 3;
+    assert_true(sdm_survey_has_twins(&s));
+    sdm_shape_survey_dispose(&s);
+    s = survey("none");
+    assert_false(sdm_survey_has_twins(&s));
+    sdm_shape_survey_dispose(&s);
+}
+
 // The vertices in m: the size and the motion by a parameter in mm tell; both name the unit.
 static void vertices_in_metres(void **state)
 {
@@ -373,6 +393,7 @@ int main(void)
         cmocka_unit_test(without_faults),
         cmocka_unit_test(parts_that_are_inside_out),
         cmocka_unit_test(broken_meshes),
+        cmocka_unit_test(parts_in_the_same_place),
         cmocka_unit_test(vertices_in_metres),
         cmocka_unit_test(a_part_in_metres),
         cmocka_unit_test(breaks_along_a_parameter),

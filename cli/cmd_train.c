@@ -222,7 +222,8 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     print_next(args, r);
     if (cli_warnings() > 0)
         printf("  warnings    %zu, at the beginning of the output%s\n", cli_warnings(),
-               r->verdict.cut > 0 || r->verdict.inside_out > 0
+               r->verdict.cut > 0 || r->verdict.inside_out > 0 || r->verdict.triangles_by[0] ||
+                       sdm_verdict_lacks_part(&r->verdict)
                    ? ""
                    : ": the verdict does not know what they name, mend it first");
     return SDM_OK;

@@ -3,13 +3,7 @@
 
 #include <math.h>
 #include <stdio.h>
-
-#include "report_audit.h"
-
-/* From this share of a surface with edges, or thinner than two voxels, on, and below this number of
-   voxels across the thinnest part, volumes are told to be too small: a spanner with half of its
-   surface near edges lost 5 % of its volume with 3.6 voxels, 10 % with 1.9, 1 % with 7.3. */
-static const double EDGES_MANY = 0.1, VOXELS_MANY = 4;
+#include <string.h>
 
 /* The part of the error with its share of the sum of all parts. */
 static void print_part(const sdm_verdict *v, sdm_cause cause, double sum, bool first)
@@ -42,12 +36,6 @@ static void print_far(const sdm_verdict *v)
            v->largest_at_mm < 0 ? "inside" : "outside");
 }
 
-/* Are voxels so large beside parts with edges that surfaces enclose too little? */
-static bool is_coarse(const sdm_verdict *v)
-{
-    return v->thin >= EDGES_MANY && v->thickness_mm < VOXELS_MANY * v->coarse_mm;
-}
-
 /* Begins a line: with the label "not for" if it is the first of the list, else with spaces. */
 static void not_for(bool *first)
 {
@@ -62,14 +50,26 @@ static const char *percent(double share, char text[16])
     return text;
 }
 
+/* text[80] = "; grid.spacing 0.78 WHAT", where the line `verdict` names no spacing, or that it
+ * does: the whole report names one. Returns text. */
+static const char *advised_spacing(const sdm_verdict *v, const char *what, char text[80])
+{
+    if (!strcmp(v->key, "grid.spacing"))
+        snprintf(text, 80, "; the grid.spacing of the line 'verdict' %s", what);
+    else
+        snprintf(text, 80, "; grid.spacing %.2g %s", sdm_verdict_spacing(v), what);
+    return text;
+}
+
 /* The purposes for which a model of this grade is not good, a line each. */
-static void print_unfit(const sdm_verdict *v, bool cuts)
+static void print_unfit(const sdm_verdict *v)
 {
     bool first = true;
-    char text[16];
+    char text[16], advice[80];
     if (v->inside_out > 0)
         not_for(&first), printf("the parts that are inside out, which are missing\n");
-    if (v->cut > 0 && !cuts)
+    // the line of the grade tells of more, unless parts are inside out
+    if (v->cut > 0 && (v->cut <= SDM_CUT_POOR || v->inside_out > 0))
         not_for(&first),
             printf("the %.2g %% of the shapes that the grid cuts\n", fmin(99, 100 * v->cut));
     if (sdm_verdict_errs_far(v))
@@ -77,20 +77,27 @@ static void print_unfit(const sdm_verdict *v, bool cuts)
             printf("distances far from the surface: wrong by up to %.2g mm\n", v->largest_mm);
     if (v->volume_error > SDM_VOLUME_BAD)
         not_for(&first), printf("volumes: off by %s %%\n", percent(v->volume_error, text));
-    if (is_coarse(v))
+    if (sdm_verdict_lacks_part(v))
+        not_for(&first),
+            printf("its thinnest part and volumes of surfaces (.stl): it is %.2g mm thick, too "
+                   "thin for voxels of %.3g mm, and will be missing or broken%s\n",
+                   v->thickness_mm, v->coarse_mm, advised_spacing(v, "shows it", advice));
+    else if (sdm_verdict_cuts_edges(v))
         not_for(&first),
             printf("volumes of surfaces (.stl): voxels of %.3g mm cut the edges of its parts, the "
-                   "thinnest of which is %.2g mm thick; grid.spacing %.2g keeps more of them\n",
-                   v->coarse_mm, v->thickness_mm, 0.25 * v->thickness_mm);
+                   "thinnest of which is %.2g mm thick%s\n",
+                   v->coarse_mm, v->thickness_mm, advised_spacing(v, "keeps more of them", advice));
     if (v->derivative_error > SDM_DERIVATIVE_BAD)
         not_for(&first), printf("derivatives of maps by %s: off by %s %%\n", v->derivative_by,
                                 percent(v->derivative_error, text));
     if (v->volume_derivative_error > SDM_DERIVATIVE_BAD)
         not_for(&first), printf("derivatives of the volume by %s: off by %s %%\n",
                                 v->volume_derivative_by, percent(v->volume_derivative_error, text));
-    if (sdm_too_thin(v->thickness_mm, v->coarse_mm))
-        not_for(&first), printf("its thinnest part, which is " CLI_THIN_PART "\n", v->thickness_mm,
-                                v->coarse_mm, 0.5 * v->thickness_mm);
+    if (v->triangles_by[0])
+        not_for(&first),
+            printf("derivatives of exact maps (exact --jacobian, fit --exact or --polish) where "
+                   "the triangles change with %s: vertices do not correspond there\n",
+                   v->triangles_by);
 }
 
 /* Errors of volumes and derivatives. */
@@ -114,18 +121,11 @@ static void print_derivatives(const sdm_verdict *v)
 void cli_print_verdict(const sdm_verdict *v)
 {
     const double voxel = v->voxel_mm;
+    char text[SDM_GRADE_TEXT];
     printf("  in voxels   all %.4f, within a voxel of the surface %.4f; Dice %.4f, smallest %.4f\n",
            v->rmse_mm / voxel, v->rmse_voxel_mm / voxel, v->dice, v->dice_min);
-    // a network may be poor for this alone
-    const bool cuts = v->grade == SDM_GRADE_POOR && v->cut > SDM_CUT_POOR;
-    printf("  %-11s ", sdm_grade_name(v->grade));
-    if (cuts)
-        printf("its grid cuts %.3g %% of the shapes, whose surfaces end open there",
-               fmin(v->cut < 1 ? 99 : 100, 100 * v->cut));
-    else
-        printf("%s", sdm_grade_text(v->grade));
-    printf("\n");
-    print_unfit(v, cuts);
+    printf("  %-11s %s\n", sdm_grade_name(v->grade), sdm_grade_text(v, text));
+    print_unfit(v);
     print_far(v);
     print_derivatives(v);
     print_parts(v);
@@ -146,5 +146,6 @@ void cli_print_verdict(const sdm_verdict *v)
                    100 * v->thin);
         printf("\n");
     }
-    printf("  verdict     %s\n", v->sentence);
+    printf("  verdict     %s%s\n",
+           v->grade == SDM_GRADE_POOR ? "The model is poor, not for use. " : "", v->sentence);
 }

@@ -233,6 +233,90 @@ static void parts_too_thin_for_the_grid(void **state)
     }
 }
 
+// The text of a grade leaves out what other figures exclude, says of a poor model that it is not
+// for use, and why; and the verdict advises one spacing.
+static void uses_and_spacing(void **state)
+{
+    (void)state;
+    char text[SDM_GRADE_TEXT];
+    sdm_verdict v = figures();
+    v.coarse_mm = v.voxel_mm, v.thickness_mm = 5, v.thin = 0.2;
+    assert_string_equal(sdm_grade_text(&v, text),
+                        "for level sets, surfaces, measurements and fits to images");
+    assert_true(isnan(sdm_verdict_spacing(&v)));
+    // volumes that are off, edges that are cut, a part that is broken: no measurements
+    v.volume_error = 0.03;
+    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and fits to images");
+    v.volume_error = NAN, v.thickness_mm = 3;
+    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and fits to images");
+    assert_true(fabs(sdm_verdict_spacing(&v) - 0.75) < 1e-9);
+    v.thin = 0.05;
+    assert_non_null(strstr(sdm_grade_text(&v, text), "measurements"));
+    v.grade = SDM_GRADE_USABLE, v.thickness_mm = 1;
+    assert_string_equal(sdm_grade_text(&v, text), "for pictures, segmentations and first fits");
+    assert_true(fabs(sdm_verdict_spacing(&v) - 0.5) < 1e-9);
+    // the key of the verdict comes first
+    strcpy(v.key, "grid.spacing"), v.to = 0.4;
+    assert_true(sdm_verdict_spacing(&v) == 0.4);
+    // a poor model and its reason
+    v.grade = SDM_GRADE_POOR;
+    assert_string_equal(sdm_grade_text(&v, text),
+                        "not for use: whole voxels are on the wrong side");
+    v.thickness_mm = 0.5;
+    assert_string_equal(sdm_grade_text(&v, text), "not for use: its thinnest part is missing");
+    v.cut = 0.6;
+    assert_non_null(strstr(sdm_grade_text(&v, text), "not for use: its grid cuts 60 % of"));
+    v.inside_out = 1;
+    assert_string_equal(sdm_grade_text(&v, text), "not for use: parts of the shape are missing");
+}
+
+/* Tetrahedra: one, or from half of the range of the second parameter on two. */
+static int pair_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                     const double *p, sdm_mesh_out *out)
+{
+    static const uint32_t TRI[12] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
+    const size_t n = p[1] < 0.5 ? 1 : 2;
+    (void)self, (void)options;
+    const int failed = host->reserve(host, out, 4 * n, 4 * n);
+    for (size_t i = 0; i < n && !failed; i++)
+        for (uint32_t k = 0; k < 12; k++) {
+            out->vert[12 * i + k] = (k % 3 + 1 == k / 3 ? p[0] : 0) + (double)(3 * i);
+            out->tri[12 * i + k] = TRI[k] + 4 * (uint32_t)i;
+        }
+    return failed;
+}
+
+// The parameter that changes the triangles is found, and no other one.
+static void triangles_change(void **state)
+{
+    (void)state;
+    static const sdm_param PARAMS[] = {{"size", "mm", 1, 2, 1, ""}, {"many", "", 0, 1, 0, ""}};
+    static const sdm_shape SHAPE = {.abi = SDM_SHAPE_ABI,
+                                    .size = sizeof(sdm_shape),
+                                    .name = "tetrahedra",
+                                    .summary = "one or two tetrahedra",
+                                    .params = PARAMS,
+                                    .n_params = 2,
+                                    .mesh = pair_mesh};
+    double p[2] = {1, 0};
+    size_t param;
+    sdm_error e = {0};
+    sdm_instance *shape = NULL;
+    if (sdm_instance_create(&SHAPE, NULL, 0, NULL, &shape, &e)) fail_msg("%s", e.text);
+    dataset d = {.shape = shape,
+                 .n_params = 2,
+                 .min = {1, 0},
+                 .max = {2, 1},
+                 .n_holdout = 1,
+                 .holdout_params = p};
+    assert_int_equal(trainer_find_triangles_param(&d, &param, &e), SDM_OK);
+    assert_int_equal(param, 1);
+    d.max[1] = 0.4; // within this range nothing changes
+    assert_int_equal(trainer_find_triangles_param(&d, &param, &e), SDM_OK);
+    assert_int_equal(param, 2);
+    sdm_instance_free(shape);
+}
+
 // Shapes that leave the grid come first in the sentence; what limits the others follows.
 static void grid_cuts(void **state)
 {
@@ -528,6 +612,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(error_far_from_the_surface),
         cmocka_unit_test(grid_limits),
         cmocka_unit_test(grades),
+        cmocka_unit_test(uses_and_spacing),
+        cmocka_unit_test(triangles_change),
         cmocka_unit_test(grid_cuts),
         cmocka_unit_test(inside_out_is_the_cause),
         cmocka_unit_test(parts_too_thin_for_the_grid),

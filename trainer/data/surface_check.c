@@ -2,6 +2,7 @@
 #include "surface_check.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "sdm/exact.h"
 #include "sdm/internal/part_audit.h"
@@ -143,5 +144,30 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
                            .thickness_mm = thickness,
                            .cut = d->n_holdout ? (double)cut / (double)d->n_holdout : 0,
                            .inside_out = compared ? (double)inside_out / (double)compared : 0};
+    return s;
+}
+
+static bool same_triangles(const sdm_mesh *a, const sdm_mesh *b)
+{
+    return a->n_vert == b->n_vert && a->n_tri == b->n_tri &&
+           !memcmp(a->tri, b->tri, 3 * a->n_tri * sizeof *a->tri);
+}
+
+sdm_status trainer_find_triangles_param(const dataset *d, size_t *param, sdm_error *err)
+{
+    sdm_mesh low = {0}, high = {0};
+    double p[SDM_POD_MAX_PARAMS];
+    sdm_status s = SDM_OK;
+    *param = d->n_params;
+    for (size_t k = 0; k < d->n_params && !s && d->n_holdout && *param == d->n_params; k++) {
+        memcpy(p, d->holdout_params, d->n_params * sizeof *p);
+        p[k] = d->min[k];
+        s = sdm_instance_mesh(d->shape, p, &low, err);
+        p[k] = d->max[k];
+        if (!s) s = sdm_instance_mesh(d->shape, p, &high, err);
+        if (!s && !same_triangles(&low, &high)) *param = k;
+    }
+    sdm_mesh_dispose(&low);
+    sdm_mesh_dispose(&high);
     return s;
 }

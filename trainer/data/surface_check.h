@@ -24,6 +24,11 @@ typedef struct surface_check {
 /* Does the mesh reach beyond the outer voxel centres of the grid? */
 bool trainer_is_cut(const sdm_mesh *m, const sdm_grid *g);
 
+/* *param = the first parameter of which the mesh has other numbers of vertices or other triangles
+   at the ends of its range, with the other parameters of the first held-out shape; n_params: there
+   is none. Errors of sdm_instance_mesh(). */
+sdm_status trainer_find_triangles_param(const dataset *d, size_t *param, sdm_error *err);
+
 /* Compares a few held-out shapes at random points of their surfaces that lie inside the grid;
    rms_mm and thin are NaN if there is no such point. `cut` is of all held-out shapes. [n_threads
    threads; the same bits for any number] */

@@ -9,7 +9,6 @@
 #include "data/surface_check.h"
 #include "history.h"
 #include "progress.h"
-#include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
 
 /* If the last third of the steps took away more of the error than this, more steps help. */
@@ -26,15 +25,6 @@ static const double RATE_HIGH = 0.03, RATE_USUAL = 3e-3;
    error of the model, and by more than this fraction of a voxel: only then does a finer grid, of
    eight times as many voxels, take away most of the error of the surface. */
 static const double GRID_SHARE = 2, GRID_ERROR = 0.05;
-
-/* A part thinner than this multiple of a voxel is missing in most places. */
-static const double MISSING = 0.7;
-
-/* Do surfaces on the grid lack the thinnest part of the shapes, or show it broken? */
-static bool lacks_thin_part(const sdm_verdict *v)
-{
-    return sdm_too_thin(v->thickness_mm, v->coarse_mm);
-}
 
 /* Sets the key to change and its values. */
 static void advise(sdm_verdict *v, const char *key, double from, double to)
@@ -118,13 +108,6 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
     return "The number of maps limits it";
 }
 
-/* The spacing, with two digits, at which a part of this thickness has two voxels across it. */
-static double spacing_for(double thick)
-{
-    const double unit = pow(10, floor(log10(0.5 * thick)) - 1);
-    return floor(0.5 * thick / unit) * unit;
-}
-
 /* Sets the key for the part that limits; returns the first half of the sentence. */
 static const char *advise_part(const verdict_input *in, sdm_verdict *v)
 {
@@ -147,8 +130,8 @@ static const char *advise_part(const verdict_input *in, sdm_verdict *v)
         advise(v, "grid.spacing", v->voxel_mm, v->voxel_mm / 2);
         return "The lattices of the template limit it, which are as fine as the grid";
     default:
-        if (lacks_thin_part(v)) {
-            advise(v, "grid.spacing", v->coarse_mm, spacing_for(v->thickness_mm));
+        if (sdm_verdict_lacks_part(v)) {
+            advise(v, "grid.spacing", v->coarse_mm, sdm_verdict_spacing(v));
             return "The grid is too coarse for the thinnest part, which surfaces lack or show "
                    "broken";
         }
@@ -179,7 +162,7 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
         part[SDM_CAUSE_NETWORK] > 0.5 * part[SDM_CAUSE_MAPS])
         *limit = SDM_CAUSE_NETWORK;
     // no network shows a part that its grid does not
-    if (lacks_thin_part(v)) {
+    if (sdm_verdict_lacks_part(v)) {
         *limit = SDM_CAUSE_GRID;
         return true;
     }
@@ -299,11 +282,11 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
     v->grade = grade_of(v);
     decide_limit(in, v);
     // the maps lack these parts: however exact the network is, it has learned another shape
-    const bool lacks = v->inside_out > 0 || lacks_thin_part(v);
+    const bool lacks = v->inside_out > 0 || sdm_verdict_lacks_part(v);
     if (lacks && v->grade == SDM_GRADE_GOOD) v->grade = SDM_GRADE_USABLE;
     // whole parts are missing: who has only the model file must be warned
     if (v->inside_out > 0) v->grade = SDM_GRADE_POOR;
-    if (v->thickness_mm < MISSING * v->coarse_mm) v->grade = SDM_GRADE_POOR;
+    if (v->thickness_mm < SDM_PART_MISSING * v->coarse_mm) v->grade = SDM_GRADE_POOR;
     if (v->inside_out > 0)
         tell_inside_out(v);
     else if (v->cut > 0)
@@ -364,10 +347,12 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                         .degree = NAN,
                         .ridge = NAN};
     surface_check surface = {NAN, NAN, NAN, 0, 0};
+    size_t triangles;
     history h = {0};
     const dataset *d = &t->data;
     sdm_status s = t->kind->parts(t, &m, err);
     if (!s) s = trainer_surface_check(d, t->n_threads, &surface, err);
+    if (!s) s = trainer_find_triangles_param(d, &triangles, err);
     if (!s) s = trainer_history_read(t, &h, err);
     if (s) return s;
     const double floor = isfinite(m.bases.heldout) ? m.bases.heldout : 0;
@@ -408,6 +393,9 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                               .steps = (double)t->step,
                               .budget = t->turns->budget};
     set_derivatives(t, &errors->derivatives, out);
+    if (triangles < d->n_params)
+        snprintf(out->triangles_by, sizeof out->triangles_by, "%.60s",
+                 sdm_instance_params(t->shape, NULL)[triangles].name);
     trainer_verdict_decide(&in, out);
     trainer_history_dispose(&h);
     return SDM_OK;

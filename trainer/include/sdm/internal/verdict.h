@@ -74,8 +74,11 @@ typedef struct sdm_verdict {
        square: of maps within half a voxel of the surface, and of the volume of maps. */
     double volume_error, volume_error_max, derivative_error, volume_derivative_error;
     char derivative_by[64], volume_derivative_by[64]; /* names of these parameters; "": none */
-    double saved_seconds;                             /* that train.patience has saved */
-    bool limited; /* false: nothing that could be measured limits the model */
+    /* a parameter that changes the numbers of vertices or the triangles of the mesh, so that
+       vertices do not correspond; "": none was found */
+    char triangles_by[64];
+    double saved_seconds; /* that train.patience has saved */
+    bool limited;         /* false: nothing that could be measured limits the model */
     sdm_cause limit;
     /* The key to change, its value in the run and the value to try; "": none. */
     char key[40];
@@ -99,9 +102,29 @@ const char *sdm_cause_text(sdm_cause cause);
 /* A model is poor if its grid cuts a larger fraction of the held-out shapes. */
 #define SDM_CUT_POOR 0.5
 
-/* "good", "usable" or "poor"; what such a model is good for. [any thread] */
+/* A model is poor if its thinnest part is thinner than this multiple of a voxel: it is missing in
+   most places. */
+#define SDM_PART_MISSING 0.7
+
+/* "good", "usable" or "poor". [any thread] */
 const char *sdm_grade_name(sdm_grade grade);
-const char *sdm_grade_text(sdm_grade grade);
+
+/* What such a model is good for, without the uses that its other figures exclude; of a poor one why
+   it is not for use. `text` holds SDM_GRADE_TEXT characters. Returns text. [any thread] */
+enum { SDM_GRADE_TEXT = 120 };
+const char *sdm_grade_text(const sdm_verdict *v, char *text);
+
+/* Volumes of surfaces on the grid are too small: at least a tenth of the surface has edges or is
+   thinner than two voxels, and the thinnest part is thinner than four voxels. [any thread] */
+bool sdm_verdict_cuts_edges(const sdm_verdict *v);
+
+/* The grid does not show the thinnest part of the shapes (sdm_too_thin()). [any thread] */
+bool sdm_verdict_lacks_part(const sdm_verdict *v);
+
+/* The one spacing that the verdict advises, mm: that of its key, or the spacing that shows the
+   thinnest part or keeps the volumes of surfaces; NaN: none. Rounded down to two digits. [any
+   thread] */
+double sdm_verdict_spacing(const sdm_verdict *v);
 
 /* true: the largest error exceeds a voxel and lies farther than near_mm from the surface, where the
    grade says nothing. [any thread] */

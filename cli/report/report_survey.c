@@ -291,6 +291,22 @@ static void tell_cut(teller *t)
     tell(t, f->cut.shapes ? SDM_E_QUALITY : SDM_OK, &text);
 }
 
+/* One line about a grid that is far larger than the shapes. */
+static void tell_large_grid(teller *t)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    sdm_text text = {0};
+    // tell_unit() explains shapes that are small because they are in another unit
+    if (!(f->surplus > SDM_SURVEY_SURPLUS_MAX) || f->scale.odd_size) return;
+    sdm_text_add(&text,
+                 "the grid has %.3g times as many voxels as a grid around the shapes with a margin "
+                 "of %d voxels: it is %.2g times as long along x, %.2g along y, %.2g along z",
+                 f->surplus, SDM_GRID_MARGIN, f->surplus_along[0], f->surplus_along[1],
+                 f->surplus_along[2]);
+    add_proposal(t->s, &text);
+    tell(t, SDM_E_QUALITY, &text);
+}
+
 /* One line about the thinnest part of the shape in which it is thinnest. */
 static void tell_thin(teller *t)
 {
@@ -504,6 +520,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_unit(&t);
     tell_params(&t);
     tell_cut(&t);
+    tell_large_grid(&t);
     tell_thin(&t);
     tell_callbacks(&t);
     tell_notes(&t);

@@ -64,11 +64,16 @@ expect 4 mend sdmgen shapes check good.yaml 'grid.size=[29,33,33]' --plugin "$pl
 cuts='over the parameters the shape reaches from \(-2, -2, -2\) to \(4, 2, 2\) mm; the grid covers \(-3\.5, -4, -4\) to \(3\.5, 4, 4\) mm and cuts [0-9.]+ % of the shapes \(by up to 0\.5 mm at the upper end of x\); use grid: \{spacing: 0\.25\} \(size: \[[0-9, ]+\], spacing: 0\.25, origin: \[[-0-9., ]+\]\)'
 has "^warning +$cuts$"
 present cut.svg
+# A grid far larger than the shapes, which need 8 + 1.75 mm and 4 + 1.75 mm of it.
+large='the grid has 2[0-9.]+ times as many voxels as a grid around the shapes with a margin of 3 voxels: it is 2 times as long along x, 3\.4 along y, 3\.4 along z; use grid: \{spacing: 0\.25\} \(size: \[[0-9, ]+\], spacing: 0\.25, origin: \[[-0-9., ]+\]\)'
+expect 4 mend sdmgen shapes check good.yaml 'grid.size=[62,78,78]' --plugin "$plugin" --samples 16
+has "^warning +$large$"
+expect 0 "^sdmgen: warning: $large$" sdmgen config good.yaml 'grid.size=[62,78,78]' --plugin "$plugin" -q
 # The handle is 0.5 mm thick.
 thin='part 2 of 2 \(box [^a-z]* mm\) is 0\.5 mm thick, too thin for voxels of 0\.5 mm: it will be missing or broken in surfaces; a spacing of at most 0\.25 mm shows it'
-expect 4 mend sdmgen shapes check good.yaml grid.spacing=0.5 --plugin "$plugin" --samples 16
+expect 4 mend sdmgen shapes check good.yaml grid.spacing=0.5 grid.size=[25,17,17] --plugin "$plugin" --samples 16
 has "^warning +$thin \(at size=.*; parts are too thin in all 21 shapes\)$"
-expect 0 "^sdmgen: warning: $thin" sdmgen config good.yaml grid.spacing=0.5 --plugin "$plugin" -q
+expect 0 "^sdmgen: warning: $thin" sdmgen config good.yaml grid.spacing=0.5 grid.size=[25,17,17] --plugin "$plugin" -q
 expect 0 "^sdmgen: warning: $thin$" sdmgen exact --shape faulty --plugin "$plugin" --spacing 0.5 -o thin.nrrd -q
 
 # More maps than the memory for them holds: refused, or a warning where a template may do with fewer.

@@ -42,9 +42,9 @@ expect 1 "^sdmgen: error: train.steps=1: cannot open: .*: the first argument is 
 
 # A refused training leaves no folder that it has made, an empty one that was there stays.
 mkdir -p there/already
-expect 2 'data.memory_gb' sdmgen train "$tiny" --out there/already/new/run data.memory_gb=0.001 'grid.size=[60,60,60]'
+expect 2 'data.memory_gb' sdmgen train "$tiny" --out there/already/new/run data.memory_gb=0.001 'grid.size=[60,60,60]' grid.spacing=0.25
 absent there/already/new
-expect 2 'data.memory_gb' sdmgen train "$tiny" --out there/already data.memory_gb=0.001 'grid.size=[60,60,60]'
+expect 2 'data.memory_gb' sdmgen train "$tiny" --out there/already data.memory_gb=0.001 'grid.size=[60,60,60]' grid.spacing=0.25
 [ -d there/already ] || bad 'a folder that was there has been removed'
 
 # A budget of time that the maps alone exceed: told in one line, and the advice is more time.
@@ -132,8 +132,8 @@ has '"distribution": "normal", "mean": 0, "deviation": 1\}'
 # --force replaces a run only after the new one has passed all checks.
 before=$(cat run/* | cksum)
 expect 2 "range \[0, 100\] of 'a'" sdmgen train "$tiny" --force --out run 'shape.ranges.a=[0,100]' --quiet
-expect 2 'data.memory_gb' sdmgen train "$tiny" --force --out run data.memory_gb=0.001 'grid.size=[60,60,60]' --quiet
-expect 2 'data.memory_gb is .* a coarser grid' sdmgen train "$tiny" --force --out run 'grid.size=[100000,100000,100000]'
+expect 2 'data.memory_gb' sdmgen train "$tiny" --force --out run data.memory_gb=0.001 'grid.size=[60,60,60]' grid.spacing=0.25 --quiet
+expect 2 'data.memory_gb is .* a coarser grid' sdmgen train "$tiny" --force --out run 'grid.size=[100000,100000,100000]' grid.spacing=0.00015
 refused_grid() {
     sdmgen train "$tiny" "$@" --quiet >out 2>err
     [ $? -eq 2 ] || bad "a grid that misses the shapes: $(cat err)"

@@ -307,7 +307,7 @@ static void a_grid_that_is_too_coarse(void **state)
         bool thin;
     } cases[] = {{0.35, false}, {0.36, true}};
     for (size_t i = 0; i < 2; i++) {
-        const sdm_grid grid = sdm_grid_centred((const int64_t[3]){60, 60, 60}, cases[i].spacing,
+        const sdm_grid grid = sdm_grid_centred((const int64_t[3]){45, 45, 45}, cases[i].spacing,
                                                (const double[3]){0});
         sdm_shape_survey s =
             survey_with("none", &(sdm_survey_opts){.samples = 8, .grid = &grid, .brief = true});
@@ -315,6 +315,25 @@ static void a_grid_that_is_too_coarse(void **state)
         assert_int_equal(s.thin.shapes, cases[i].thin ? s.n : 0);
         assert_true(!cases[i].thin || fabs(s.thin.amount - 0.72) < 1e-9);
         assert_int_equal(sdm_shape_survey_verdict(&s), cases[i].thin ? SDM_E_QUALITY : SDM_OK);
+        sdm_shape_survey_dispose(&s);
+    }
+}
+
+// Grids of 30 x 24 x 24 voxels and a little more than twice as many along each axis.
+static void a_grid_that_is_too_large(void **state)
+{
+    (void)state;
+    for (int large = 0; large < 2; large++) {
+        const int64_t n[3] = {large ? 62 : 58, large ? 49 : 46, large ? 49 : 46};
+        const sdm_grid grid = sdm_grid_centred(n, 0.35, (const double[3]){1, 0, 0});
+        sdm_shape_survey s =
+            survey_with("none", &(sdm_survey_opts){.samples = 8, .grid = &grid, .brief = true});
+        // the box is 8 x 6 x 6 mm, the margin 7 voxels
+        const double need[3] = {8 / 0.35 + 7, 6 / 0.35 + 7, 6 / 0.35 + 7};
+        for (int a = 0; a < 3; a++)
+            assert_true(fabs(s.surplus_along[a] - (double)n[a] / need[a]) < 1e-9);
+        assert_int_equal(s.cut.shapes + s.thin.shapes, 0);
+        assert_int_equal(sdm_shape_survey_verdict(&s), large ? SDM_E_QUALITY : SDM_OK);
         sdm_shape_survey_dispose(&s);
     }
 }
@@ -403,6 +422,7 @@ int main(void)
         cmocka_unit_test(callbacks),
         cmocka_unit_test(a_grid_that_cuts),
         cmocka_unit_test(a_grid_that_is_too_coarse),
+        cmocka_unit_test(a_grid_that_is_too_large),
         cmocka_unit_test(threads_and_brief_surveys),
         cmocka_unit_test(refusals),
         cmocka_unit_test(built_in_shapes_pass),

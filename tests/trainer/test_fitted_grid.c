@@ -63,6 +63,29 @@ static void test_around(void **state)
                      SDM_E_ARG);
 }
 
+// How much larger than a box a grid is: its voxels over those from 3 voxels before the box to 3
+// voxels behind it.
+static void test_surplus(void **state)
+{
+    (void)state;
+    const double low[3] = {0, 0, 0}, high[3] = {4, 8, 16}, empty[3] = {-1, 8, 16};
+    double along[3];
+    // 9, 17 and 33 centres within the box, 6 more in the margins
+    sdm_grid g = {
+        .n = {15, 23, 39}, .spacing = {0.5, 0.5, 0.5}, .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    assert_true(fabs(sdm_grid_surplus(&g, low, high, along) - 1) < 1e-12);
+    g.n[0] = 30, g.n[2] = 117;
+    assert_true(fabs(sdm_grid_surplus(&g, low, high, along) - 6) < 1e-12);
+    assert_true(fabs(along[0] - 2) < 1e-12 && along[1] == 1 && fabs(along[2] - 3) < 1e-12);
+    // the first axis of the grid runs along z: 39 voxels of it are needed, along the third 15
+    const double turned[9] = {0, 0, 1, 0, 1, 0, 1, 0, 0};
+    memcpy(g.dir, turned, sizeof turned);
+    g.n[0] = 39, g.n[2] = 30;
+    assert_true(fabs(sdm_grid_surplus(&g, low, high, along) - 2) < 1e-12);
+    assert_true(along[0] == 1 && fabs(along[2] - 2) < 1e-12);
+    assert_true(isnan(sdm_grid_surplus(&g, low, empty, along)));
+}
+
 // The capsule: a cylinder with round ends about z. Its box over the ranges is known.
 static void test_capsule(void **state)
 {
@@ -250,8 +273,9 @@ static void test_proposal(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_around), cmocka_unit_test(test_capsule),  cmocka_unit_test(test_thin),
-        cmocka_unit_test(test_faces),  cmocka_unit_test(test_proposal),
+        cmocka_unit_test(test_around),  cmocka_unit_test(test_capsule),
+        cmocka_unit_test(test_thin),    cmocka_unit_test(test_faces),
+        cmocka_unit_test(test_surplus), cmocka_unit_test(test_proposal),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,4 +1,5 @@
-/* A grid around a box, in numbers that are easy to read; how far points lie beyond a grid. */
+/* A grid around a box, in numbers that are easy to read; how far points lie beyond a grid, and how
+ * much larger than a box a grid is. */
 #include <math.h>
 
 #include "sdm/internal/shape_box.h"
@@ -49,4 +50,27 @@ double sdm_grid_beyond(const sdm_grid *g, const double x[3], double beyond[3][2]
         }
     }
     return most;
+}
+
+double sdm_grid_surplus(const sdm_grid *g, const double low[3], const double high[3],
+                        double along[3])
+{
+    double first[3] = {INFINITY, INFINITY, INFINITY}, last[3] = {-INFINITY, -INFINITY, -INFINITY},
+           product = 1;
+    for (int corner = 0; corner < 8; corner++) {
+        double x[3], index[3];
+        for (int a = 0; a < 3; a++) x[a] = corner >> a & 1 ? high[a] : low[a];
+        sdm_grid_index(g, x, index);
+        for (int a = 0; a < 3; a++) {
+            first[a] = fmin(first[a], index[a]);
+            last[a] = fmax(last[a], index[a]);
+        }
+    }
+    for (int a = 0; a < 3; a++) {
+        along[a] = low[a] <= high[a]
+                       ? (double)g->n[a] / (last[a] - first[a] + 1 + 2 * SDM_GRID_MARGIN)
+                       : NAN;
+        product *= along[a];
+    }
+    return product;
 }

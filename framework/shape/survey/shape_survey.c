@@ -478,6 +478,8 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
         if (!s) s = repeat(&v, n_threads, err);
         if (!s && !is_late(&v, 1)) s = widen_box(&v, err);
     }
+    if (!s && opts->grid)
+        out->surplus = sdm_grid_surplus(opts->grid, out->low, out->high, out->surplus_along);
     if (!s) s = sdm_survey_measure_scale(&v.family, out, err);
     sdm_free(v.found);
     sdm_free(v.fold);
@@ -518,7 +520,7 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
     bool bad = s->inside_out.shapes || s->crossing.shapes || s->folded.shapes || s->turned.shapes ||
                s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->thin.shapes ||
-               s->flat.shapes || s->narrow || s->unlike ||
+               s->flat.shapes || s->narrow || s->unlike || s->surplus > SDM_SURVEY_SURPLUS_MAX ||
                s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
                s->scale.odd_speed || s->scale.odd_angle;
     for (size_t k = 0; k < s->n_params && s->jump; k++)

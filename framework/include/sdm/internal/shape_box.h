@@ -33,6 +33,12 @@ sdm_status sdm_shape_thickness(const sdm_instance *shape, const double (*range)[
  * distance below the first voxel (side 0) and above the last one (side 1). [any thread] */
 double sdm_grid_beyond(const sdm_grid *g, const double x[3], double beyond[3][2]);
 
+/* along[axis] = length of the grid over that of the grid which holds the box low[3] .. high[3] (mm)
+ * with a margin of SDM_GRID_MARGIN voxels of the same spacing. Returns their product: how many
+ * times as many voxels the grid has; NaN: the box is empty. [any thread] */
+double sdm_grid_surplus(const sdm_grid *g, const double low[3], const double high[3],
+                        double along[3]);
+
 /* The largest spacing of the grid, mm. */
 static inline double sdm_grid_coarsest(const sdm_grid *g)
 {

@@ -119,6 +119,9 @@ typedef struct sdm_shape_survey {
     sdm_survey_count thin;
     double beyond[3][2]; /* mm, of all shapes: below the first and above the last voxel of each axis
                             of the grid; 0: not beyond */
+    /* sdm_grid_surplus() of the grid and the box of all meshes, and its factors along the axes;
+       above SDM_SURVEY_SURPLUS_MAX the grid is far too large. 0: there is no grid; NaN: no mesh */
+    double surplus, surplus_along[3];
 
     /* what a brief survey leaves out */
     /* corners and the first samples in which triangles have turned over within a sixteenth of the
@@ -160,9 +163,9 @@ bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i);
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
  * are usable, but a training or derivatives would suffer: parts that are inside out (also those
  * that the engine turns), parts without thickness, walls that pass through each other or outlines
- * that cross themselves, sizes, triangles or vertices that jump, a grid that cuts or is too coarse
- * for a part, wrong velocities, results that differ from call to call, or an odd size or speed
- * (another unit than mm, or a parameter that does nothing). Else SDM_OK. */
+ * that cross themselves, sizes, triangles or vertices that jump, a grid that cuts, is too coarse
+ * for a part or far too large, wrong velocities, results that differ from call to call, or an odd
+ * size or speed (another unit than mm, or a parameter that does nothing). Else SDM_OK. */
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 
 /* A smaller share of the area may turn over: slivers at a tip, rings of a tube that bends sharply
@@ -170,6 +173,9 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 #define SDM_SURVEY_FOLD_MIN 0.04
 /* The same where the surface also meets itself: the inner wall of a thin neck has little area. */
 #define SDM_SURVEY_FOLD_CROSSED 0.002
+
+/* More times as many voxels as the grid around the shapes are wasted: twice along each axis. */
+#define SDM_SURVEY_SURPLUS_MAX 8.0
 
 /* A part that is thinner than this share of the longest edge of the box shows on no grid. */
 #define SDM_SURVEY_FLAT 1e-3

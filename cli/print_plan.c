@@ -58,8 +58,8 @@ static void print_stages(const sdm_train_work *w, const sdm_train_plan *p)
            format_bytes(p->all_received, bytes));
 }
 
-/* Says for how many maps a budget of time is enough, if it is too short for those that the
- * configuration asks for. */
+/* Says what a budget of time is for, or, if half of it is too short for the maps that the
+ * configuration asks for, for how many it is enough. */
 static void print_budget(const sdm_config *c, const sdm_train_work *w, const sdm_train_plan *p)
 {
     char a[32], made[64], all[64];
@@ -67,7 +67,13 @@ static void print_budget(const sdm_config *c, const sdm_train_work *w, const sdm
                  seconds = p->seconds[SDM_PLAN_DESIGN] +
                            p->seconds[SDM_PLAN_MAPS] * before / (w->n_holdout + w->n_maps),
                  half = 30 * c->train.minutes;
-    if (!(c->train.minutes > 0) || seconds <= half) return;
+    if (!(c->train.minutes > 0)) return;
+    if (seconds <= half) {
+        printf("  budget   train.minutes is %.4g: at most half of it is for the maps before training "
+               "(%s), the rest for as many steps as fit\n",
+               c->train.minutes, format_seconds(seconds, a));
+        return;
+    }
     printf("  budget   half of train.minutes (%s) is enough for %s of the %s maps before training, "
            "which then starts with these: lower data.static or data.start, or raise train.minutes "
            "to %.4g\n",

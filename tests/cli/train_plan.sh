@@ -50,6 +50,10 @@ has '^  design  '
 has '^  refine   20 steps '
 has '^  nodes    1: '
 has '; (more than one does not pay|it pays up to [0-9]+)'
+# A budget of time: what it is for, and for how many maps it is enough. Other budgets have no such line.
+grep -q '^  budget' out && bad 'a budget of time without train.minutes'
+expect 0 - sdmgen train template.yaml train.steps=0 train.minutes=600 --plan -q
+has '^  budget   train\.minutes is 600: at most half of it is for the maps before training \([0-9.e-]+ s\), the rest for as many steps as fit$'
 # A template whose parts need no correction makes no maps for the training and no steps.
 expect 0 - sdmgen train "$source_folder/configs/linkage.yaml" network.kind=template grid=auto grid.voxels=24 --plan -q
 has '^  maps     [0-9]+ maps '

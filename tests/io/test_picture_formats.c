@@ -156,6 +156,31 @@ static void test_svg_is_well_formed(void **state)
     }
 }
 
+// Each axis of a plot has three labelled ticks or more, whatever its range. Labels of the y axis
+// end at it, those of the x axis are centred below it; a power of ten is two texts.
+static void test_axes_have_three_labels(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 60; i++) {
+        const double low = pow(10, 0.37 * (i % 7) - 3), factor = pow(10, 0.06 * (i + 1)),
+                     x[2] = {0, 3 + i}, y[2] = {low, low * factor};
+        for (int log_y = 0; log_y < 2; log_y++) {
+            const sdm_curve curve = {.x = x, .y = y, .n = 2};
+            sdm_error err;
+            size_t size;
+            if (sdm_picture_plot("ticks.svg", NULL, NULL, NULL, log_y, &curve, 1, &err))
+                fail_msg("%s", err.text);
+            char *svg = read_file("ticks.svg", &size);
+            const int power = count(svg, ">10</text>") > 2 ? 2 : 1,
+                      on_y = count(svg, "text-anchor=\"end\"") / power;
+            if (on_y < 3 || count(svg, "text-anchor=\"middle\"") < 3)
+                fail_msg("y from %g to %g, log %d: %d labels", y[0], y[1], log_y, on_y);
+            free(svg);
+        }
+    }
+    remove("ticks.svg");
+}
+
 static void test_pdf_has_text(void **state)
 {
     (void)state;
@@ -332,6 +357,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_svg_is_well_formed),
+        cmocka_unit_test(test_axes_have_three_labels),
         cmocka_unit_test(test_pdf_has_text),
         cmocka_unit_test(test_failures_leave_no_file),
         cmocka_unit_test(test_full_disk),

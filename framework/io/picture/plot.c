@@ -104,19 +104,19 @@ static void power_of_ten(sdm_canvas *c, double y, int exponent)
 }
 
 /* Draws ticks, with labels at the powers of ten (every second, third ... of them when the axis
-   spans over ten) and, when the axis holds fewer than three of these, at 2 and 5 times them. */
+   spans over ten) and, when the axis holds fewer than three powers, at 2 and 5 times them: an axis
+   of a decade or more has three labels. */
 static void draw_log_axis(sdm_canvas *c, const window *w)
 {
     const double decades = w->high[1] - w->low[1];
     const int every = (int)ceil(decades / 10), from = (int)floor(w->low[1]);
-    const bool few = floor(w->high[1]) - ceil(w->low[1]) < 2;
+    const bool few = floor(w->high[1]) - ceil(w->low[1]) + 1 < 3;
     for (int e = from; e <= w->high[1]; e++) {
         for (int m = 1; m < 10; m++) {
             const double v = e + log10(m);
             char text[32];
             if (v < w->low[1] || v > w->high[1] || (m > 1 && decades > 4)) continue;
-            const bool labelled =
-                few && (m == 2 || m == 5 || (decades < 0.8 && (m == 3 || m == 7)));
+            const bool labelled = few && (m == 2 || m == 5);
             snprintf(text, sizeof text, "%g", m * pow(10, e));
             const double y = to_y(w, v);
             if (m == 1 && !few) {
@@ -137,8 +137,8 @@ static void draw_y_axis(sdm_canvas *c, const window *w)
 {
     double first, step;
     char text[32];
-    // ticks in even steps when the values span less than about a factor of two
-    if (w->log_y && w->high[1] - w->low[1] > 0.35) {
+    // ticks in even steps when the values span less than a decade
+    if (w->log_y && w->high[1] - w->low[1] >= 1) {
         draw_log_axis(c, w);
         return;
     }

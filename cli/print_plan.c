@@ -69,9 +69,10 @@ static void print_budget(const sdm_config *c, const sdm_train_work *w, const sdm
                  half = 30 * c->train.minutes;
     if (!(c->train.minutes > 0)) return;
     if (seconds <= half) {
-        printf("  budget   train.minutes is %.4g: at most half of it is for the maps before training "
-               "(%s), the rest for as many steps as fit\n",
-               c->train.minutes, format_seconds(seconds, a));
+        printf(
+            "  budget   train.minutes is %.4g: at most half of it is for the maps before training "
+            "(%s), the rest for as many steps as fit\n",
+            c->train.minutes, format_seconds(seconds, a));
         return;
     }
     printf("  budget   half of train.minutes (%s) is enough for %s of the %s maps before training, "

@@ -1,4 +1,4 @@
-/* Shows the verdict of a fit: what was checked, with its figure and its limit. */
+/* Shows the verdict of a fit: what was checked, with its figure and the bound that it needs. */
 #include <math.h>
 #include <stdio.h>
 
@@ -14,6 +14,52 @@ const char *cli_fit_grade_name(sdm_fit_grade grade)
     return words[grade];
 }
 
+/* What the figure of a check is. */
+static const char *const MEANINGS[SDM_FIT_N_CHECKS] = {
+    [SDM_FIT_CHECK_NO_SHAPE] = "gain over an image without the shape",
+    [SDM_FIT_CHECK_CONTRAST] = "mean value inside less mean value outside",
+    [SDM_FIT_CHECK_CAVITY] = "radius of the largest ball in the shape, mm",
+    [SDM_FIT_CHECK_IN_IMAGE] = "share of the shape that lies in the image",
+    [SDM_FIT_CHECK_CONVERGED] = "iterations",
+    [SDM_FIT_CHECK_RESIDUALS] = "residuals inside the surface over noise",
+    [SDM_FIT_CHECK_BESIDE] = "residuals outside of the surface over noise",
+    [SDM_FIT_CHECK_EMPTY] = "share of the shape that is of another material",
+    [SDM_FIT_CHECK_MISSING] = "the shape's material beside it, over its volume",
+    [SDM_FIT_CHECK_INSIDE] = "spread of the values inside, fitted over measured",
+    [SDM_FIT_CHECK_OUTSIDE] = "spread of the values outside, fitted over measured",
+    [SDM_FIT_CHECK_GIVEN] = "mean values found, from those given, in sd",
+    [SDM_FIT_CHECK_BOUNDS] = "parameters at an end of their range",
+    [SDM_FIT_CHECK_BLOB] = "gain over an ellipsoid in its place",
+    [SDM_FIT_CHECK_KEPT_POSE] = "gain of a free pose",
+    [SDM_FIT_CHECK_MIRROR] = "gain over the mirror image",
+    [SDM_FIT_CHECK_GRID] = "depth of the border of the maps in the shape, mm",
+    [SDM_FIT_CHECK_NETWORK] = "share of the shapes that the model's grid cuts",
+    [SDM_FIT_CHECK_DATA] = "points on the surface; labels: their voxel, mm",
+    [SDM_FIT_CHECK_SIZE] = "spread of the points, mm",
+    [SDM_FIT_CHECK_VOXELS] = "voxel of the maps, mm",
+    [SDM_FIT_CHECK_NEXT_POSE] = "gain over the next best pose or parameter",
+    [SDM_FIT_CHECK_PATCH] = "share of the points that form another surface",
+    [SDM_FIT_CHECK_COVERED] = "share of the surface without points",
+};
+
+/* The side of the limit on which the figure of a finding must lie. */
+static const char *bound_name(const sdm_fit_finding *x)
+{
+    const bool above = x->figure >= x->limit;
+    switch (x->kind) {
+    case SDM_FIT_CHECK_NO_SHAPE:
+    case SDM_FIT_CHECK_IN_IMAGE:
+    case SDM_FIT_CHECK_BLOB:
+    case SDM_FIT_CHECK_MIRROR:
+    case SDM_FIT_CHECK_SIZE:
+    case SDM_FIT_CHECK_NEXT_POSE: return "at least";
+    case SDM_FIT_CHECK_CONTRAST: // inside brighter or darker, as at the start
+    case SDM_FIT_CHECK_DATA:     // a number of points, or the edge of a voxel
+        return above == (x->grade == SDM_FIT_PASSED) ? "at least" : "at most";
+    default: return "at most";
+    }
+}
+
 void cli_fit_print_verdict(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
@@ -21,11 +67,17 @@ void cli_fit_print_verdict(const cli_fit *f)
     printf("verdict: %s\n", cli_fit_grade_name(v->grade));
     for (size_t i = 0; i < v->n_findings; i++) {
         const sdm_fit_finding *x = &v->findings[i];
+        char figure[64] = "";
+        int n = 0;
         // + 0: no negative zero
+        if (!isnan(x->figure)) n = snprintf(figure, sizeof figure, "%.3g", x->figure + 0);
+        if (!isnan(x->limit))
+            snprintf(figure + n, sizeof figure - (size_t)n, ", need %s %.3g", bound_name(x), x->limit);
         printf("  %-12s %-9s", sdm_fit_check_name(x->kind), GRADES[x->grade]);
-        if (!isnan(x->figure)) printf(" %.3g", x->figure + 0);
-        if (!isnan(x->limit)) printf(", limit %.3g", x->limit);
-        printf("%s%s\n", !*x->text ? "" : isnan(x->figure) ? " " : ": ", x->text);
+        if (*x->text)
+            printf(" %s%s%s\n", figure, *figure ? ": " : "", x->text);
+        else
+            printf(" %-28s %s\n", figure, MEANINGS[x->kind]);
     }
     if (v->grade == SDM_FIT_FAILED && f->opts.turns == SDM_FIT_TURNS_NONE &&
         !isnan(f->args->pose.rotation[0]))

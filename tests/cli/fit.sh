@@ -88,7 +88,7 @@ has '^ellipsoid fitted to ct.nii.gz$'
 has 'rx +3\.[0-9]+ \+- 0\.0'
 has 'reference: Dice 0.9'
 has 'converged after'
-has '^  map voxels   doubtful  0.35, limit 0.2.*coarse beside the point spread of the image: .*with voxels of 0.2[0-9]* mm \(--exact --spacing\)'
+has '^  map voxels   doubtful  0.35, need at most 0.2.*coarse beside the point spread of the image: .*with voxels of 0.2[0-9]* mm \(--exact --spacing\)'
 # the truth of the test image beside the estimate; that of another shape, and a file without parameters, are refused
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --truth truth.json
 has '^  rx .* \+- .* mm +truth 3\.5, off by [0-9.]+ sd$'

@@ -35,7 +35,7 @@ for square in 0.7 1; do
     if [ $square = 1 ]; then
         has '^  residuals    passed '
     else
-        has '^  residuals    doubtful  2\.[0-9]+, limit 1\.[0-9]+: neighbourhoods of points lie 1\.[0-9] times as far off the surface as the scatter'
+        has '^  residuals    doubtful  2\.[0-9]+, need at most 1\.[0-9]+: neighbourhoods of points lie 1\.[0-9] times as far off the surface as the scatter'
     fi
 done
 

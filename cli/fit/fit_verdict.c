@@ -52,11 +52,13 @@ static const char *bound_name(const sdm_fit_finding *x)
     case SDM_FIT_CHECK_BLOB:
     case SDM_FIT_CHECK_MIRROR:
     case SDM_FIT_CHECK_SIZE:
-    case SDM_FIT_CHECK_NEXT_POSE: return "at least";
+    case SDM_FIT_CHECK_NEXT_POSE:
+        return "at least";
     case SDM_FIT_CHECK_CONTRAST: // inside brighter or darker, as at the start
     case SDM_FIT_CHECK_DATA:     // a number of points, or the edge of a voxel
         return above == (x->grade == SDM_FIT_PASSED) ? "at least" : "at most";
-    default: return "at most";
+    default:
+        return "at most";
     }
 }
 
@@ -72,7 +74,8 @@ void cli_fit_print_verdict(const cli_fit *f)
         // + 0: no negative zero
         if (!isnan(x->figure)) n = snprintf(figure, sizeof figure, "%.3g", x->figure + 0);
         if (!isnan(x->limit))
-            snprintf(figure + n, sizeof figure - (size_t)n, ", need %s %.3g", bound_name(x), x->limit);
+            snprintf(figure + n, sizeof figure - (size_t)n, ", need %s %.3g", bound_name(x),
+                     x->limit);
         printf("  %-12s %-9s", sdm_fit_check_name(x->kind), GRADES[x->grade]);
         if (*x->text)
             printf(" %s%s%s\n", figure, *figure ? ": " : "", x->text);

@@ -210,6 +210,7 @@ static sdm_status fit_one(const cli_args *args, const char *json, sdm_error *err
     if (!s) s = cli_fit_read_options(&f, err);
     if (!s) s = cli_fit_read_target(&f, err);
     if (!s) s = cli_fit_check_options(&f, err);
+    if (!s) s = cli_fit_make_grid(&f, err);
     if (!s) cli_fit_default_lengths(&f);
     if (!s) s = cli_fit_read_reference(&f, err);
     if (!s) s = cli_fit_read_truth(&f, err);

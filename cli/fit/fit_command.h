@@ -47,6 +47,10 @@ typedef struct cli_fit {
     double pivot[3];    /* middle of the shape at the start, in the shape's frame, mm */
     sdm_fit_source source;
 
+    /* fit_grid.c: thickness (mm) of the thinnest part, for which the grid of exact maps was made
+     * finer; 0: it was not */
+    double thinnest;
+
     /* fit_target.c: the image, labels or points to fit to */
     sdm_volume image;
     float *mask;    /* [nz][ny][nx] labels, 1 inside, 0 outside; NULL: the target is no label map */
@@ -96,6 +100,12 @@ typedef struct cli_fit {
 /* Opens the model or the shape; sets the start parameters and the source of the maps. SDM_E_ARG,
  * SDM_E_RANGE, errors of opening. */
 sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err);
+
+/* After cli_fit_read_target(): without a network, sets the grid of the exact maps, which holds the
+ * shape over its ranges: that of --like, --size or --spacing; that of the model; or 64 voxels along
+ * its longest edge and, for volumes, up to 128 where the thinnest part of the start shape would
+ * have less than three voxels across it. SDM_E_ARG; errors of making the shape. */
+sdm_status cli_fit_make_grid(cli_fit *f, sdm_error *err);
 
 /* After cli_fit_open_source(): reads --depth. With --measure it measures the shape at the start, so
  * that a mistake ends the command before the fit. SDM_E_ARG, SDM_E_PLUGIN. */

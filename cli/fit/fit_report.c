@@ -110,6 +110,16 @@ static void print_target(const cli_fit *f)
                r->evidence);
 }
 
+/* The number of maps, and the voxels of exact maps, which points do not need. */
+static void print_maps(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    printf("  maps         %zu by the network, %zu by the exact engine", r->n_network, r->n_exact);
+    if (!f->source.model && !f->points) printf(", voxels of %.3g mm", cli_fit_map_voxel(f));
+    if (f->thinnest > 0) printf(", because the thinnest part is %.2g mm thick", f->thinnest);
+    printf("\n");
+}
+
 void cli_fit_print(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
@@ -129,8 +139,7 @@ void cli_fit_print(const cli_fit *f)
     if (r->n_restarts)
         printf("  restarts     %zu: a refused fit went on from another value of a parameter\n",
                r->n_restarts);
-    printf("  maps         %zu by the network, %zu by the exact engine\n", r->n_network,
-           r->n_exact);
+    print_maps(f);
     printf("  time         %.2f s: maps %.2f s; search of the start %.2f s\n", r->seconds,
            r->seconds_network + r->seconds_exact, r->seconds_search);
 }

@@ -70,52 +70,6 @@ static sdm_status shape_params(cli_fit *f, sdm_error *err)
     return s;
 }
 
-/* Enlarges the box min .. max by the bounding box of the shape at p. */
-static sdm_status add_box(const cli_fit *f, const double *p, double min[3], double max[3],
-                          sdm_error *err)
-{
-    sdm_mesh mesh = {0};
-    const sdm_status s = sdm_instance_mesh(f->shape, p, &mesh, err);
-    for (size_t i = 0; i < mesh.n_vert && !s; i++)
-        for (int a = 0; a < 3; a++) {
-            min[a] = fmin(min[a], mesh.vert[3 * i + (size_t)a]);
-            max[a] = fmax(max[a], mesh.vert[3 * i + (size_t)a]);
-        }
-    sdm_mesh_dispose(&mesh);
-    return s;
-}
-
-/* Sets the grid of exact maps: it holds the shape at the start parameters, and with any single
- * parameter moved to an end of its range. Beyond the grid the fit can only estimate distances. */
-static sdm_status exact_grid(cli_fit *f, sdm_error *err)
-{
-    if (f->model && !(f->args->spacing[0] > 0)) {
-        f->source.grid = sdm_model_get_info(f->model)->grid;
-        return SDM_OK;
-    }
-    double min[3] = {INFINITY, INFINITY, INFINITY}, max[3] = {-INFINITY, -INFINITY, -INFINITY};
-    double *p = NULL;
-    sdm_status s = SDM_ALLOC(&p, f->n_params, "parameters", err);
-    if (!s) memcpy(p, f->start, f->n_params * sizeof *p);
-    if (!s) s = add_box(f, p, min, max, err);
-    for (size_t i = 0; i < f->n_params && !s; i++) {
-        p[i] = f->params[i].min;
-        s = add_box(f, p, min, max, err);
-        p[i] = f->params[i].max;
-        if (!s) s = add_box(f, p, min, max, err);
-        p[i] = f->start[i];
-    }
-    sdm_free(p);
-    return s ? s : cli_grid_for_box(f->args, min, max, &f->source.grid, err);
-}
-
-double cli_fit_map_voxel(const cli_fit *f)
-{
-    const double *h = f->source.model ? sdm_model_get_info(f->source.model)->grid.spacing
-                                      : f->source.grid.spacing;
-    return fmax(h[0], fmax(h[1], h[2]));
-}
-
 /* Checks the start parameters, or clamps them, according to --policy. */
 static sdm_status check_start(cli_fit *f, sdm_error *err)
 {
@@ -161,6 +115,5 @@ sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err)
     if (s) return s;
     f->source.shape = f->shape;
     warn_shape(f);
-    if (!network) s = exact_grid(f, err);
-    return s;
+    return SDM_OK;
 }

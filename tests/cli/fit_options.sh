@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: which options apply to which kind of target, against the table in docs/fitting-reference.md.
-# Tests: fit_applies.c fit_size.c fit_labels.c fit_target.c option_names.c
+# Tests: fit_grid.c fit_applies.c fit_size.c fit_labels.c fit_target.c option_names.c
 . "$(dirname "$0")/common.sh"
 shape='--shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2'
 expect 0 - sdmgen phantom $shape --spacing 0.8 -o image.nii --label labels.nii --quiet
@@ -86,4 +86,14 @@ grep -q 'warning: map.nii holds over [0-9]* different values, or fractions: --re
 grep -q 'warning: --margin 0.1 mm is less than 1.5 voxels of' err || bad "a small margin: $(cat err)"
 expect 2 'error: map.nii is a signed distance map, no image: fit the surface' sdmgen fit $shape map.nii --rotation 0,0,0 --max-iterations 1
 grep -qE 'sdm_fit_(opts|source)' out err && bad "names of C: $(cat out err)"
+# exact maps follow the thinnest part; --spacing decides, and points need no voxels
+thin='--plugin ../../plugins/faulty/faulty.so --shape faulty -O fault=wall -p size=1.8 --rotation 0,0,0'
+sdmgen phantom ${thin% --rotation*} --spacing 0.4 -o wall.nii --quiet >out 2>err || bad "wall: $(cat err)"
+sdmgen fit $thin wall.nii --max-iterations 1 >out 2>err
+has '^  maps .* by the exact engine, voxels of 0\.0[0-9]* mm, because the thinnest part is 0\.1 mm thick$'
+sdmgen fit $thin wall.nii --max-iterations 1 --spacing 0.2 >out 2>err
+has '^  maps .* by the exact engine, voxels of 0\.2 mm$'
+has '^  map voxels .*: the voxels of the maps are coarse beside the thinnest part of the shape: .*--exact --spacing'
+sdmgen fit $thin points.csv --max-iterations 1 >out 2>err
+has '^  maps .* by the exact engine$'
 finish

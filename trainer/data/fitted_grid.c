@@ -7,10 +7,10 @@
 
 enum { BOX_SAMPLES = 256, THIN_SAMPLES = 8, FACE_SAMPLES = 8, BOX_SEED = 1 };
 
-/* `grid: auto` makes so many voxels across the thinnest part of the shapes, as long as the longest
- * edge has at most VOXELS_MOST of them and the grid at most COUNT_MOST: maps and training cost as
- * much as there are voxels. */
-enum { THIN_VOXELS = 3, VOXELS_MOST = 96 };
+/* `grid: auto` makes SDM_GRID_THIN_VOXELS voxels across the thinnest part of the shapes, as long as
+ * the longest edge has at most VOXELS_MOST of them and the grid at most COUNT_MOST: maps and
+ * training cost as much as there are voxels. */
+enum { VOXELS_MOST = 96 };
 static const double COUNT_MOST = 4e5;
 
 /* Most voxels of a grid that is proposed with the spacing of the configuration. */
@@ -45,7 +45,7 @@ static sdm_status refine_for_thin(const sdm_config *config, const sdm_instance *
                                        thick, err);
     for (int n = SDM_GRID_VOXELS + 4; n <= VOXELS_MOST && !s; n += 4) {
         sdm_grid finer;
-        if (isnan(*thick) || THIN_VOXELS * sdm_grid_coarsest(grid) <= *thick) break;
+        if (isnan(*thick) || SDM_GRID_THIN_VOXELS * sdm_grid_coarsest(grid) <= *thick) break;
         s = sdm_grid_around(f->low, f->high, n, NULL, &finer, err);
         if (s || (double)sdm_grid_count(&finer) > COUNT_MOST ||
             !sdm_train_fits_memory(config, n_params, &finer))

@@ -14,6 +14,8 @@
 
 // longest edge of a voxel that shows the thickness, over the radius of the largest ball inside
 #define VOXEL_OVER_RADIUS_MAX 0.5
+// the same over the thickness of the thinnest part, see sdm_too_thin()
+#define VOXEL_DIAGONAL 1.4142
 // from this edge on, over the same radius, voxels miss the shape
 #define VOXEL_OVER_RADIUS_FAR 2
 // larger voxels bias the standard deviations: edge over the sd of the point spread
@@ -132,6 +134,23 @@ static void coarseness_limit(fit_coarseness *c, double limit, const char *detail
     if (limit < c->limit) c->limit = limit, c->detail = detail;
 }
 
+/* Thickness (mm) of the thinnest part of the fitted shape; without the shape, of the thinnest part
+ * that the training of the network found. NaN: not known. */
+static double thinnest_part(const fit_problem *p)
+{
+    const sdm_fit_source *f = p->source;
+    sdm_mesh mesh = {0};
+    sdm_part_audit audit = {0};
+    double thick = NAN;
+    if (!f->shape) return f->model ? sdm_model_get_info(f->model)->quality.thickness_mm : NAN;
+    if (!sdm_instance_mesh(f->shape, p->state.params, &mesh, NULL) &&
+        !sdm_part_audit_make(&mesh, false, &audit, NULL))
+        thick = sdm_part_audit_thickness(&audit);
+    sdm_part_audit_dispose(&audit);
+    sdm_mesh_dispose(&mesh);
+    return thick;
+}
+
 fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
 {
     fit_coarseness c = {INFINITY, INFINITY, "", false};
@@ -145,6 +164,9 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
         walls = details > WALLS_MIN ? fmin(thick, 0.5 * voxel) : 0;
     if (details > 0) coarseness_limit(&c, fmax(edges, walls), "the details of the shape");
     coarseness_limit(&c, thick, "the thickness of the shape");
+    const double thinnest = thinnest_part(p);
+    if (sdm_too_thin(thinnest, voxel))
+        coarseness_limit(&c, thinnest / VOXEL_DIAGONAL, "the thinnest part of the shape");
     if (p->given_labels || p->target->kind == SDM_FIT_LABEL)
         coarseness_limit(&c, VOXEL_OVER_LABEL_MAX * fit_longest_edge(&p->target->grid),
                          "the voxels of the labels");
@@ -172,23 +194,6 @@ void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_v
         coarse.detail,
         p->target->kind == SDM_FIT_POINTS ? "contain an estimate of this error" : "are too small",
         coarse.advice);
-}
-
-/* Thickness (mm) of the thinnest part of the fitted shape; without the shape, of the thinnest part
- * that the training of the network found. NaN: not known. */
-static double thinnest_part(const fit_problem *p)
-{
-    const sdm_fit_source *f = p->source;
-    sdm_mesh mesh = {0};
-    sdm_part_audit audit = {0};
-    double thick = NAN;
-    if (!f->shape) return f->model ? sdm_model_get_info(f->model)->quality.thickness_mm : NAN;
-    if (!sdm_instance_mesh(f->shape, p->state.params, &mesh, NULL) &&
-        !sdm_part_audit_make(&mesh, false, &audit, NULL))
-        thick = sdm_part_audit_thickness(&audit);
-    sdm_part_audit_dispose(&audit);
-    sdm_mesh_dispose(&mesh);
-    return thick;
 }
 
 void sdm_fit_check_labels(const fit_problem *p, sdm_fit_verdict *v)

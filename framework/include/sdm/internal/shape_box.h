@@ -28,6 +28,9 @@ sdm_status sdm_shape_box(const sdm_instance *shape, const double (*range)[2], si
 sdm_status sdm_shape_thickness(const sdm_instance *shape, const double (*range)[2], size_t samples,
                                uint64_t seed, double *mm, sdm_error *err);
 
+/* Grids that follow the thinnest part of a shape have so many voxels across it. */
+#define SDM_GRID_THIN_VOXELS 3
+
 /* Returns how far the point x (mm) lies beyond the outer voxel centres of the grid along the axis
  * where it is farthest, in mm; 0: within them. beyond[axis][side], unless NULL, is raised to the
  * distance below the first voxel (side 0) and above the last one (side 1). [any thread] */

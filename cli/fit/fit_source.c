@@ -100,9 +100,10 @@ sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err)
     if (network && f->args->spacing[0] > 0)
         return sdm_fail(
             err, SDM_E_ARG,
-            "fit: --spacing applies to exact maps (--exact, --shape); a model has its own grid: "
+            "fit: --spacing applies to exact maps (--exact, --shape); a model has its own grid%s: "
             "for "
-            "finer maps fit again with --exact from the parameters and the pose of its result");
+            "finer maps fit again with --exact from the parameters and the pose of its result",
+            f->args->fit.polish ? ", which the exact maps of --polish take, too" : "");
     if (!network && f->args->fit.polish)
         return sdm_fail(
             err, SDM_E_ARG,

@@ -24,8 +24,9 @@ static sdm_status compare(const sdm_model_info *info, const sdm_instance *shape,
         return s;
     return sdm_fail(err, SDM_E_PLUGIN,
                     "shape '%s' was changed after the training: at %s parameters its mesh has %.6g "
-                    "mm^3 and %.6g mm^2, at the training %.6g mm^3 and %.6g mm^2; load the shape "
-                    "of that time, or train again",
+                    "mm^3 and %.6g mm^2, at the training %.6g mm^3 and %.6g mm^2 (sums over all "
+                    "triangles: overlaps count twice); load the shape of that time, or train "
+                    "again",
                     info->shape, where, v, a, volume, area);
 }
 

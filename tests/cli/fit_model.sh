@@ -67,6 +67,7 @@ code=$?
 
 # Mistakes in arguments.
 expect 2 'spacing applies to exact maps' sdmgen fit $model ct.nii $start --spacing 0.3
+expect 2 'spacing applies to .* its own grid, which the exact maps of --polish take, too: ' sdmgen fit $model ct.nii $start --polish --spacing 0.3
 expect 2 'O belongs to --shape' sdmgen fit $model ct.nii $start -O edge=0.5
 expect 1 'nowhere.sdm' sdmgen fit nowhere.sdm ct.nii $start -o no.nrrd
 expect 3 'ct.nii' sdmgen fit ct.nii ct.nii $start -o no.nrrd

@@ -71,6 +71,14 @@ awk -v t="$(json ms_network)" 'BEGIN { exit !(t > 0) }' || bad "no time of the n
 rm -r trained
 expect 0 'not measured' sdmgen train "$tiny" "${faulty[@]}" --out trained --quiet
 has '^  time        one map on one core: network [0-9.]+ ms, exact engine not measured$'
+# a shape that was changed since the training: a fit by the network alone warns
+rm -r trained
+expect 0 - sdmgen train "$tiny" "${faulty[@]}" 'shape={name: faulty, options: {fault: changed}}' --out trained --quiet
+sdmgen phantom --shape torus --spacing 0.5 -o torus.nii --quiet >out 2>err
+sdmgen fit trained/model.sdm torus.nii --rotation 0,0,0 --max-iterations 1 --plugin ../../plugins/faulty/faulty.so --quiet >out 2>err
+grep -q "warning: shape 'faulty' was changed after the training: at the default parameters .* (sums over all triangles: overlaps count twice); load the shape of that time, or train again$" err ||
+    bad "no warning of a changed shape: $(cat err)"
+rm -r trained
 
 # A model that cannot be written, because a folder has its name: the error names the checkpoint, and --quiet does not hide that.
 "$program" train "$tiny" train.steps=2000 --out unwritten --quiet >out 2>err &

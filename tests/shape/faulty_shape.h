@@ -1,6 +1,6 @@
 /* A shape for tests: a body and a handle, two boxes that overlap; the option `fault` selects what
- * is wrong with them. Some faults begin where size exceeds 2; `trained` begins when the file
- * trained/model.sdm is there. */
+ * is wrong with them. Some faults begin where size exceeds 2; `trained` and `changed` begin when
+ * the file trained/model.sdm is there. */
 #ifndef SDM_TEST_FAULTY_SHAPE_H
 #define SDM_TEST_FAULTY_SHAPE_H
 
@@ -19,7 +19,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
-     "edge|centimetres|small|wall|step|apart|twins",
+     "edge|centimetres|small|wall|step|apart|twins|changed",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -90,7 +90,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     static volatile double shared; // for threads that call at once
     shared = p[0];
     for (int i = 0; i < 20000 && !strcmp(fault, "shared"); i++) shift += 0 * shared;
-    const double r = !strcmp(fault, "shared") ? shared : p[0];
+    double r = !strcmp(fault, "shared") ? shared : p[0];
+    if (!strcmp(fault, "changed") && !access("trained/model.sdm", F_OK)) r *= 1.01;
     const double body[2][3] = {{-r, -r, -r}, {r, r, r}};
     // `wall`: the sides of the handle pass through each other at size 1.75; `step`: a reach above
     // 1.75 counts, and nothing but that

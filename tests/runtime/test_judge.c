@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "fit/judge/noise.h"
+#include "fit/judge/suffice.h"
 #include "oracle/fit_tools.h"
 
 #define PI 3.14159265358979324
@@ -687,11 +688,45 @@ static void test_mirror_of_an_ellipsoid(void **state)
     free(v);
 }
 
+// At least half of the parameters without a normal distribution are open: doubtful, after the
+// reason that stands there already. With fewer of them nothing is added, and with all the fit
+// fails.
+static void test_open_parameters_are_told(void **state)
+{
+    (void)state;
+    const sdm_fit_opts o = sdm_fit_defaults();
+    fit_problem *p = calloc(1, sizeof *p);
+    if (!p) abort();
+    p->opts = &o, p->n_params = 5;
+    p->distribution[4].kind = SDM_DISTRIBUTION_NORMAL;
+    static const bool none[5] = {false}, one[5] = {true, false, false, false, true},
+                      half[5] = {true, true}, all[5] = {true, true, true, true, true};
+    const bool *const cases[4] = {none, one, half, all};
+    for (int c = 0; c < 4; c++) {
+        bool open[5];
+        memcpy(open, cases[c], sizeof open);
+        sdm_fit_result r = {.n_params = 5, .by_prior = open};
+        const sdm_fit_finding before = {
+            .kind = SDM_FIT_CHECK_DATA, .grade = SDM_FIT_DOUBTFUL, .text = "few points"};
+        sdm_fit_verdict_add(&r.verdict, &before);
+        sdm_fit_check_determined(p, &r, &r.verdict);
+        const sdm_fit_finding *f = r.verdict.findings;
+        assert_int_equal(r.verdict.n_findings, 1);
+        assert_int_equal(f->grade, c == 3 ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL);
+        if (c < 2) assert_string_equal(f->text, "few points");
+        if (c == 2)
+            assert_non_null(strstr(f->text, "few points; 2 of 4 parameters are not determined"));
+        if (c == 3) assert_non_null(strstr(f->text, "none of the 5 parameters"));
+    }
+    free(p);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_noise_is_robust),
         cmocka_unit_test(test_findings_are_sorted),
+        cmocka_unit_test(test_open_parameters_are_told),
         cmocka_unit_test(test_right_fits_pass),
         cmocka_unit_test(test_an_image_without_noise_passes),
         cmocka_unit_test(test_a_thin_shape_in_noise_is_refused),

@@ -2,6 +2,7 @@
 #include "suffice.h"
 
 #include <math.h>
+#include <stdio.h>
 
 #include "finding.h"
 #include "noise.h"
@@ -215,9 +216,27 @@ void sdm_fit_check_labels(const fit_problem *p, sdm_fit_verdict *v)
 
 void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)
 {
-    size_t known = 0;
-    for (size_t k = 0; k < p->n_params; k++) known += !r->by_prior[k];
-    if (known || p->opts->keep_params || v->grade == SDM_FIT_FAILED) return;
+    size_t known = 0, open = 0, counted = 0;
+    if (p->opts->keep_params || v->grade == SDM_FIT_FAILED) return;
+    for (size_t k = 0; k < p->n_params; k++) {
+        known += !r->by_prior[k];
+        // a distribution of its own says enough of a parameter
+        if (p->distribution[k].kind == SDM_DISTRIBUTION_NORMAL && p->opts->prior_sd > 0) continue;
+        counted++, open += r->by_prior[k];
+    }
+    if (known && 2 * open >= counted && open) {
+        // the finding on the number of points stays the first reason
+        char before[sizeof v->findings->text + 2] = "";
+        for (size_t i = 0; i < v->n_findings; i++)
+            if (v->findings[i].kind == SDM_FIT_CHECK_DATA && *v->findings[i].text)
+                snprintf(before, sizeof before, "%s; ", v->findings[i].text);
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_DOUBTFUL, (double)(counted - open),
+                          (double)counted,
+                          "%s%zu of %zu parameters are not determined by the data: their standard "
+                          "deviations are those of the priors",
+                          before, open, counted);
+    }
+    if (known) return;
     sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_FAILED, 0, 1,
                       "the data determine none of the %zu parameters: their standard deviations "
                       "are those of the priors",

@@ -32,6 +32,7 @@ void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_v
  * the fitted shape is thick, mm; nothing where that is not known. */
 void sdm_fit_check_labels(const fit_problem *p, sdm_fit_verdict *v);
 
-/* Adds the finding "data" if nothing failed before, and the data determine none of the parameters.
- */
+/* Adds the finding "data" if nothing failed before: failed where the data determine none of the
+ * parameters; doubtful where they leave at least half of those open that have no normal
+ * distribution. */
 void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v);

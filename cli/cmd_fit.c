@@ -163,6 +163,7 @@ static sdm_status write_page(const cli_fit *f, sdm_error *err)
 /* The end of the error of a fit that is not trustworthy: what to try; "": nothing to add. */
 static const char *remedy(const cli_fit *f)
 {
+    if (f->exchanged) return "";
     if (f->suspicion) return f->suspicion;
     const bool network = f->model && f->shape && !f->args->fit.exact && !f->args->fit.polish;
     if (f->found && !f->result.converged && network)
@@ -219,6 +220,7 @@ static sdm_status fit_one(const cli_args *args, const char *json, sdm_error *err
     if (!s) cli_fit_notice_tissues(&f);
     if (!s) cli_fit_notice_kept(&f);
     if (!s) s = fit_shape(&f, err);
+    if (!s) s = cli_fit_explain_contrast(&f, err);
     if (!s) s = show_result(&f, json, err);
     cli_fit_dispose(&f);
     return s;

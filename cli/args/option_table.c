@@ -582,8 +582,8 @@ const cli_option cli_options[] = {
      "label map or segmentation to compare with, within the field of view of the image: Dice and "
      "distances between the surfaces"},
     {"truth", 0, CLI_TEXT, "FILE.json", NULL, 0, 0, ON(CLI_FIT), AT(fit.truth),
-     "print the true parameters beside the fitted ones: the file of `phantom --truth`, or of an "
-     "earlier fit"},
+     "print the true parameters beside the fitted ones, and how far the pose is from the true one: "
+     "the file of `phantom --truth`, or of an earlier fit"},
     {"reference-label", 0, CLI_LIST, "VALUE|NAME", NULL, 0, 0, ON(CLI_FIT),
      AT(fit.reference_labels),
      "label in the file of --reference (default: all segments, or all voxels but 0); several form "

@@ -79,12 +79,15 @@ typedef struct cli_fit {
 
     /* fit_truth.c: true parameters, NaN: not known; NULL: none are */
     double *truth; /* [n_params] */
+    bool has_truth_pose;
+    sdm_pose truth_pose;
 
     /* fit_result.c */
     sdm_fit_result result;
     bool found;      /* result holds an estimate */
     sdm_error doubt; /* status SDM_E_QUALITY: why the estimate is not trustworthy; SDM_OK: it is
                         trustworthy */
+    bool exchanged;  /* fit_contrast.c: that is the reason */
     sdm_fit_source map_source; /* source of `map`: the one of the last iterations */
     bool by_network;           /* the network makes `map`: the estimate is in its trained range */
     sdm_grid map_grid;         /* grid of map_source, in the estimated pose */
@@ -174,9 +177,14 @@ double cli_fit_map_voxel(const cli_fit *f);
  * the reference. SDM_E_ARG, SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err);
 
-/* Before the fit: fills f->truth from the file of --truth, if it is given. SDM_E_ARG: the truth of
- * another shape; SDM_E_FORMAT, SDM_E_IO. */
+/* Before the fit: fills f->truth and, where the file has one, f->truth_pose from the file of
+ * --truth, if it is given. SDM_E_ARG: the truth of another shape; SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_truth(cli_fit *f, sdm_error *err);
+
+/* After the fit: prints how far the pose is from that of --truth; adds it to a JSON object. Nothing
+ * where the file has no pose. */
+void cli_fit_print_truth_pose(const cli_fit *f);
+void cli_fit_json_truth_pose(const cli_fit *f, sdm_json *json);
 
 /* After cli_fit_make_map(): fills f->overlap, unless there is no reference or no surface. */
 sdm_status cli_fit_compare(cli_fit *f, sdm_error *err);
@@ -212,6 +220,11 @@ const char *cli_fit_grade_name(sdm_fit_grade grade);
 /* Prints the verdict as text; adds it to a JSON object. */
 void cli_fit_print_verdict(const cli_fit *f);
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);
+
+/* After a fit to an image that is not trustworthy: where the image at the start pose looks like the
+ * inside around the shape, and clearly more like the outside within it, makes this the only reason
+ * of f->doubt and of the verdict, and sets f->exchanged. Errors of making the map. */
+sdm_status cli_fit_explain_contrast(cli_fit *f, sdm_error *err);
 
 /* Computes f->map and f->surface of the estimate. */
 sdm_status cli_fit_make_map(cli_fit *f, sdm_error *err);

@@ -36,6 +36,10 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
     sdm_json_reals(j, "translation_mm", r->pose.translation, 3);
     sdm_json_reals(j, "rotation_sd_rad", r->sd + f->n_params, 3);
     sdm_json_reals(j, "translation_sd_mm", r->sd + f->n_params + 3, 3);
+    if (*r->open_motions) {
+        sdm_json_reals(j, "rotation_sd_determined_rad", r->pose_sd_determined, 3);
+        sdm_json_reals(j, "translation_sd_determined_mm", r->pose_sd_determined + 3, 3);
+    }
     sdm_json_text(j, "meaning",
                   "world = R x + translation, LPS mm; R turns about the origin of the shape's "
                   "frame by the rotation "
@@ -43,6 +47,7 @@ static void add_unknowns(sdm_json *j, const cli_fit *f)
                   "the axes of the world");
     sdm_json_close(j, '}');
     sdm_json_text(j, "not_determined_motions", r->open_motions);
+    cli_fit_json_truth_pose(f, j);
     if (f->opts.keep_pose) {
         sdm_json_real(j, "kept_pose_motion_mm", r->kept_pose_motion);
         sdm_json_real(j, "kept_pose_gain", r->kept_pose_gain);

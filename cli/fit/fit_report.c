@@ -126,9 +126,12 @@ void cli_fit_print(const cli_fit *f)
     printf("%s fitted to %s%s\n", f->shape_name, f->path,
            f->doubt.status ? ": NOT TO BE TRUSTED" : "");
     print_params(f);
-    print_vector("rotation", r->pose.rotation, r->sd + f->n_params, "rad");
-    print_vector("translation", r->pose.translation, r->sd + f->n_params + 3, "mm");
-    if (*r->open_motions) printf("  not determined by the data: %s\n", r->open_motions);
+    print_vector("rotation", r->pose.rotation, r->pose_sd_determined, "rad");
+    print_vector("translation", r->pose.translation, r->pose_sd_determined + 3, "mm");
+    if (*r->open_motions)
+        printf("  not determined by the data: %s; the +- of the pose leaves it out\n",
+               r->open_motions);
+    cli_fit_print_truth_pose(f);
     if (f->measures.n) cli_print_measures(&f->measures, true);
     print_overlap(f);
     print_target(f);

@@ -1,15 +1,21 @@
-/* The true parameters of a test image, from the file of `sdmgen phantom --truth`, to compare the
- * fitted ones with. */
+/* The true parameters and the true pose of a test image, from the file of `sdmgen phantom --truth`,
+ * to compare the fitted ones with. */
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "fit_command.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/json_read.h"
+#include "sdm/internal/mat3.h"
+#include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
 enum { TRUTH_BYTES_MAX = 1 << 20 };
+
+/* Degrees in a radian; variance of an angle that may be any, rad^2: pi^2 / 3. */
+static const double DEGREES = 57.295779513082321, ANY_ANGLE = 3.2898681336964529;
 
 /* Is the string at index i the name of a parameter of the shape? */
 static bool is_parameter(const cli_fit *f, const sdm_json_document *d, size_t i)
@@ -45,6 +51,33 @@ static sdm_status take_truth(cli_fit *f, const char *path, const sdm_json_docume
                             path, f->shape_name);
 }
 
+/* out[3] = the list of three numbers `key` of the object at index i; false: there is none. */
+static bool read_three(const sdm_json_document *d, size_t i, const char *key, double out[3])
+{
+    const size_t list = sdm_json_member(d, i, key);
+    if (!list || d->values[list].kind != '[' || d->values[list].next != list + 4) return false;
+    for (size_t a = 0; a < 3; a++)
+        if (!sdm_json_number(d, list + 1 + a, &out[a])) return false;
+    return true;
+}
+
+/* f->truth_pose = the pose of the document, if it has one. */
+static sdm_status take_pose(cli_fit *f, const char *path, const sdm_json_document *d,
+                            sdm_error *err)
+{
+    const size_t pose = sdm_json_member(d, 0, "pose");
+    if (!pose) return SDM_OK;
+    f->has_truth_pose = true;
+    if (!read_three(d, pose, "rotation_rad", f->truth_pose.rotation) ||
+        !read_three(d, pose, "translation_mm", f->truth_pose.translation))
+        return sdm_fail(err, SDM_E_FORMAT,
+                        "%s: `pose` needs `rotation_rad` and `translation_mm`, three numbers each, "
+                        "as `sdmgen phantom --truth` and `fit -o FILE.json` write it",
+                        path);
+    const sdm_status s = sdm_pose_check(&f->truth_pose, err);
+    return s ? sdm_fail_in(err, s, "%s", path) : SDM_OK;
+}
+
 sdm_status cli_fit_read_truth(cli_fit *f, sdm_error *err)
 {
     const char *path = f->args->fit.truth;
@@ -56,7 +89,72 @@ sdm_status cli_fit_read_truth(cli_fit *f, sdm_error *err)
     if (!s) s = sdm_json_parse(path, (const char *)text, size, &d, err);
     if (!s) s = SDM_ALLOC(&f->truth, f->n_params, "true parameters", err);
     if (!s) s = take_truth(f, path, &d, err);
+    if (!s) s = take_pose(f, path, &d, err);
     sdm_json_document_dispose(&d);
     sdm_free(text);
     return s;
+}
+
+/* axis[3] = the axis of the world about which the data leave the rotation open. Returns the number
+ * of such axes; axis is set where it is 1. */
+static int open_axis(const cli_fit *f, double axis[3])
+{
+    const size_t n = f->n_params, size = n + 6;
+    const double *c = f->result.covariance + n * (size + 1);
+    double total = 0;
+    size_t most = 0;
+    if (!*f->result.open_motions) return 0;
+    for (size_t i = 0; i < 3; i++) {
+        total += c[i * (size + 1)];
+        if (c[i * (size + 1)] > c[most * (size + 1)]) most = i;
+    }
+    // each open rotation adds ANY_ANGLE times the square of its axis
+    for (size_t i = 0; i < 3; i++) axis[i] = c[most * size + i];
+    const double length = v3_norm(axis);
+    for (size_t i = 0; i < 3; i++) axis[i] /= length;
+    return (int)lrint(total / ANY_ANGLE);
+}
+
+/* *degrees = angle between the fitted and the true rotation, without that about one open axis; NaN:
+ * more are open. Returns the distance (mm) between the centres of the shape in both poses. */
+static double compare_pose(const cli_fit *f, double *degrees)
+{
+    const sdm_pose *fitted = &f->result.pose, inverse = sdm_pose_inverse(&f->truth_pose),
+                   between = sdm_pose_compose(fitted, &inverse);
+    double axis[3], a[3], b[3];
+    const int open = open_axis(f, axis);
+    *degrees = open > 1 ? NAN : DEGREES * v3_norm(between.rotation);
+    if (open == 1) {
+        double r[9];
+        sdm_pose_matrix(&between, r);
+        m3_apply(r, axis, a);
+        v3_cross(axis, a, b);
+        *degrees = DEGREES * atan2(v3_norm(b), v3_dot(axis, a));
+    }
+    sdm_pose_apply(fitted, f->pivot, a);
+    sdm_pose_apply(&f->truth_pose, f->pivot, b);
+    return sqrt(v3_dist2(a, b));
+}
+
+void cli_fit_print_truth_pose(const cli_fit *f)
+{
+    double degrees;
+    if (!f->has_truth_pose) return;
+    const double shift = compare_pose(f, &degrees);
+    printf("  pose         off the truth by %.3g mm at the centre of the shape", shift);
+    if (isfinite(degrees))
+        printf(" and %.3g degrees%s", degrees,
+               *f->result.open_motions ? " of what is determined" : "");
+    printf("\n");
+}
+
+void cli_fit_json_truth_pose(const cli_fit *f, sdm_json *j)
+{
+    double degrees;
+    if (!f->has_truth_pose) return;
+    const double shift = compare_pose(f, &degrees);
+    sdm_json_open(j, "truth_pose_error", '{');
+    sdm_json_real(j, "centre_mm", shift);
+    sdm_json_real(j, "rotation_deg", degrees);
+    sdm_json_close(j, '}');
 }

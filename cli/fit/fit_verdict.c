@@ -82,7 +82,7 @@ void cli_fit_print_verdict(const cli_fit *f)
         else
             printf(" %-28s %s\n", figure, MEANINGS[x->kind]);
     }
-    if (v->grade == SDM_FIT_FAILED && f->opts.turns == SDM_FIT_TURNS_NONE &&
+    if (v->grade == SDM_FIT_FAILED && !f->exchanged && f->opts.turns == SDM_FIT_TURNS_NONE &&
         !isnan(f->args->pose.rotation[0]))
         printf("  --rotation gives one start: without it the fit tries 60 rotations\n");
 }

@@ -137,6 +137,7 @@ static sdm_status result_create(size_t n, sdm_fit_result *out, sdm_error *err)
     if (!s) s = SDM_ALLOC(&out->prior_sd, n, "result of the fit", err);
     for (size_t i = 0; i < size * size && !s; i++) out->covariance[i] = out->correlation[i] = NAN;
     for (size_t i = 0; i < size && !s; i++) out->sd[i] = NAN;
+    for (int i = 0; i < 6; i++) out->pose_sd_determined[i] = NAN;
     return s;
 }
 

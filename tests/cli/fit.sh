@@ -92,6 +92,12 @@ has '^  map voxels   doubtful  0.35, need at most 0.2.*coarse beside the point s
 # the truth of the test image beside the estimate; that of another shape, and a file without parameters, are refused
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --truth truth.json
 has '^  rx .* \+- .* mm +truth 3\.5, off by [0-9.]+ sd$'
+has '^  pose         off the truth by 0\.[01][0-9]* mm at the centre of the shape and [0-9](\.[0-9]+)? degrees$'
+printf '{"parameters": {"rx": 3.5}, "pose": {"rotation_rad": [0.1, -0.2, 0.3], "translation_mm": [20, -30, 11]}}' >shifted.json
+expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --truth shifted.json --json
+near "$(json centre_mm)" 1 0.15
+printf '{"parameters": {"rx": 3.5}, "pose": {"rotation_rad": [0.1, -0.2]}}' >pose.json
+expect 3 'pose\.json: .pose. needs .rotation_rad. and .translation_mm., three numbers each' sdmgen fit $fit ct.nii.gz $near_truth --truth pose.json
 expect 2 'truth\.json: the truth of another shape than .torus.: ellipsoid' sdmgen fit --shape torus ct.nii.gz $near_truth --truth truth.json
 echo '{"shape": "ellipsoid"}' >empty.json
 expect 3 'empty\.json: no object .parameters. with a parameter of .ellipsoid.' sdmgen fit $fit ct.nii.gz $near_truth --truth empty.json

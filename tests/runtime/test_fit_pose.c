@@ -110,6 +110,9 @@ static void test_axis_of_symmetry(void **state)
         assert_true(fabs(fabs(dot) - 1) < 0.01);
         // an angle that may be any has the sd pi / sqrt(3)
         assert_true(fabs(turn_sd(&f, along) - 1.81) < 0.1 && turn_sd(&f, across) < 0.05);
+        for (int k = 0; k < 6; k++)
+            assert_true(f.pose_sd_determined[k] >= 0 && f.pose_sd_determined[k] < 0.05 &&
+                        f.pose_sd_determined[k] <= f.sd[f.n_params + (size_t)k]);
         sdm_fit_dispose(&f);
     }
 }

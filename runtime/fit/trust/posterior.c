@@ -119,6 +119,9 @@ static double model_error(const fit_problem *p)
     return sqrt(labels * labels + map * map + network * network);
 }
 
+// sd of a variance; NaN for a negative one, since 0 would mean that the unknown is known exactly
+static double sd_of(double variance) { return variance >= 0 ? sqrt(variance) : NAN; }
+
 // covariance, sd and correlation from the sandwich; bias[n][n]: what the voxels of the maps add to
 // the covariance; spread[n][n]: scratch memory
 static void covariance_fill(const fit_problem *p, const fit_score_covariance *scatter,
@@ -150,13 +153,11 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
             const double c = sandwich(n, influence, spread, i, j) + bias[i * n + j];
             out->covariance[i * size + j] = out->covariance[j * size + i] = c;
         }
-    sdm_fit_open_motions_spread(p, out->covariance);
     sdm_fit_pose_params_spread(p, out->covariance);
-    for (size_t i = 0; i < size; i++) {
-        const double variance = out->covariance[i * (size + 1)];
-        // NaN, since 0 would mean that the unknown is known exactly
-        out->sd[i] = variance >= 0 ? sqrt(variance) : NAN;
-    }
+    for (size_t i = 0; i < 6; i++)
+        out->pose_sd_determined[i] = sd_of(out->covariance[(p->n_params + i) * (size + 1)]);
+    sdm_fit_open_motions_spread(p, out->covariance);
+    for (size_t i = 0; i < size; i++) out->sd[i] = sd_of(out->covariance[i * (size + 1)]);
     for (size_t i = 0; i < size; i++)
         for (size_t j = 0; j < size; j++) {
             const double product = out->sd[i] * out->sd[j];

@@ -493,6 +493,9 @@ typedef struct sdm_fit_result {
     /* true: the fit began with a network and ended with exact maps, see
        sdm_fit_opts.max_polish_iterations */
     bool polished;
+    /* standard deviations of the pose as in sd[n_params ...], without those along open_motions:
+       rad, mm; the same as in sd where there are none. NaN as sd */
+    double pose_sd_determined[6];
 } sdm_fit_result;
 
 /* Fits the shape of source to target. Errors: SDM_E_ARG: source, options or start, or no voxel near

@@ -1,0 +1,78 @@
+/* Recognises that the values of the inside and the outside were exchanged on the command line. */
+#include <math.h>
+#include <stdio.h>
+
+#include "fit_command.h"
+#include "sdm/memory.h"
+
+/* Least contrast of the exchanged values at the start, over that of the given ones: a start beside
+ * the shape shows a part of it only. */
+#define CONTRAST_MIN 0.15
+
+/* Sum and number of the voxels of an image on one side of the surface. */
+typedef struct side_values {
+    double sum, n;
+} side_values;
+
+/* in, around: the image within the start shape and in the layer of the margin around it, sampled at
+ * the voxels of the maps. */
+static sdm_status measure_start(const cli_fit *f, side_values *in, side_values *around,
+                                sdm_error *err)
+{
+    const sdm_grid *g = f->source.model ? &sdm_model_get_info(f->source.model)->grid
+                                        : &f->source.grid,
+                   *image = &f->target.grid;
+    const sdm_pose own = {{0, 0, 0}, {0, 0, 0}};
+    float *map = NULL;
+    sdm_status s = SDM_ALLOC(&map, sdm_grid_count(g), "distance map", err);
+    if (!s) s = sdm_fit_map(&f->source, f->start, &own, g, f->opts.n_threads, map, err);
+    size_t v = 0;
+    for (int64_t k = 0; k < g->n[2] && !s; k++)
+        for (int64_t j = 0; j < g->n[1]; j++)
+            for (int64_t i = 0; i < g->n[0]; i++, v++) {
+                const double index[3] = {(double)i, (double)j, (double)k};
+                double world[3], x[3];
+                bool there = map[v] <= f->opts.margin;
+                sdm_grid_world(g, index, world);
+                sdm_pose_apply(&f->opts.start_pose, world, world);
+                sdm_grid_index(image, world, x);
+                for (int a = 0; a < 3; a++)
+                    there = there && x[a] >= -0.5 && x[a] < (double)image->n[a] - 0.5;
+                if (!there) continue;
+                const size_t at =
+                    (size_t)((llrint(x[2]) * image->n[1] + llrint(x[1])) * image->n[0] +
+                             llrint(x[0]));
+                side_values *side = map[v] < 0 ? in : around;
+                if (isfinite(f->target.values[at])) side->sum += f->target.values[at], side->n++;
+            }
+    sdm_free(map);
+    return s;
+}
+
+sdm_status cli_fit_explain_contrast(cli_fit *f, sdm_error *err)
+{
+    const double inside = f->opts.appearance.inside[0].mean,
+                 outside = f->opts.appearance.outside[0].mean;
+    side_values in = {0, 0}, around = {0, 0};
+    // a whole image (--find) has no start
+    if (f->target.kind != SDM_FIT_IMAGE || f->doubt.status != SDM_E_QUALITY || f->args->fit.find)
+        return SDM_OK;
+    const sdm_status s = measure_start(f, &in, &around, err);
+    if (s || !(in.n > 0) || !(around.n > 0)) return s;
+    const double a = in.sum / in.n, b = around.sum / around.n;
+    const bool around_like_inside = fabs(b - inside) < fabs(b - outside);
+    if (!around_like_inside || !((a - b) / (outside - inside) > CONTRAST_MIN)) return SDM_OK;
+    sdm_fit_verdict *v = &f->result.verdict;
+    for (size_t i = 0; i < v->n_findings; i++) *v->findings[i].text = '\0';
+    sdm_fit_finding why = {
+        .kind = SDM_FIT_CHECK_CONTRAST, .grade = SDM_FIT_FAILED, .figure = a - b, .limit = 0};
+    snprintf(why.text, sizeof why.text,
+             "the values of the inside and the outside are exchanged: at the start the image is "
+             "%.4g within the shape and %.4g around it, but the inside was given as %.4g and the "
+             "outside as %.4g: exchange --inside and --outside",
+             a, b, inside, outside);
+    sdm_fit_verdict_add(v, &why);
+    snprintf(f->doubt.text, sizeof f->doubt.text, "%s", why.text);
+    f->exchanged = true;
+    return SDM_OK;
+}

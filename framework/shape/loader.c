@@ -144,7 +144,7 @@ sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err)
 
     // absolute path, because dlopen() searches the system's library folders for a bare name
     char *path = realpath(file, NULL);
-    if (!path) return sdm_fail(err, SDM_E_PLUGIN, "plug-in %s: %s", file, strerror(errno));
+    if (!path) return sdm_fail(err, SDM_E_IO, "plug-in %s: %s", file, strerror(errno));
     const sdm_status s = is_loaded(r, path) ? SDM_OK : object_load(r, path, err);
     free(path);
     return s;
@@ -165,7 +165,7 @@ static sdm_status file_load_or_skip(sdm_registry *r, const char *folder, const c
         return sdm_fail(err, SDM_E_PLUGIN, "plug-in folder %s: path too long", folder);
     sdm_error why = {0};
     const sdm_status s = sdm_registry_load(r, file, &why);
-    if (s == SDM_E_PLUGIN) return sdm_registry_skip(r, why.text, err);
+    if (s == SDM_E_PLUGIN || s == SDM_E_IO) return sdm_registry_skip(r, why.text, err);
     return s ? sdm_fail(err, s, "%s", why.text) : SDM_OK;
 }
 
@@ -175,7 +175,7 @@ static sdm_status folder_load(sdm_registry *r, const char *folder, sdm_error *er
 {
     struct dirent **list = NULL;
     const int n = scandir(folder, &list, is_shared_object, alphasort);
-    if (n < 0) return sdm_fail(err, SDM_E_PLUGIN, "plug-in folder %s: %s", folder, strerror(errno));
+    if (n < 0) return sdm_fail(err, SDM_E_IO, "plug-in folder %s: %s", folder, strerror(errno));
     sdm_status s = SDM_OK;
     for (int i = 0; i < n; i++) {
         if (!s) s = file_load_or_skip(r, folder, list[i]->d_name, err);

@@ -342,7 +342,7 @@ static void test_bad_plugins_are_refused(void **state)
     check_refused("taken_name", SDM_E_PLUGIN, "shape 'torus' is there already (built in)");
     check_refused("second_bad", SDM_E_PLUGIN, "no callback mesh()");
     check_refused("undefined", SDM_E_PLUGIN, "a_function_without_definition");
-    check_refused("missing", SDM_E_PLUGIN, "No such file or directory");
+    check_refused("missing", SDM_E_IO, "No such file or directory");
     assert_null(sdm_registry_find(registry, "lone", NULL));
 }
 

@@ -61,7 +61,7 @@ absent x.ply x.vdb nowhere
 # Files that are no plug-ins.
 echo 'not a library' >false.so
 expect 3 'false\.so' sdmgen shapes --plugin ./false.so
-expect 3 'missing\.so' sdmgen shapes --plugin ./missing.so
+expect 1 'plug-in \./missing\.so: No such file' sdmgen shapes --plugin ./missing.so
 expect 3 'plug-in .*\.c cannot be loaded: .*; a plug-in is a compiled shared object \(\.so\)$' sdmgen shapes --plugin "$source_folder/shapes/capsule.c"
 
 # Folders of plug-ins: a file given twice is one; one that cannot be loaded is skipped unless its shape is asked for.
@@ -78,7 +78,7 @@ expect 2 "unknown shape 'broken'; plug-in .*/path/broken\.so cannot be loaded: "
 expect 2 "unknown shape 'cube'; sdmgen shapes lists" sdmgen shapes cube --quiet
 printf '        ' >>path/copy.so # another file; --plugin comes before the path
 SDMGEN_PLUGIN_PATH=$good expect 0 "octahedron\.so: shape 'octahedron' is there already \(.*/copy\.so\)" sdmgen shapes octahedron --plugin path/copy.so
-SDMGEN_PLUGIN_PATH=$PWD/none expect 3 'plug-in folder .*/none: No such file' sdmgen shapes
+SDMGEN_PLUGIN_PATH=$PWD/none expect 1 'plug-in folder .*/none: No such file' sdmgen shapes
 # one folder too high
 SDMGEN_PLUGIN_PATH=$(dirname "$good") expect 2 "unknown shape 'octahedron'; SDMGEN_PLUGIN_PATH=.* holds no plug-in: name the folder in which the \.so file lies" sdmgen shapes octahedron
 unset SDMGEN_PLUGIN_PATH

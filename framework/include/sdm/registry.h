@@ -27,13 +27,14 @@ SDM_API sdm_status sdm_registry_add(sdm_registry *r, const sdm_shape *shape, con
 
 /* Loads a shared object and adds all its shapes. `file` must come from the command line or the
  * environment, never from a configuration. A file that is loaded already, under this name, another
- * one or as a copy of the same bytes, adds nothing. SDM_E_PLUGIN; SDM_E_UNSUPPORTED in a build
- * without plug-ins (SDM_PLUGINS=OFF). */
+ * one or as a copy of the same bytes, adds nothing. SDM_E_IO: there is no such file;
+ * SDM_E_PLUGIN: it is no plug-in, or one whose shapes sdm_registry_add() refuses;
+ * SDM_E_UNSUPPORTED in a build without plug-ins (SDM_PLUGINS=OFF). */
 SDM_API sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_error *err);
 
 /* Loads every *.so in the folders of a colon-separated path (the value of SDMGEN_PLUGIN_PATH); NULL
- * does nothing. A file that cannot be loaded (SDM_E_PLUGIN of sdm_registry_load()) is skipped.
- * SDM_E_PLUGIN: a folder cannot be read; SDM_E_UNSUPPORTED as above. */
+ * does nothing. A file that cannot be loaded (SDM_E_IO or SDM_E_PLUGIN of sdm_registry_load()) is
+ * skipped. SDM_E_IO: a folder cannot be read; SDM_E_UNSUPPORTED as above. */
 SDM_API sdm_status sdm_registry_load_path(sdm_registry *r, const char *path, sdm_error *err);
 
 /* Message number `index` about the files that sdm_registry_load_path() has skipped; NULL: there are

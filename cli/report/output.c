@@ -289,10 +289,21 @@ sdm_status cli_write_labels(const char *path, const sdm_grid *grid, const uint8_
     return sdm_segmentation_write(path, grid, labels, &segment, 1, text, err);
 }
 
-/* Writes the inside of the map as a segmentation. */
-static sdm_status write_inside(const char *path, const cli_map *map, const char *text,
-                               sdm_error *err)
+/* text[400] = the description of an image that was made from the map; `values` says what the voxels
+ * hold. The parameters come last: NIfTI files keep only 79 characters. */
+static void describe_image(const cli_map *map, const char *values, char text[400])
 {
+    char made[80];
+    describe_method(map, made);
+    snprintf(text, 400, "sdmgen %s: %s; %s: %s %s", SDM_VERSION_TEXT, values, made, map->shape,
+             map->params);
+}
+
+/* Writes the inside of the map as a segmentation. */
+static sdm_status write_inside(const char *path, const cli_map *map, sdm_error *err)
+{
+    char text[400];
+    describe_image(map, "labels, 1 inside, 0 outside", text);
     const size_t n = sdm_grid_count(map->grid);
     uint8_t *labels = NULL;
     sdm_status s = SDM_ALLOC(&labels, n, "labels", err);
@@ -304,18 +315,15 @@ static sdm_status write_inside(const char *path, const cli_map *map, const char 
 
 sdm_status cli_write_map(const char *path, const cli_map *map, const cli_args *args, sdm_error *err)
 {
-    char text[400], made[80];
+    char text[400];
     const sdm_status s = cli_check_interrupt(err);
     if (s) return s;
     switch (kind_of(path, NULL)) {
     case KIND_VDB:
         return write_vdb(path, map, args, err);
     case KIND_IMAGE:
-        // the parameters come last: NIfTI files keep only 79 characters
-        describe_method(map, made);
-        snprintf(text, sizeof text, "sdmgen %s: " SDM_MAP_TEXT "; %s: %s %s", SDM_VERSION_TEXT,
-                 made, map->shape, map->params);
-        if (cli_ends_with(path, CLI_SEGMENTATION_ENDING)) return write_inside(path, map, text, err);
+        if (cli_ends_with(path, CLI_SEGMENTATION_ENDING)) return write_inside(path, map, err);
+        describe_image(map, SDM_MAP_TEXT, text);
         return sdm_image_write(path, map->grid, map->values, text, err);
     case KIND_SURFACE:
         return write_surface(path, map, err);

@@ -23,6 +23,10 @@ def read(path):
 
 sizes, _, where, distances = read("map.nrrd")
 of_labels, keys, there, labels = read("inside.seg.nrrd")
+# the description says what the voxels hold; shape and parameters are the same
+text, of_map = there["content"], where["content"]
+assert ": labels, 1 inside, 0 outside; exact: ellipsoid " in text and ": mm, negative inside; exact: ellipsoid " in of_map, (text, of_map)
+assert text.split("; ")[1:] == of_map.split("; ")[1:], (text, of_map)
 assert sizes == of_labels and all(where[k] == there[k] for k in ("space directions", "space origin"))
 assert [d < 0 for d in distances] == [bool(v) for v in labels] and max(labels) == 1
 assert keys["Segment0_Name"] == keys["Segment0_ID"] == "ellipsoid" and keys["Segment0_LabelValue"] == "1"

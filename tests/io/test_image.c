@@ -285,6 +285,16 @@ static void test_description_cannot_break_headers(void **state)
     assert_int_equal(sdm_image_write("test_image_d.nii", &g, v, text, NULL), SDM_OK);
     assert_true(file_load("test_image_d.nii", d, sizeof d) > 348);
     assert_true(d[148 + 77] == 'x' && d[148 + 78] == 0 && d[148 + 79] == 0);
+    // a word that does not fit is left out; one that ends with the field stays
+    memset(text, 'y', 74);
+    strcpy(text + 74, " a=0.25");
+    assert_int_equal(sdm_image_write("test_image_d.nii", &g, v, text, NULL), SDM_OK);
+    assert_true(file_load("test_image_d.nii", d, sizeof d) > 348);
+    assert_true(d[148 + 73] == 'y' && d[148 + 74] == 0 && d[148 + 75] == 0);
+    strcpy(text + 74, " a=.2 b=1");
+    assert_int_equal(sdm_image_write("test_image_d.nii", &g, v, text, NULL), SDM_OK);
+    assert_true(file_load("test_image_d.nii", d, sizeof d) > 348);
+    assert_memory_equal(d + 148 + 73, "y a=.2", 7);
 }
 
 static void check_npy(const char *header, const void *values, size_t size, int version,

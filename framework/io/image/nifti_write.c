@@ -56,6 +56,20 @@ static void put_transform(uint8_t *h, const sdm_grid *g)
     sdm_put_uint(h + 254, 2, NIFTI_SCANNER); /* sform_code */
 }
 
+/* Writes the description, descrip[80], without a word that does not fit: half of "alpha=0.45" would
+ * be another value. */
+static void put_description(uint8_t descrip[80], const char *text)
+{
+    char whole[512];
+    sdm_one_line(text, whole, sizeof whole);
+    sdm_one_line(whole, (char *)descrip, 80);
+    const size_t length = strlen((const char *)descrip);
+    if (whole[length] == '\0' || whole[length] == ' ') return;
+    const char *space = strrchr((const char *)descrip, ' ');
+    const size_t end = space ? (size_t)(space - (const char *)descrip) : length;
+    memset(descrip + end, 0, 80 - end);
+}
+
 static void put_header(uint8_t h[NIFTI_START], const sdm_image *m)
 {
     const sdm_grid *g = m->grid;
@@ -71,7 +85,7 @@ static void put_header(uint8_t h[NIFTI_START], const sdm_image *m)
     sdm_put_f32(h + 108, NIFTI_START);         /* vox_offset */
     sdm_put_f32(h + 112, 1.0f);                /* scl_slope */
     h[123] = NIFTI_UNIT_MM;
-    sdm_one_line(m->text, (char *)h + 148, 80); /* descrip */
+    put_description(h + 148, m->text);
     put_transform(h, g);
     memcpy(h + 344, "n+1", 4); /* magic */
 }

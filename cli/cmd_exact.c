@@ -102,9 +102,14 @@ static sdm_status open_mesh(job *j, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG,
                         "exact: --sign does nothing with --method naive, which computes winding "
                         "numbers");
+    if (args->keep_overlap && !strcmp(args->method, "naive"))
+        return sdm_fail(err, SDM_E_ARG,
+                        "exact: --keep-overlap does nothing with --method naive, which always "
+                        "measures to all triangles");
     if (args->columns && !args->points)
         return sdm_fail(err, SDM_E_ARG, "exact: --columns belongs to --points FILE");
-    sdm_status s = cli_check_vdb_options(args, err);
+    sdm_status s = args->mesh ? cli_refuse_plugins(args, "a mesh file", err) : SDM_OK;
+    if (!s) s = cli_check_vdb_options(args, err);
     if (!s)
         s = args->points ? cli_points_check(args, &j->points, err) : cli_layers_check(args, err);
     if (s) return s;

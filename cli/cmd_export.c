@@ -18,6 +18,8 @@ static sdm_status check_options(const cli_args *args, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG, "export: an output is needed: -o FILE%s", type);
     if (!args->shape && (args->params.n || args->options.n))
         return sdm_fail(err, SDM_E_ARG, "export: -p and -O need --shape");
+    const sdm_status s = args->shape ? SDM_OK : cli_refuse_plugins(args, "a MODEL", err);
+    if (s) return s;
     for (size_t i = 0; i < args->outputs.n; i++)
         if (!cli_ends_with(args->outputs.items[i], type))
             return sdm_fail(err, SDM_E_ARG, "export: '%s': %s is written as *%s",

@@ -63,7 +63,7 @@ typedef struct job {
 static sdm_check_stat find_statistic(const cli_args *args)
 {
     int stat = SDM_CHECK_MAX;
-    while (stat < SDM_CHECK_MEAN &&
+    while (args->error_of && stat < SDM_CHECK_MEAN &&
            strcmp(args->error_of, sdm_check_stat_name((sdm_check_stat)stat)))
         stat++;
     return (sdm_check_stat)stat;
@@ -210,7 +210,7 @@ static sdm_status check_options(const cli_args *args, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG,
                         "generate: --measure describes one shape: it does not go with --%s",
                         args->points ? "points" : "params");
-    if (!(args->max_error > 0) && strcmp(args->error_of, "max"))
+    if (args->error_of && !(args->max_error > 0))
         return sdm_fail(err, SDM_E_ARG, "generate: --error-of does nothing without --max-error MM");
     if (cli_outside(args) != SDM_OUTSIDE_REFUSE && !grid && !args->points)
         return sdm_fail(
@@ -355,8 +355,8 @@ static void notice_row(const job *j, size_t row, const sdm_result *r)
     if (r->reason == SDM_REASON_ERROR)
         cli_notice("%serror of the network near the surface (%s) %.3g mm, above %g mm: computed by "
                    "the exact engine",
-                   where, j->args->error_of, sdm_check_get(&r->check, find_statistic(j->args)),
-                   j->args->max_error);
+                   where, sdm_check_stat_name(find_statistic(j->args)),
+                   sdm_check_get(&r->check, find_statistic(j->args)), j->args->max_error);
     if (!j->args->check || j->args->json) return;
     const sdm_check *c = &r->check;
     fputs(where, stdout);

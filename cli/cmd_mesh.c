@@ -61,7 +61,7 @@ sdm_status cmd_mesh(const cli_args *args, sdm_error *err)
     if (args->mesh && (args->params.n > 0 || args->options.n > 0))
         return sdm_fail(err, SDM_E_ARG, "mesh: -p and -O need --shape");
     sdm_mesh mesh = {0};
-    sdm_status s = SDM_OK;
+    sdm_status s = args->mesh ? cli_refuse_plugins(args, "a mesh file", err) : SDM_OK;
     for (size_t i = 0; i < args->outputs.n && !s; i++)
         s = cli_check_type(args->outputs.items[i], true, err);
     if (!s) s = cli_check_files(args, NULL, err);

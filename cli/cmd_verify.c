@@ -145,7 +145,8 @@ sdm_status cmd_verify(const cli_args *args, sdm_error *err)
         return sdm_fail(err, SDM_E_ARG,
                         "verify: --%s does nothing for %s: it is for the random shapes of a model",
                         args->samples >= 0 ? "samples" : "seed", path);
-    const sdm_status s = vdb || image ? cli_expect_model(args, err) : SDM_OK;
+    sdm_status s = vdb || image ? cli_expect_model(args, err) : SDM_OK;
+    if (!s && (vdb || image)) s = cli_refuse_plugins(args, path, err);
     if (s) return s;
     if (vdb) return verify_vdb(args, path, err);
     return image ? verify_image(args, path, err) : verify_model(args, path, err);

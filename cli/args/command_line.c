@@ -7,6 +7,8 @@
 
 #include "sdm/memory.h"
 
+bool cli_may_repeat(const cli_option *o) { return o->kind == CLI_LIST || o->kind == CLI_FLAG; }
+
 bool cli_option_fits(const cli_option *option, size_t command)
 {
     return (option->commands >> command & 1u) != 0;
@@ -97,6 +99,32 @@ static bool in_range(const cli_option *o, double v) { return v >= o->min && v <=
 /* A range that ends here or beyond says nothing to a user. */
 #define UNLIMITED 1e12
 
+/* Number of numbers in the value of an option of real numbers; 0: another option. */
+static size_t count_reals(const cli_option *o)
+{
+    return o->kind == CLI_REAL                             ? 1
+           : o->kind == CLI_REAL2                          ? 2
+           : o->kind == CLI_REAL3 || o->kind == CLI_REAL13 ? 3
+           : o->kind == CLI_REAL6                          ? 6
+           : o->kind == CLI_REAL9                          ? 9
+                                                           : 0;
+}
+
+/* The end of the message about a value whose numbers have decimal commas: their commas make twice
+ * as many whole numbers of them. "": other values. */
+static const char *comma_hint(const cli_option *o, const char *value, char hint[64])
+{
+    const size_t wanted = count_reals(o);
+    size_t parts = 1;
+    *hint = '\0';
+    if (wanted == 1 || o->kind == CLI_REAL13) sdm_comma_hint(value, hint);
+    if (*hint || strspn(value, "0123456789,+-") != strlen(value)) return hint;
+    for (const char *at = value; (at = strchr(at, ',')) != NULL; at++) parts++;
+    if (wanted > 1 && parts == 2 * wanted)
+        snprintf(hint, 64, "; a decimal number has a point: 0.5, not 0,5");
+    return hint;
+}
+
 static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *err)
 {
     if (o->kind == CLI_CHOICE)
@@ -111,19 +139,20 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
                        : o->kind == CLI_REAL6 ? "six numbers"
                        : o->kind == CLI_REAL9 ? "nine numbers"
                                               : "one number or three";
-    char low[32], high[32];
+    char low[32], high[32], hint[64];
     if (o->max == CLI_TURN)
         return sdm_fail(err, SDM_E_ARG,
                         "--%s '%s': need %s in radians, at most a turn of 6.2832 (90 degrees are "
-                        "1.5708)",
-                        o->name, value, form);
+                        "1.5708)%s",
+                        o->name, value, form, comma_hint(o, value, hint));
+    const char *comma = comma_hint(o, value, hint);
     if (o->max >= UNLIMITED && o->min <= -UNLIMITED)
-        return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s", o->name, value, form);
+        return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s%s", o->name, value, form, comma);
     if (o->max >= UNLIMITED)
-        return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s, at least %s", o->name, value, form,
-                        sdm_format_real(o->min, low));
-    return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s in %s .. %s", o->name, value, form,
-                    sdm_format_real(o->min, low), sdm_format_real(o->max, high));
+        return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s, at least %s%s", o->name, value, form,
+                        sdm_format_real(o->min, low), comma);
+    return sdm_fail(err, SDM_E_ARG, "--%s '%s': need %s in %s .. %s%s", o->name, value, form,
+                    sdm_format_real(o->min, low), sdm_format_real(o->max, high), comma);
 }
 
 /* Splits the text at commas. Returns the number of values in out; 0 when a part is not a number or
@@ -151,10 +180,7 @@ static sdm_status store_vector(const cli_option *o, const char *value, void *fie
 {
     double v[9];
     const size_t n = split_numbers(value, o->kind == CLI_INT3, v);
-    const size_t wanted = o->kind == CLI_REAL2   ? 2
-                          : o->kind == CLI_REAL6 ? 6
-                          : o->kind == CLI_REAL9 ? 9
-                                                 : 3;
+    const size_t wanted = o->kind == CLI_INT3 ? 3 : count_reals(o);
     if (n != wanted && !(n == 1 && o->kind == CLI_REAL13)) return bad_value(o, value, err);
     for (size_t i = 0; i < wanted; i++) {
         const double x = n == 1 ? v[0] : v[i];
@@ -207,6 +233,19 @@ static sdm_status store_value(cli_args *args, const cli_option *o, const char *v
 
 /* ---- the command line ---- */
 
+/* Refuses a second value of an option that may not be repeated; a flag says the same twice. */
+static sdm_status check_once(const cli_args *args, const cli_option *o, const char *value,
+                             sdm_error *err)
+{
+    if (cli_may_repeat(o)) return SDM_OK;
+    for (size_t i = 0; i < args->n_given; i++)
+        if (args->given[i].option == o)
+            return sdm_fail(err, SDM_E_ARG,
+                            "%s: --%s is given twice, with '%.60s' and with '%.60s': give it once",
+                            args->command->name, o->name, args->given[i].value, value);
+    return SDM_OK;
+}
+
 /* Parses the option at argv[*i]. Its value is in the same argument or the next one, which
  * advances *i. */
 static sdm_status parse_option(int argc, char **argv, int *i, cli_args *args, sdm_error *err)
@@ -231,6 +270,8 @@ static sdm_status parse_option(int argc, char **argv, int *i, cli_args *args, sd
         value = argv[++*i];
     }
     if (value && !*value) return sdm_fail(err, SDM_E_ARG, "--%s: empty value", o->name);
+    const sdm_status s = check_once(args, o, value, err);
+    if (s) return s;
     args->given[args->n_given++] = (cli_given){o, value ? value : o->name};
     return store_value(args, o, value, err);
 }
@@ -292,7 +333,6 @@ static void set_defaults(cli_args *args)
     args->policy = "refuse";
     args->method = "exact";
     args->sign = "auto";
-    args->error_of = "max";
     args->pose = (cli_pose_args){{NAN, NAN, NAN}, {NAN, NAN, NAN}};
     set_phantom_defaults(&args->phantom);
     set_fit_defaults(&args->fit);

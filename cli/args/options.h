@@ -150,61 +150,62 @@ struct cli_args {
     bool isolate;         /* commands with --plugin */
     double isolate_seconds, isolate_memory; /* s, GB; 0: option missing */
     int64_t threads, seed;
-    bool resume;                     /* train */
-    const char *dataset;             /* train: folder of maps */
-    bool plan;                       /* train */
-    int64_t nodes, cores;            /* train; 0: option missing */
-    const char *part;                /* fit, dataset; NULL: option missing */
-    int64_t maps;                    /* dataset; -1: option missing */
-    int64_t ranks;                   /* train; 0: option missing */
-    bool force;                      /* train, experiment, fit */
-    bool dense, half;                /* generate, exact, fit: .vdb */
-    bool keep_overlap, certify;      /* exact */
-    bool audit;                      /* mesh */
-    bool turn_parts;                 /* mesh, exact */
-    const char *points, *columns;    /* generate, exact: file of points, columns */
-    double narrow;                   /* exact: voxels; 0: option missing */
-    double tolerance;                /* exact: mm; 0: option missing */
-    bool no_model, changed_files;    /* report */
-    const char *report;              /* train, fit: file of a page */
-    bool dump;                       /* config */
-    bool keys;                       /* config, experiment */
-    bool markdown;                   /* config, experiment, help */
-    bool man;                        /* help */
-    const char *completion;          /* help: shell */
-    const char *out;                 /* train, experiment, shapes */
-    const char *install;             /* slicer */
-    const char *returns;             /* generate, exact, fit: file of results */
-    bool measure;                    /* generate, exact, fit */
-    const char *depths;              /* generate, exact, fit: list of mm; NULL: option missing */
-    const char *rows;                /* generate: the file of --params */
-    const char *policy;              /* generate, fit */
-    const char *shape;               /* exact, mesh, bench, phantom, fit */
-    const char *mesh;                /* exact, mesh, bench */
-    const char *sign, *method;       /* exact */
-    const char *pictures;            /* eval */
-    const char *closest, *normal;    /* exact */
-    const char *triangle;            /* exact */
-    const char *jacobian;            /* exact, generate */
-    bool check;                      /* generate */
-    double max_error;                /* generate: mm; 0: option missing */
-    const char *error_of, *gradient; /* generate */
-    double band;                     /* voxels; 0: option missing */
-    double max_mse;                  /* eval: mm^2 */
-    double spacing[3], origin[3];    /* mm */
-    double direction[9];             /* generate; direction[0] NaN: option missing */
-    const char *like;                /* exact, generate, phantom */
-    const char *outside;             /* generate */
-    int64_t size[3];                 /* voxels */
-    int64_t samples;                 /* eval, verify, shapes */
-    int64_t naive;                   /* eval */
-    const char *grid;                /* bench */
-    const char *peers;               /* bench, experiment */
-    double edge, share;              /* bench; 0: option missing */
-    int64_t repeat;                  /* bench; 0: option missing */
-    bool growth;                     /* bench */
-    bool dry_run;                    /* experiment */
-    cli_pose_args pose;              /* phantom, fit */
+    bool resume;                  /* train */
+    const char *dataset;          /* train: folder of maps */
+    bool plan;                    /* train */
+    int64_t nodes, cores;         /* train; 0: option missing */
+    const char *part;             /* fit, dataset; NULL: option missing */
+    int64_t maps;                 /* dataset; -1: option missing */
+    int64_t ranks;                /* train; 0: option missing */
+    bool force;                   /* train, experiment, fit */
+    bool dense, half;             /* generate, exact, fit: .vdb */
+    bool keep_overlap, certify;   /* exact */
+    bool audit;                   /* mesh */
+    bool turn_parts;              /* mesh, exact */
+    const char *points, *columns; /* generate, exact: file of points, columns */
+    double narrow;                /* exact: voxels; 0: option missing */
+    double tolerance;             /* exact: mm; 0: option missing */
+    bool no_model, changed_files; /* report */
+    const char *report;           /* train, fit: file of a page */
+    bool dump;                    /* config */
+    bool keys;                    /* config, experiment */
+    bool markdown;                /* config, experiment, help */
+    bool man;                     /* help */
+    const char *completion;       /* help: shell */
+    const char *out;              /* train, experiment, shapes */
+    const char *install;          /* slicer */
+    const char *returns;          /* generate, exact, fit: file of results */
+    bool measure;                 /* generate, exact, fit */
+    const char *depths;           /* generate, exact, fit: list of mm; NULL: option missing */
+    const char *rows;             /* generate: the file of --params */
+    const char *policy;           /* generate, fit */
+    const char *shape;            /* exact, mesh, bench, phantom, fit */
+    const char *mesh;             /* exact, mesh, bench */
+    const char *sign, *method;    /* exact */
+    const char *pictures;         /* eval */
+    const char *closest, *normal; /* exact */
+    const char *triangle;         /* exact */
+    const char *jacobian;         /* exact, generate */
+    bool check;                   /* generate */
+    double max_error;             /* generate: mm; 0: option missing */
+    const char *error_of;         /* generate; NULL: option missing */
+    const char *gradient;         /* generate */
+    double band;                  /* voxels; 0: option missing */
+    double max_mse;               /* eval: mm^2 */
+    double spacing[3], origin[3]; /* mm */
+    double direction[9];          /* generate; direction[0] NaN: option missing */
+    const char *like;             /* exact, generate, phantom */
+    const char *outside;          /* generate */
+    int64_t size[3];              /* voxels */
+    int64_t samples;              /* eval, verify, shapes */
+    int64_t naive;                /* eval */
+    const char *grid;             /* bench */
+    const char *peers;            /* bench, experiment */
+    double edge, share;           /* bench; 0: option missing */
+    int64_t repeat;               /* bench; 0: option missing */
+    bool growth;                  /* bench */
+    bool dry_run;                 /* experiment */
+    cli_pose_args pose;           /* phantom, fit */
     cli_phantom_args phantom;
     cli_fit_args fit;
     cli_cohort_args cohort; /* fit */
@@ -241,3 +242,7 @@ const cli_option *cli_find_option(size_t command, const char *name, size_t lengt
 
 /* True when `command` (an index into cli_commands) has the option. */
 bool cli_option_fits(const cli_option *option, size_t command);
+
+/* True when the option may be given several times: a list, and a flag, which says the same again.
+ * cli_parse() refuses a second value of any other option. */
+bool cli_may_repeat(const cli_option *option);

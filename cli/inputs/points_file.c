@@ -15,6 +15,10 @@
 
 #define MAX_BYTES ((uint64_t)4 << 30)
 
+/* The end of messages about a line with other separators, as spreadsheets of some countries write
+ * it: 0,5;1;2 for 0.5,1,2. */
+#define SEPARATORS "; commas separate the values, and a decimal number has a point: 0.5,1,2"
+
 /* The columns of a table. */
 typedef struct columns {
     size_t n, place[3]; /* number; places of x, y and z */
@@ -52,9 +56,9 @@ static sdm_status read_names(const char *path, size_t number, char *line, column
     if (found[0] == 1 && found[1] == 1 && found[2] == 1) return SDM_OK;
     return sdm_fail(err, SDM_E_FORMAT,
                     "%s:%zu: the header (%.30s%s%.30s%s%.30s%s) must name one column each x, y and "
-                    "z, in mm; without a header a line is x,y,z",
+                    "z, in mm; without a header a line is x,y,z%s",
                     path, number, first[0], n > 1 ? "," : "", first[1], n > 2 ? "," : "", first[2],
-                    n > 3 ? ",..." : "");
+                    n > 3 ? ",..." : "", strchr(first[0], ';') ? SEPARATORS : "");
 }
 
 /* Whether none of the cells of the line is a number. */
@@ -80,11 +84,13 @@ static sdm_status read_line(const char *path, size_t number, char *line, const c
         for (size_t a = 0; a < 3; a++)
             if (n == c->place[a] && !sdm_parse_real(cell, &x[a]) && !wrong) wrong = cell;
     if (wrong)
-        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: '%.100s' is not a finite number; a line is %s",
-                        path, number, wrong, c->n == 3 ? "x,y,z" : "as the header says");
+        return sdm_fail(err, SDM_E_FORMAT,
+                        "%s:%zu: '%.100s' is not a finite number; a line is %s%s", path, number,
+                        wrong, c->n == 3 ? "x,y,z" : "as the header says",
+                        strchr(wrong, ';') ? SEPARATORS : "");
     if (n != c->n && c->n == 3)
-        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %zu values, a line needs three: x,y,z (mm)",
-                        path, number, n);
+        return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %zu values, a line needs three: x,y,z (mm)%s",
+                        path, number, n, n == 6 ? SEPARATORS : "");
     if (n != c->n)
         return sdm_fail(err, SDM_E_FORMAT, "%s:%zu: %zu values, the header names %zu columns", path,
                         number, n, c->n);

@@ -199,6 +199,14 @@ sdm_status cli_expect_model(const cli_args *args, sdm_error *err)
                         : SDM_OK;
 }
 
+sdm_status cli_refuse_plugins(const cli_args *args, const char *input, sdm_error *err)
+{
+    return !args->plugins.n && !args->isolate
+               ? SDM_OK
+               : sdm_fail(err, SDM_E_ARG, "%s: --%s does nothing for %s, which needs no shape",
+                          args->command->name, args->plugins.n ? "plugin" : "isolate", input);
+}
+
 sdm_status cli_open_unknown(const cli_args *args, const char *path, sdm_model **out, sdm_error *err)
 {
     sdm_error why = {0};
@@ -296,7 +304,9 @@ static sdm_status read_param(const sdm_param *params, size_t n, const char *word
     if (seen[index]) return sdm_fail(err, SDM_E_ARG, "parameter '%s' is given twice", name);
     seen[index] = true;
     if (parse_any_real(value, &values[index])) return SDM_OK;
-    return sdm_fail(err, SDM_E_ARG, "parameter %s: '%.100s' is not a number", name, value);
+    char comma[64];
+    return sdm_fail(err, SDM_E_ARG, "parameter %s: '%.100s' is not a number%s", name, value,
+                    sdm_comma_hint(value, comma));
 }
 
 sdm_status cli_read_params(const sdm_param *params, size_t n, const cli_list *given, double *values,

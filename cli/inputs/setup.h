@@ -49,6 +49,10 @@ sdm_status cli_open_unknown(const cli_args *args, const char *path, sdm_model **
 /* SDM_E_ARG if --expect is given: for commands whose input is no model. */
 sdm_status cli_expect_model(const cli_args *args, sdm_error *err);
 
+/* SDM_E_ARG if --plugin or --isolate is given to a command whose input needs no shape: `input`
+ * names the input in the message. */
+sdm_status cli_refuse_plugins(const cli_args *args, const char *input, sdm_error *err);
+
 /* *out[info->n_params] = the parameters of a model in the form of a shape's. Their texts belong to
  * `info`; the array is freed with sdm_free(). */
 sdm_status cli_model_params(const sdm_model_info *info, sdm_param **out, sdm_error *err);

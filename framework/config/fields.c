@@ -58,13 +58,22 @@ bool sdm_refuse_type(sdm_reader *r, const sdm_tree_node *node, const char *path,
     return false;
 }
 
+static bool refuse_number(sdm_reader *r, const sdm_tree_node *node, const char *path)
+{
+    char buf[SDM_QUOTE_MAX + 16], comma[64] = "";
+    if (node->kind == SDM_TREE_SCALAR) sdm_comma_hint(node->text, comma);
+    sdm_mistakes_add(r->mistakes, node->mark, "%s: needs a finite number, got %s%s", path,
+                     describe_node(node, buf), comma);
+    return false;
+}
+
 bool sdm_read_real(sdm_reader *r, const sdm_tree_node *node, const char *path, double min,
                    double max, double *out)
 {
     char a[32], b[32], quoted[SDM_QUOTE_MAX];
     double v;
     if (node->kind != SDM_TREE_SCALAR || node->quoted || !sdm_parse_real(node->text, &v))
-        return sdm_refuse_type(r, node, path, "a finite number");
+        return refuse_number(r, node, path);
     if (!(v >= min && v <= max)) {
         sdm_mistakes_add(r->mistakes, node->mark, "%s: %s is out of range (%s .. %s)", path,
                          sdm_quote(node->text, quoted), sdm_format_plain(min, a),

@@ -54,6 +54,20 @@ bool sdm_parse_real(const char *s, double *out)
     return true;
 }
 
+const char *sdm_comma_hint(const char *s, char buf[64])
+{
+    char point[24];
+    double v;
+    const char *comma = strchr(s, ',');
+    *buf = '\0';
+    if (!comma || strchr(comma + 1, ',') || strlen(s) >= sizeof point) return buf;
+    snprintf(point, sizeof point, "%s", s);
+    point[comma - s] = '.';
+    if (comma > s && comma[1] && sdm_parse_real(point, &v))
+        snprintf(buf, 64, "; a decimal number has a point: %s", point);
+    return buf;
+}
+
 bool sdm_parse_int(const char *s, int64_t *out)
 {
     const bool negative = *s == '-';

@@ -56,9 +56,11 @@ static sdm_status number_parse(const sdm_shape *shape, const sdm_option *o, cons
     int64_t whole = 0;
     const bool integer = o->type == SDM_OPTION_INT;
     const bool good = integer ? sdm_parse_int(given, &whole) : sdm_parse_real(given, &v);
+    char comma[64];
     if (!good)
-        return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is '%s', need %s", shape->name,
-                        o->name, given, integer ? "an integer" : "a number");
+        return sdm_fail(err, SDM_E_CONFIG, "shape '%s': option '%s' is '%s', need %s%s",
+                        shape->name, o->name, given, integer ? "an integer" : "a number",
+                        integer ? "" : sdm_comma_hint(given, comma));
     if (integer) v = (double)whole;
     if (!(v >= o->min && v <= o->max)) {
         char min[32], max[32];

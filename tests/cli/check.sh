@@ -119,7 +119,9 @@ if [ -e $plugin ]; then
 fi
 absent never.npy
 # Options that would do nothing are refused.
-expect 2 'error-of does nothing without --max-error' sdmgen generate $model --error-of mean -o x.nrrd
+for stat in mean max; do # also the default, given on purpose
+    expect 2 'error-of does nothing without --max-error' sdmgen generate $model --error-of $stat -o x.nrrd
+done
 expect 2 'outside does nothing on the grid of the model' sdmgen generate $model --outside bound -o x.nrrd
 for option in --half --dense '--band 4'; do
     # shellcheck disable=SC2086

@@ -65,6 +65,13 @@ printf '1,2,3\n1,nan,3\n' >bad.csv
 expect 3 "bad.csv:2: 'nan' is not a finite number" sdmgen exact --mesh cube.off --points bad.csv -o no.csv
 printf '1,2,3\n1,2,3,4\n' >bad.csv
 expect 3 'bad.csv:2: 4 values, a line needs three' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
+# Decimal commas.
+printf 'x,y,z\n0,5,1,5,2,5\n' >bad.csv
+expect 3 'bad.csv:2: 6 values, .* a decimal number has a point: 0.5,1,2$' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
+printf 'x;y;z\n0,5;1;2\n' >bad.csv
+expect 3 'bad.csv:1: the header .* a decimal number has a point: 0.5,1,2$' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
+printf '1,2,3\n0.5;1;2\n' >bad.csv
+expect 3 "bad.csv:2: '0.5;1;2' is not .*; commas separate the values" sdmgen exact --mesh cube.off --points bad.csv -o no.csv
 printf 'x,y,z\n# nothing\n' >bad.csv
 expect 3 'bad.csv: no points' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
 printf 'u,v,w\n1,2,3\n' >bad.csv

@@ -39,6 +39,17 @@ expect 2 "sign 'guess': need one of auto\|crossings" sdmgen exact --shape torus 
 expect 2 "sign 'auto\|crossings': need one of auto\|crossings" sdmgen exact --shape torus --sign 'auto|crossings'
 expect 2 'quiet=1: --quiet takes no value' sdmgen shapes --quiet=1
 expect 2 'threads: empty value' sdmgen shapes --threads=
+expect 2 "exact: --spacing is given twice, with '1' and with '2': give it once" sdmgen exact --shape torus --spacing 1 --spacing 2 --json
+expect 2 "option 'edge' is '0,5', need a number; a decimal number has a point: 0.5" sdmgen exact --shape torus -O edge=0,5 --json
+expect 2 "parameter minor: '1,2' is not a number; a decimal number has a point: 1.2" sdmgen exact --shape torus -p minor=1,2 --json
+expect 2 "grid.spacing: needs a finite number, got '0,9'; a decimal number has a point: 0.9" sdmgen config "$source_folder/tests/cli/tiny.yaml" grid.spacing=0,9
+
+# Options that would do nothing.
+expect 2 'keep-overlap does nothing with --method naive' sdmgen exact --shape torus --method naive --keep-overlap --json
+expect 2 'exact: --plugin does nothing for a mesh file, which needs no shape' sdmgen exact --mesh x.ply --plugin x.so --json
+expect 2 'mesh: --isolate does nothing for a mesh file, which needs no shape' sdmgen mesh --mesh x.ply --isolate --json
+expect 2 'verify: --plugin does nothing for x.nii, which needs no shape' sdmgen verify x.nii --plugin x.so
+expect 2 'export: --plugin does nothing for a MODEL, which needs no shape' sdmgen export model.sdm -o x.onnx --plugin x.so
 
 # An error while writing to standard output gives exit code 1.
 expect 1 'cannot write to standard output' bash -c '"$0" shapes >/dev/full' "$program"

@@ -142,6 +142,12 @@ static void numbers_and_names_are_parsed(void **state)
                                                         "0x10", "1,5", "--1", NULL};
          *bad; bad++)
         assert_false(sdm_parse_real(*bad, &v));
+    char hint[64];
+    assert_string_equal(sdm_comma_hint("-1,5", hint), "; a decimal number has a point: -1.5");
+    for (const char *const *other =
+             (const char *const[]){"", "1.5", "1,5,2", ",5", "5,", "a,b", "1,5 mm", NULL};
+         *other; other++)
+        assert_string_equal(sdm_comma_hint(*other, hint), "");
     assert_true(sdm_parse_int("-9223372036854775808", &i) && i == INT64_MIN);
     assert_true(sdm_parse_int("9223372036854775807", &i) && i == INT64_MAX);
     for (const char *const *bad = (const char *const[]){"", "-", "1.0", "9223372036854775808",

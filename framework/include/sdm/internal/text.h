@@ -48,6 +48,10 @@ void sdm_json_dispose(sdm_json *j);
 SDM_INTERNAL_API bool sdm_parse_real(const char *s, double *out);
 SDM_INTERNAL_API bool sdm_parse_int(const char *s, int64_t *out);
 
+/* The end of a message about a text that is not a number: "; a decimal number has a point: 0.5" for
+ * "0,5", "" for a text that is no number with a decimal comma. Returns buf. */
+SDM_INTERNAL_API const char *sdm_comma_hint(const char *s, char buf[64]);
+
 /* Writes v with the fewest digits that read back to the same value, with '.' as decimal point.
  * Returns buf. */
 SDM_INTERNAL_API const char *sdm_format_real(double v, char buf[32]);

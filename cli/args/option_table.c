@@ -208,7 +208,9 @@ const cli_option cli_options[] = {
     {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0,
      ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_BENCH) | ON(CLI_PHANTOM) |
          ON(CLI_EXPORT),
-     AT(params), "value of a shape parameter; may be repeated"},
+     AT(params),
+     "value of a parameter of the shape (`sdmgen shapes NAME` or `sdmgen info MODEL` lists them; "
+     "default: its default); may be repeated"},
     {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_FIT), AT(params),
      "start value of a shape parameter (default: the shape's); may be repeated"},
     {"param", 'p', CLI_LIST, "name=value", NULL, 0, 0, ON(CLI_EVAL), AT(params),
@@ -217,27 +219,32 @@ const cli_option cli_options[] = {
     {"option", 'O', CLI_LIST, "name=value", NULL, 0, 0,
      ON(CLI_EXACT) | ON(CLI_MESH) | ON(CLI_SHAPES) | ON(CLI_BENCH) | ON(CLI_PHANTOM) | ON(CLI_FIT) |
          ON(CLI_EXPORT),
-     AT(options), "value of a shape option; may be repeated"},
+     AT(options),
+     "value of an option of the shape (`sdmgen shapes NAME` lists them); may be repeated"},
     {"params", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_GENERATE), AT(rows),
      "parameters from a table: a header line of names, then one output per row"},
 
     /* the grid */
     {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576,
-     ON(CLI_EXACT) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(size), "voxels along x, y, z"},
+     ON(CLI_EXACT) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(size), "number of voxels along x, y, z"},
     {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9,
      ON(CLI_EXACT) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(spacing),
-     "voxel edge, one number or one per axis"},
+     "edge of a voxel, mm: one number, or three for x, y, z"},
     {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12,
      ON(CLI_EXACT) | ON(CLI_BENCH) | ON(CLI_PHANTOM), AT(origin),
-     "centre of the first voxel, LPS mm; default: the grid is centred on the mesh"},
+     "position of the centre of the first voxel, mm (LPS: x to the left, y to the back, z to the "
+     "head); default: the grid is centred on the mesh"},
     {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576, ON(CLI_GENERATE), AT(size),
-     "voxels along x, y, z (default: the grid fills the box of the model's voxel centres). In "
+     "number of voxels along x, y, z (default: the grid fills the box of the model's voxel "
+     "centres). In "
      "other proportions than this box the grid leaves it unless --spacing is given: --outside"},
     {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_GENERATE), AT(spacing),
-     "voxel edge, one number or one per axis (default: the model's; with --size the smallest one "
+     "edge of a voxel, mm: one number, or three for x, y, z (default: the model's; with --size the "
+     "smallest one "
      "with which the grid covers the model's box)"},
     {"origin", 0, CLI_REAL3, "X,Y,Z", NULL, -1e12, 1e12, ON(CLI_GENERATE), AT(origin),
-     "centre of the first voxel, LPS mm; default: the grid has the centre of the model's"},
+     "position of the centre of the first voxel, mm (LPS: x to the left, y to the back, z to the "
+     "head); default: the grid has the centre of the model's"},
     {"direction", 0, CLI_REAL9, "XX,XY,...", NULL, -1, 1, ON(CLI_GENERATE), AT(direction),
      "axes of the grid: orthonormal matrix, row by row, whose columns are the axes (default: the "
      "model's)"},
@@ -262,7 +269,8 @@ const cli_option cli_options[] = {
      "check the map near the surface, as --check does; if its error there is larger than this, use "
      "the exact engine instead, or with --policy clamp end with exit code 4"},
     {"error-of", 0, CLI_CHOICE, NULL, "max|q95|rmse|mean", 0, 0, ON(CLI_GENERATE), AT(error_of),
-     "the error that --max-error limits: largest (default), 95 % quantile, root mean square or "
+     "with --max-error: the error that it limits: largest (default), 95 % quantile, root mean "
+     "square or "
      "mean"},
     {"method", 0, CLI_CHOICE, NULL, "exact|naive|cells|octree|edt", 0, 0, ON(CLI_EXACT), AT(method),
      "exact: the engine (default); naive: every triangle for every voxel, also triangles inside "
@@ -281,9 +289,14 @@ const cli_option cli_options[] = {
     {"tolerance", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT), AT(tolerance),
      "largest error of the method octree (default: a twentieth of the smallest voxel edge)"},
     {"sign", 0, CLI_CHOICE, NULL, "auto|crossings|pseudonormal|winding", 0, 0, ON(CLI_EXACT),
-     AT(sign), "method that separates inside from outside (default auto)"},
+     AT(sign),
+     "how inside and outside are told apart: crossings: along rays (closed meshes); pseudonormal: "
+     "by "
+     "the normal at the nearest point (meshes without overlap); winding: by winding numbers (any "
+     "mesh); auto: crossings for closed meshes, else winding (default)"},
     {"keep-overlap", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXACT), AT(keep_overlap),
-     "measure to all triangles, also to those inside the union"},
+     "where the surface overlaps itself: measure to all triangles, also to those inside the solid "
+     "(default: to the surface of the union)"},
     {"certify", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXACT), AT(certify),
      "compute the sign of every voxel again along other axes; exit code 4 when signs differ, or "
      "voxels lie in a part that is inside out (method exact)"},
@@ -351,9 +364,11 @@ const cli_option cli_options[] = {
     {"turn-parts", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH) | ON(CLI_EXACT), AT(turn_parts),
      "turn the parts of the mesh that are inside out, also those that overlap others"},
     {"dense", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT),
-     AT(dense), ".vdb: the whole map instead of a level set"},
+     AT(dense),
+     ".vdb: the distances of all voxels, instead of a level set with those near the surface"},
     {"half", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT),
-     AT(half), ".vdb: 16-bit values"},
+     AT(half),
+     ".vdb: values as 16-bit floating-point numbers, with three digits (default: 32-bit)"},
     {"band", 0, CLI_REAL, "N", NULL, 3, 100, ON(CLI_GENERATE) | ON(CLI_EXACT) | ON(CLI_FIT),
      AT(band), ".vdb: half width of the narrow band in voxels (default 3)"},
     {"out", 0, CLI_TEXT, "DIR", NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(out),

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "other_file.h"
 #include "report/files.h"
 #include "report/terminal.h"
 #include "sdm/builtin_shapes.h"
@@ -180,12 +181,23 @@ static sdm_status check_hash_text(const char *text, sdm_error *err)
                     text);
 }
 
+/* Opens a model; the message about another file tells what it is. */
+static sdm_status open_model_file(const char *path, sdm_model **out, sdm_error *err)
+{
+    char buf[256];
+    sdm_error why = {0};
+    const sdm_status s = sdm_model_open(path, out, &why);
+    if (!s) return SDM_OK;
+    const bool other = (s == SDM_E_FORMAT || s == SDM_E_IO) && !cli_ends_with(path, ".sdm");
+    return sdm_fail(err, s, "%s%s", why.text, other ? cli_other_file(path, buf) : "");
+}
+
 sdm_status cli_open_model(const cli_args *args, const char *path, sdm_model **out, sdm_error *err)
 {
     char hash[SDM_SHA256_TEXT];
     *out = NULL;
     sdm_status s = args->expect ? check_hash_text(args->expect, err) : SDM_OK;
-    if (!s) s = sdm_model_open(path, out, err);
+    if (!s) s = open_model_file(path, out, err);
     if (s || !args->expect || !strcmp(sdm_model_sha256(*out, hash), args->expect)) return s;
     sdm_model_free(*out);
     *out = NULL;
@@ -212,11 +224,11 @@ sdm_status cli_open_unknown(const cli_args *args, const char *path, sdm_model **
     sdm_error why = {0};
     const sdm_status s = cli_open_model(args, path, out, &why);
     if (!s) return s;
-    const bool other = s == SDM_E_FORMAT && !cli_ends_with(path, ".sdm");
+    char buf[256];
+    const bool other =
+        s == SDM_E_FORMAT && !cli_ends_with(path, ".sdm") && !*cli_other_file(path, buf);
     return sdm_fail(err, s, "%s%s", why.text,
-                    other && cli_ends_with_any(path, CLI_MESH_ENDINGS)
-                        ? "; `sdmgen mesh --mesh FILE --audit` checks a mesh"
-                    : other
+                    other
                         ? "; its name is neither that of a level set (.vdb) nor of an image (.nii "
                           ".nii.gz .nrrd .nhdr .mha .mhd)"
                         : "");

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen generate, info, eval and verify on a trained model: outputs, parameters, tables of parameters, damaged files.
-# Tests: cmd_eval.c cmd_generate.c cmd_info.c cmd_verify.c evaluate.c evaluate_time.c model_grade.c param_rows.c
+# Tests: cmd_eval.c cmd_generate.c cmd_info.c cmd_verify.c evaluate.c evaluate_time.c model_grade.c other_file.c param_rows.c
 . "$(dirname "$0")/common.sh"
 model=../files-of-train/run/model.sdm
 present $model
@@ -145,4 +145,17 @@ done
 (cat $model && echo more) >longer.sdm
 expect 3 'longer\.sdm' sdmgen info longer.sdm
 absent x.npy
+# A file that is no model: the message tells what it is.
+expect 0 - sdmgen mesh --shape torus -O edge=1 -o other.ply
+: >empty
+for command in eval verify info; do
+    expect 3 'empty: not a model file .*; the file is empty$' sdmgen $command empty
+    expect 3 'tiny.yaml: not a model file .*; a configuration: `sdmgen config FILE` checks it' sdmgen $command "$source_folder/tests/cli/tiny.yaml"
+    expect 1 ': not a regular file; it is a folder: its model is .*/model.sdm$' sdmgen $command "$(dirname "$model")"
+done
+for command in eval verify; do
+    expect 3 'other.ply: not a model file .*; a mesh: `sdmgen mesh --mesh FILE --audit` checks it' sdmgen $command other.ply
+done
+expect 3 'm.nii: not a model file .*; an image: `sdmgen info` and `sdmgen verify` take it' sdmgen generate m.nii -o x.nrrd
+
 finish

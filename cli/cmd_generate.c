@@ -437,7 +437,7 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
         return s;
     s = write_row(j, row, &result, err);
     if (!s && row == 0 && j->jacobian && result.source == SDM_SOURCE_NETWORK)
-        cli_warn_derivatives(args->files.items[0], j->info);
+        cli_warn_derivatives(args->files.items[0], j->model);
     return s;
 }
 

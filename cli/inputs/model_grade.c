@@ -9,7 +9,6 @@
 #include "report/report_audit.h"
 #include "report/terminal.h"
 #include "sdm/internal/shape_box.h"
-#include "sdm/internal/verdict.h"
 
 /* Largest fraction of the shapes that the grid of a good model cuts (docs/network.md). */
 #define CUT_MAX 0.05
@@ -38,13 +37,11 @@ void cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_gr
         cli_warn("%s: a part of its shapes is " CLI_THIN_PART, path, thick, voxel, 0.5 * thick);
 }
 
-void cli_warn_derivatives(const char *path, const sdm_model_info *m)
+void cli_warn_derivatives(const char *path, const sdm_model *m)
 {
-    const double error = m->quality.derivative_error;
-    if (error > SDM_DERIVATIVE_BAD)
-        cli_warn("%s: derivatives of its maps are off by %.0f %% for the worst parameter, which "
-                 "the training named at its end",
-                 path, 100 * error);
+    sdm_error why;
+    if (sdm_model_check_use(m, SDM_USE_DERIVATIVE, &why) == SDM_E_QUALITY)
+        cli_warn("%s: %s", path, why.text);
 }
 
 void cli_print_quality(const sdm_model_quality *q)

@@ -12,7 +12,7 @@ void cli_warn_quality(const char *path, const sdm_model_info *m);
 void cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_grid *g);
 
 /* Warns if the derivatives of the model's maps are off by over a fifth for a parameter. */
-void cli_warn_derivatives(const char *path, const sdm_model_info *m);
+void cli_warn_derivatives(const char *path, const sdm_model *m);
 
 /* Prints the verdict as lines of `info`. */
 void cli_print_quality(const sdm_model_quality *q);

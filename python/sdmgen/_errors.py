@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import sys
+import warnings
+from pathlib import Path
 from typing import Any
 
 from . import _abi
@@ -95,6 +98,17 @@ _CLASSES: dict[int, tuple[str, type[Error]]] = {
         ("SDM_E_INTERNAL", "internal", InternalError),
     )
 }
+
+
+def warn(text: str) -> None:
+    """Issues a UserWarning at the line that called the package, also through PyTorch."""
+    inner = [str(Path(__file__).parent / "_")[:-1]]
+    if "torch" in sys.modules:
+        inner.append(str(Path(str(sys.modules["torch"].__file__)).parent / "_")[:-1])
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(tuple(inner)):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, stacklevel=level)
 
 
 def with_arguments(text: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import Float32, Float64, address, float32, instance, number, whole
-from ._errors import Error, argument_error
+from ._errors import Error, argument_error, warn
 from ._grid import Grid
 from ._library import call, make
 
@@ -152,6 +152,8 @@ class MapInfo:
     reason: str = ""
     #: the check of the network's map; None: it was not checked
     check: Optional[Check] = None
+    #: the surface leaves the grid: the map of a model holds a part of the shape only
+    cut: bool = False
 
 
 def info_of(result: Any) -> MapInfo:
@@ -161,7 +163,21 @@ def info_of(result: Any) -> MapInfo:
         result.error_mm,
         ("", "range", "error")[result.reason],
         check_of(result.check) if result.checked else None,
+        result.cut,
     )
+
+
+class Doubts:
+    """The uses that a model is not for, by sdm_model_check_use(): each warns once. Maps of the
+    network share those of their model."""
+
+    def __init__(self, texts: Optional[dict[str, str]] = None) -> None:
+        self._texts = texts or {}
+
+    def warn(self, use: str) -> None:
+        text = self._texts.pop(use, None)
+        if text:
+            warn(text)
 
 
 class Map(Image):
@@ -173,6 +189,13 @@ class Map(Image):
         super().__init__(float32(values, (None, None, None), "values"), grid, text)
         #: how the map was computed
         self.info = info or MapInfo()
+        self._doubts = Doubts()
+
+    def _of(self, doubts: Doubts) -> Map:
+        """This map of a model that has these doubts; an exact map has none."""
+        if self.info.source == "network":
+            self._doubts = doubts
+        return self
 
     def surface(self, level: float = 0.0) -> Surface:
         """The surface on which the map has the value `level` (mm), by marching cubes."""
@@ -188,14 +211,18 @@ class Map(Image):
     @property
     def volume(self) -> float:
         """the volume of the shape, mm^3, from the distances near the surface (`sdm_map_volume` in
-        sdm/map.h tells the method)"""
+        sdm/map.h tells the method); warns once if the training of its model found volumes to be off
+        by over 2 %"""
+        self._doubts.warn("volume")
         result = c_double()
         call("sdm_map_volume", self.grid, address(self.values), 0, byref(result))
         return result.value
 
     def volume_adjoint(self) -> Float32:
         """derivatives of `volume` by the values, mm^3 per mm, [z, y, x]: `model.vjp(...)` of them are
-        the derivatives of the volume by the parameters"""
+        the derivatives of the volume by the parameters; warns once if the training of its model found
+        these to be off by over 20 %"""
+        self._doubts.warn("volume_derivative")
         result = np.empty_like(self.values)
         call("sdm_map_volume_adjoint", self.grid, address(self.values), 0, address(result))
         return result
@@ -217,7 +244,8 @@ def surface(map: Image, level: float = 0.0) -> Surface:
 class Batch:
     """Maps of several parameter vectors: `values`, float32 [n, z, y, x], mm, NEGATIVE INSIDE."""
 
-    def __init__(self, values: Float32, grid: Grid, infos: list[MapInfo]) -> None:
+    def __init__(self, values: Float32, grid: Grid, infos: list[MapInfo], doubts: Optional[Doubts] = None) -> None:
+        self._doubts = doubts or Doubts()
         self.values = values
         self.grid = grid
         #: how each map was computed
@@ -227,7 +255,7 @@ class Batch:
         return len(self.values)
 
     def __getitem__(self, index: int) -> Map:
-        return Map(self.values[index], self.grid, self.infos[index])
+        return Map(self.values[index], self.grid, self.infos[index])._of(self._doubts)
 
     def __array__(self, dtype: Any = None, copy: Any = None) -> NDArray[Any]:
         return np.array(self.values, dtype) if copy else np.asarray(self.values, dtype)

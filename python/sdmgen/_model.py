@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import warnings
 from ctypes import byref
 from dataclasses import dataclass
 from typing import Any, Mapping, Optional, Sequence, Union
@@ -13,15 +12,16 @@ from numpy.typing import ArrayLike
 
 from . import _abi
 from ._arrays import Float32, Float64, Triple, address, choice, finite, flag, float32, float64, instance, named_values, number, path_bytes, whole
-from ._errors import QualityError, argument_error
+from ._errors import QualityError, UnsupportedError, argument_error, warn
 from ._grid import Grid, grid_within
 from ._library import Handle, call, function, make
-from ._map import Band, Batch, Check, Map, MapInfo, band_of, check_of, info_of
+from ._map import Band, Batch, Check, Doubts, Map, MapInfo, band_of, check_of, info_of
 from ._shape import InstanceShape, Param, Registry, Shape, param_of
 
 Params = Union[None, ArrayLike, Mapping[str, float]]
 POLICIES = ("refuse", "clamp", "exact")
 STATISTICS = ("max", "q95", "rmse", "mean")
+USES = ("surface", "volume", "derivative", "volume_derivative")
 
 
 @dataclass(frozen=True)
@@ -72,11 +72,24 @@ def _quality_of(c: Any, name: str) -> Quality:
     numbers = [name for name in Quality.__dataclass_fields__ if name != "grade"]
     result = Quality(c.grade.decode(), *(getattr(c, name) for name in numbers))
     if result.grade == "poor":
-        warnings.warn(f"{name}: the training graded this model poor (sdmgen info)", stacklevel=4)
+        warn(f"{name}: the training graded this model poor (sdmgen info)")
     if result.cut > CUT_MAX:
         text = f"{name}: its grid cuts {100 * result.cut:.0f} % of the shapes, whose maps end open (train with grid: auto)"
-        warnings.warn(text, stacklevel=4)
+        warn(text)
     return result
+
+
+def _doubts_of(model: Model) -> Doubts:
+    """The uses that the training found the model not good enough for, with the texts of their warnings."""
+    texts = {}
+    for use in ("volume", "derivative", "volume_derivative"):
+        try:
+            model.check_use(use)
+        except QualityError as error:
+            texts[use] = f"{'model' if model.path is None else model.path}: {error.text}"
+        except UnsupportedError:  # not measured
+            pass
+    return Doubts(texts)
 
 
 @dataclass(frozen=True)
@@ -139,6 +152,7 @@ class Model:
         self.accuracy = accuracy_of(info.accuracy)
         #: the grade of the training, and what its grid leaves out
         self.quality = _quality_of(info.quality, "model" if self.path is None else str(self.path))
+        self._doubts = _doubts_of(self)
         #: name of the shape
         self.shape_name: str = info.shape.decode()
         #: kind of the network: "pod", "template", "deepsdf", "imnet" or "sdmnn"
@@ -177,6 +191,12 @@ class Model:
                 call("sdm_runtime_instance", self, registry, instance.out())
                 self._shape = InstanceShape(registry, instance, self.shape_name)
             return self._shape
+
+    def check_use(self, use: str) -> None:
+        """Tells whether the training found the model good enough for a use: "surface", "volume" (of
+        maps), "derivative" (of maps by the parameters) or "volume_derivative". Raises QualityError,
+        whose text has the measured figure, if it did not, and UnsupportedError if it measured none."""
+        call("sdm_model_check_use", self, choice(use, USES, "use"))
 
     def values(self, params: Params = None, **named: float) -> Float64:
         """A parameter vector, from an array, a mapping or names; the others have their defaults."""
@@ -264,9 +284,9 @@ class Model:
                     exact, "sdm_generate_grid", self, address(p), byref(opts), on, address(values), None, byref(result)
                 )
         except QualityError as error:
-            error.result = Map(values, on, info_of(result))
+            error.result = Map(values, on, info_of(result))._of(self._doubts)
             raise
-        return Map(values, on, info_of(result))
+        return Map(values, on, info_of(result))._of(self._doubts)
 
     def _grid(self, grid: Optional[Grid], size: Any, spacing: Any, origin: Any, direction: Any) -> Grid:
         if grid is None:
@@ -299,12 +319,24 @@ class Model:
                     exact, "sdm_generate_batch", self, address(p), len(p), byref(opts), address(values), byref(results)
                 )
             except QualityError as error:
-                error.result = Batch(values, self.grid, [info_of(r) for r in results])
+                error.result = Batch(values, self.grid, [info_of(r) for r in results], self._doubts)
                 raise
-        return Batch(values, self.grid, [info_of(r) for r in results])
+        return Batch(values, self.grid, [info_of(r) for r in results], self._doubts)
+
+    def _warn_derivatives(self, info: MapInfo) -> None:
+        """Warns once of derivatives by the network that its training found to be off by over 20 %."""
+        if info.source == "network":
+            self._doubts.warn("derivative")
+
+    def _differentiated(self, values: Float32, result: Any) -> Map:
+        """The map of derivatives that have been computed."""
+        info = info_of(result)
+        self._warn_derivatives(info)
+        return Map(values, self.grid, info)._of(self._doubts)
 
     def jacobian(self, params: Params = None, *, policy: str = "refuse", threads: int = 0, **named: float) -> Jacobian:
-        """The map and its derivatives by all parameters, mm per unit of the parameter."""
+        """The map and its derivatives by all parameters, mm per unit of the parameter. Warns once, as jvp(),
+        vjp() and slopes do, if the training found derivatives to be off by over 20 %."""
         p = self.values(params, **named)
         opts, result = self._opts(policy, threads), make("sdm_result")
         values = np.empty(self.grid.shape, np.float32)
@@ -320,7 +352,7 @@ class Model:
             address(slopes),
             byref(result),
         )
-        return Jacobian(Map(values, self.grid, info_of(result)), slopes)
+        return Jacobian(self._differentiated(values, result), slopes)
 
     def jvp(
         self, direction: ArrayLike, params: Params = None, *, policy: str = "refuse", threads: int = 0, **named: float
@@ -342,7 +374,7 @@ class Model:
             address(tangent),
             byref(result),
         )
-        return Tangent(Map(values, self.grid, info_of(result)), tangent)
+        return Tangent(self._differentiated(values, result), tangent)
 
     def vjp(
         self, adjoint: ArrayLike, params: Params = None, *, policy: str = "refuse", threads: int = 0, **named: float
@@ -351,10 +383,11 @@ class Model:
         function of the map by the voxels, the result [k] is that by the parameters."""
         p = self.values(params, **named)
         w = float32(adjoint, self.grid.shape, "adjoint")
-        opts, result = self._opts(policy, threads), np.empty(len(p))
+        opts, slopes, result = self._opts(policy, threads), np.empty(len(p)), make("sdm_result")
         exact = bool(opts.exact_shape)
-        self._call(exact, "sdm_generate_vjp", self, address(p), address(w), byref(opts), address(result), None)
-        return result
+        self._call(exact, "sdm_generate_vjp", self, address(p), address(w), byref(opts), address(slopes), byref(result))
+        self._warn_derivatives(info_of(result))
+        return slopes
 
     def check(self, params: Params = None, *, threads: int = 0, **named: float) -> Check:
         """The error of the network's map near the surface, mm, against exact distances."""
@@ -465,6 +498,8 @@ class Field:
         model._call(self._exact, "sdm_field_set_params", self, address(params), byref(result))
         #: how the map was computed
         self.info = info_of(result)
+        if self._derivatives:
+            model._warn_derivatives(self.info)
 
     @property
     def _as_parameter_(self) -> Any:
@@ -498,7 +533,7 @@ class Field:
         """The map on a grid."""
         values = np.empty(instance(grid, Grid, "grid").shape, np.float32)
         self._model._call(self._exact, "sdm_field_grid", self, grid, address(values), None)
-        return Map(values, grid, self.info)
+        return Map(values, grid, self.info)._of(self._model._doubts)
 
     def band(self, width: float, grid: Optional[Grid] = None) -> Band:
         """The narrow band of half width `width` (mm) on a grid, by default the model's."""

@@ -52,7 +52,10 @@ sdm_status sdm_generate_grid(const sdm_model *m, const double *params,
     s = open_field(m, params, &unchecked, slopes != NULL, grid, &f, &found, err);
     if (!s) s = sdm_field_grid(f, grid, values, slopes, err);
     if (!s) s = check_map(f, &all, grid, values, slopes, &found, err);
-    if ((!s || s == SDM_E_QUALITY) && result) *result = found;
+    if ((!s || s == SDM_E_QUALITY) && result) {
+        *result = found;
+        result->cut = sdm_generate_is_cut(grid, values);
+    }
     sdm_field_free(f);
     return s;
 }

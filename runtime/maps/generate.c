@@ -175,16 +175,16 @@ static sdm_status generate_all(const sdm_model *m, const double *params, size_t 
                : s;
 }
 
-/* Is a voxel at the border of the grid inside the shape? */
-static bool is_cut(const sdm_grid *g, const float *values)
+bool sdm_generate_is_cut(const sdm_grid *g, const float *values)
 {
     const int64_t nx = g->n[0], ny = g->n[1], nz = g->n[2];
     for (int64_t k = 0; k < nz; k++)
         for (int64_t j = 0; j < ny; j++) {
             const float *row = values + (k * ny + j) * nx;
-            const bool whole = k == 0 || k == nz - 1 || j == 0 || j == ny - 1;
-            if (row[0] < 0 || row[nx - 1] < 0) return true;
-            for (int64_t i = 1; whole && i < nx - 1; i++)
+            const bool whole =
+                (nz > 1 && (k == 0 || k == nz - 1)) || (ny > 1 && (j == 0 || j == ny - 1));
+            if (nx > 1 && (row[0] < 0 || row[nx - 1] < 0)) return true;
+            for (int64_t i = 0; whole && i < nx; i++)
                 if (row[i] < 0) return true;
         }
     return false;
@@ -210,7 +210,7 @@ sdm_status sdm_generate_batch(const sdm_model *m, const double *params, size_t n
     if (!s) s = generate_all(m, params, n, &o, values, found, used, err);
     for (size_t i = 0; i < n && results && (!s || s == SDM_E_QUALITY); i++) {
         results[i] = found[i];
-        results[i].cut = is_cut(&info->grid, values + i * sdm_grid_count(&info->grid));
+        results[i].cut = sdm_generate_is_cut(&info->grid, values + i * sdm_grid_count(&info->grid));
     }
     sdm_free(found);
     sdm_free(used);
@@ -269,7 +269,7 @@ sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params,
     if (!s) s = jacobian_at(m, params, used, &o, values, jacobian, &found, err);
     if ((!s || s == SDM_E_QUALITY) && result) {
         *result = found;
-        result->cut = is_cut(&sdm_model_get_info(m)->grid, values);
+        result->cut = sdm_generate_is_cut(&sdm_model_get_info(m)->grid, values);
     }
     sdm_free(used);
     return s;
@@ -350,7 +350,10 @@ sdm_status sdm_generate_jvp(const sdm_model *m, const double *params, const doub
     sdm_result found = {0};
     sdm_status s = prepare_one(m, params, opts, &o, &used, &found, err);
     if (!s) s = jvp_at(m, params, used, direction, &o, values, tangent, &found, err);
-    if ((!s || s == SDM_E_QUALITY) && result) *result = found;
+    if ((!s || s == SDM_E_QUALITY) && result) {
+        *result = found;
+        result->cut = sdm_generate_is_cut(&sdm_model_get_info(m)->grid, values);
+    }
     sdm_free(used);
     return s;
 }

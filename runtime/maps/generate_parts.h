@@ -1,4 +1,4 @@
-/* Checks before a map is computed, for other files of the runtime. */
+/* Checks before and after a map is computed, for other files of the runtime. */
 #pragma once
 
 #include "sdm/runtime.h"
@@ -13,3 +13,8 @@ sdm_status sdm_generate_check_options(const sdm_model *m, const sdm_generate_opt
 sdm_status sdm_generate_check_params(const sdm_model *m, const double *params,
                                      const sdm_generate_opts *o, double *used, sdm_result *result,
                                      sdm_error *err);
+
+/* true: a voxel of values[nz][ny][nx] at the border of the grid is inside the shape, so the surface
+   leaves the grid there. Axes of one voxel have no border: a slice cuts every shape. [any thread]
+ */
+bool sdm_generate_is_cut(const sdm_grid *grid, const float *values);

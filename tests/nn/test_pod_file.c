@@ -1,6 +1,6 @@
 /* Files of the pod network: what they keep, the survey of the weights that rounds them, damaged
  * files, and allocations that fail.
- * Tests: container.c model_file.c model_open.c model_quality.c pod_build.c pod_open.c
+ * Tests: container.c model_file.c model_open.c model_quality.c model_use.c pod_build.c pod_open.c
  * pod_quantise.c pod_survey.c
  */
 #include <math.h>
@@ -262,6 +262,7 @@ static void quality_is_kept(void **state)
     const sdm_model_quality *q = &sdm_model_get_info(m)->quality;
     const size_t without = sdm_model_get_info(m)->file_bytes;
     assert_true(!*q->grade && isnan(q->cut) && isnan(q->between_mm));
+    assert_int_equal(sdm_model_check_use(m, SDM_USE_SURFACE, NULL), SDM_E_UNSUPPORTED);
     sdm_model_free(m);
     t.info.quality = (sdm_model_quality){"poor", 0.25, NAN, 0.5,         12.5,       30,
                                          0.01,   NAN,  0.5, {1, 2, NAN}, {3, 4, NAN}};
@@ -275,6 +276,16 @@ static void quality_is_kept(void **state)
     assert_true(q->probe_volume_mm3[1] == 2 && q->probe_area_mm2[1] == 4);
     assert_true(isnan(q->probe_volume_mm3[2]) && isnan(q->probe_area_mm2[2]));
     assert_true(sdm_model_get_info(m)->file_bytes > without);
+    // uses: a poor grade, a good volume, derivatives not measured, bad derivatives of volumes
+    sdm_error err;
+    assert_int_equal(sdm_model_check_use(m, SDM_USE_SURFACE, &err), SDM_E_QUALITY);
+    assert_int_equal(sdm_model_check_use(m, SDM_USE_VOLUME, &err), SDM_OK);
+    assert_int_equal(sdm_model_check_use(m, SDM_USE_DERIVATIVE, &err), SDM_E_UNSUPPORTED);
+    assert_int_equal(sdm_model_check_use(m, SDM_USE_VOLUME_DERIVATIVE, &err), SDM_E_QUALITY);
+    assert_string_equal(err.text, "derivatives of volumes of its maps are off by 50 % for the "
+                                  "worst parameter, more than 20 %: exact maps have right ones");
+    assert_int_equal(sdm_model_check_use(m, (sdm_model_use)4, &err), SDM_E_ARG);
+    assert_int_equal(sdm_model_check_use(NULL, SDM_USE_VOLUME, &err), SDM_E_ARG);
     sdm_model_free(m);
     // an unknown grade and an impossible share are damage
     const sdm_model_quality wrong[] = {{"fine", 0, 0, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}},

@@ -6,6 +6,7 @@ import pickle
 import signal
 import threading
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -79,6 +80,57 @@ def test_derivatives(run, model, model_file, tmp_path):
     assert np.abs(model.jvp(v, P).values - along).max() < 1e-2 * np.abs(along).max()
     back = (both.values.astype(float) * w).sum((1, 2, 3))
     assert np.abs(model.vjp(w, P) - back).max() < 1e-2 * np.abs(back).max()
+
+
+def test_derivatives_and_volumes_that_are_bad_warn_once(model_file, tmp_path):
+    """The test network, trained in a second, is bad for all three uses; each warns at the line of the caller."""
+    model = sdmgen.Model(model_file)
+    for use in ("volume", "derivative", "volume_derivative"):
+        with pytest.raises(sdmgen.QualityError) as refused:
+            model.check_use(use)
+        told = float(refused.value.text.split("off by ")[1].split(" %")[0])
+        assert told == pytest.approx(100 * getattr(model.quality, f"{use}_error"), rel=0.05)
+    if model.quality.grade != "poor":
+        model.check_use("surface")
+    with pytest.raises(sdmgen.ArgumentError, match="use"):
+        model.check_use("nonsense")
+    ones = np.ones(model.grid.shape, np.float32)
+    derivatives = (
+        lambda m: m.jacobian(P),
+        lambda m: m.jvp([1, 0, 0, 0], P),
+        lambda m: m.vjp(ones, P),
+        lambda m: m.sample([[0, 0, 0]], P, slopes=True),
+        lambda m: m.field(P, derivatives=True),
+    )
+    volumes = (lambda m: m(P).volume, lambda m: m.batch([m.values(P)])[0].volume, lambda m: m.field(P).grid(m.grid).volume)
+    cases = [(work, "derivatives of its maps are off by") for work in derivatives]
+    cases += [(work, "volumes of its maps are off by") for work in volumes]
+    cases += [(lambda m: m(P).volume_adjoint(), "derivatives of volumes of its maps are off by")]
+    for work, text in cases:
+        fresh = sdmgen.Model(model_file)
+        with pytest.warns(UserWarning, match=f"model.sdm: {text}") as caught:
+            work(fresh)
+            work(fresh)
+        assert len(caught) == 1 and caught[0].filename == __file__
+    # no words about maps alone, or about exact maps
+    fresh = sdmgen.Model(model_file)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fresh(P).surface()
+        fresh.sample([[0, 0, 0]], P)
+        assert fresh(P, max_error=0.001).volume > 0
+        assert pickle.loads(pickle.dumps(sdmgen.Map(fresh(P).values, fresh.grid))).volume > 0
+
+
+def test_a_map_that_the_grid_cuts_is_marked(model):
+    assert not model(P).info.cut and not model(P, spacing=0.5).info.cut
+    low = np.argwhere(model(P).values < 0).min(0)[::-1]
+    grid = sdmgen.Grid((6, 6, 6), 0.5, model.grid.origin + (low + 2) * model.grid.spacing)
+    inner = model(P, grid=grid)
+    border = np.pad(np.zeros((4, 4, 4), bool), 1, constant_values=True)
+    assert inner.info.cut and (inner.values[border] < 0).any()
+    # a slice cuts every shape
+    assert not model(P, size=(90, 90, 1), spacing=0.2, outside="bound").info.cut
 
 
 def test_batches_and_policies(run, model, model_file, tmp_path):

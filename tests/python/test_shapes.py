@@ -155,9 +155,10 @@ def test_training_and_fit(tmp_path):
     assert model.shape is shape and model.accuracy == result.accuracy and model.accuracy.rmse_mm < 0.05
     # a model whose grid cuts its shapes is loaded with a warning
     small = {"grid": {"size": [8, 8, 8], "spacing": 0.2}, "train.steps": 5}
-    with pytest.warns(UserWarning, match=r"its grid cuts [0-9]+ % of the shapes"):
+    with pytest.warns(UserWarning, match=r"its grid cuts [0-9]+ % of the shapes") as caught:
         cut = sdmgen.train(config, small, out=tmp_path / "cut", shape=shape).model
-    assert cut.quality.cut > 0.05
+    assert cut.quality.cut > 0.05 and caught[0].filename == __file__
+    assert cut({"radius": 1, "stretch": 1.2}).info.cut
     p = {"radius": 0.9, "stretch": 1.4}
     assert np.abs(model(p).values - sdmgen.exact(shape, model.grid, params=p).values).max() < 0.2
     # policy exact and checks call the function

@@ -27,12 +27,16 @@ SDM_API sdm_status sdm_map_gradient(const sdm_grid *grid, const float *values, i
    for a ball with a radius of ten voxels, where counting the voxels inside errs by 0.6 % and
    tetrahedra by 0.5 %; where the shape is thinner than three voxels, a few per cent. Only volume
    inside the box of the grid counts. n_threads 0: the OpenMP default; the same bits for every
-   value. SDM_E_ARG: also a map with NaN; SDM_E_NOMEM. [any thread] */
+   value. Of a network's map the volume has the error of the network, too:
+   sdm_model_check_use(SDM_USE_VOLUME) tells whether it is at most 2 %. SDM_E_ARG: also a map with
+   NaN; SDM_E_NOMEM. [any thread] */
 SDM_API sdm_status sdm_map_volume(const sdm_grid *grid, const float *values, int n_threads,
                                   double *volume, sdm_error *err);
 
 /* adjoint[nz][ny][nx] = derivatives of the volume of sdm_map_volume() by the values, mm^3 per mm.
-   sdm_generate_vjp() makes derivatives of the volume by the parameters of them. n_threads as above.
+   sdm_generate_vjp() makes derivatives of the volume by the parameters of them;
+   sdm_model_check_use(SDM_USE_VOLUME_DERIVATIVE) tells whether those are right within 20 %.
+   n_threads as above.
    adjoint may be the same array as values. SDM_E_ARG. [any thread] */
 SDM_API sdm_status sdm_map_volume_adjoint(const sdm_grid *grid, const float *values, int n_threads,
                                           float *adjoint, sdm_error *err);

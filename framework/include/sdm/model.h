@@ -58,6 +58,19 @@ typedef struct sdm_model_quality {
     double probe_volume_mm3[SDM_MODEL_PROBES], probe_area_mm2[SDM_MODEL_PROBES];
 } sdm_model_quality;
 
+/* Relative errors from which on a model is not for volumes, and not for derivatives. */
+#define SDM_VOLUME_BAD 0.02
+#define SDM_DERIVATIVE_BAD 0.2
+
+/* Uses of a model, for sdm_model_check_use(), each with the figure of sdm_model_quality that
+   decides. */
+typedef enum sdm_model_use {
+    SDM_USE_SURFACE = 0,          /* surfaces, level sets: grade; "poor" is not for them */
+    SDM_USE_VOLUME = 1,           /* volume_error > SDM_VOLUME_BAD */
+    SDM_USE_DERIVATIVE = 2,       /* of maps: derivative_error > SDM_DERIVATIVE_BAD */
+    SDM_USE_VOLUME_DERIVATIVE = 3 /* volume_derivative_error > SDM_DERIVATIVE_BAD */
+} sdm_model_use;
+
 /* Description of a model. All pointers stay valid until sdm_model_free(); texts are
    NUL-terminated. */
 typedef struct sdm_model_info {
@@ -105,6 +118,13 @@ SDM_API void sdm_model_free(sdm_model *m);
 /* The description, owned by the model. [any thread] */
 SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
 
+/* Tells whether the training found the model good enough for a use; the functions that compute
+   maps, volumes and derivatives do not ask. SDM_OK: it did. SDM_E_QUALITY: it did not; *err holds
+   the figure, as in "derivatives of volumes are off by 165 % for the worst parameter, more than 20
+   %". SDM_E_UNSUPPORTED: not measured (slow kinds of network, earlier versions). SDM_E_ARG: m is
+   NULL, or there is no such use. [any thread] */
+SDM_API sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error *err);
+
 /* Index of a parameter in the parameter vectors of the model; -1 if there is none of this name.
    [any thread] */
 SDM_API int sdm_model_param_index(const sdm_model *m, const char *name);
@@ -126,7 +146,9 @@ SDM_API void sdm_model_forward(const sdm_model *m, const double *params, size_t 
 SDM_API size_t sdm_model_jacobian_scratch_bytes(const sdm_model *m);
 
 /* values[nz][ny][nx] = the map at params[n_params], jacobian[n_params][nz][ny][nx] = its derivative
-   by each parameter, mm per unit of the parameter (forward-mode differentiation). [any thread] */
+   by each parameter, mm per unit of the parameter (forward-mode differentiation).
+   sdm_model_check_use(SDM_USE_DERIVATIVE) tells whether these, and the products below, are right
+   within 20 %. [any thread] */
 SDM_API void sdm_model_jacobian(const sdm_model *m, const double *params, float *values,
                                 float *jacobian, void *scratch);
 

@@ -55,10 +55,11 @@ SDM_API sdm_status sdm_field_set_params(sdm_field *f, const double *params, sdm_
 /* The functions below may be called by any number of threads at the same time, after
    sdm_field_set_params(). Distances are in mm, negative inside; gradients are the derivatives by
    the world coordinates, mm per mm; slopes are the derivatives by the parameters, mm per unit of
-   the parameter. Outside of the box the option `outside` decides; gradients there are those of the
-   bound or of the exact distance, slopes those of the bound. SDM_E_RANGE: a point lies outside of
-   the box and the option is SDM_OUTSIDE_REFUSE. SDM_E_ARG: a coordinate is not finite; slopes
-   without `derivatives`. SDM_E_UNSUPPORTED: slopes of exact distances at points. */
+   the parameter, as right as sdm_model_check_use(SDM_USE_DERIVATIVE) tells. Outside of the box the
+   option `outside` decides; gradients there are those of the bound or of the exact distance, slopes
+   those of the bound. SDM_E_RANGE: a point lies outside of the box and the option is
+   SDM_OUTSIDE_REFUSE. SDM_E_ARG: a coordinate is not finite; slopes without `derivatives`.
+   SDM_E_UNSUPPORTED: slopes of exact distances at points. */
 
 /* *value = the distance at x (LPS, mm); gradient[3] and slopes[n_params] may be NULL. Allocates
    nothing. */

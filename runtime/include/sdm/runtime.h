@@ -51,7 +51,8 @@ typedef struct sdm_result {
     bool checked;      /* `check` is valid */
     sdm_check check;   /* check of the network's map, even if an exact one has replaced it */
     /* The shape reaches the border of the grid, where its surface ends open: the map holds a part
-       of it. Of sdm_generate(), _batch() and _jacobian(). */
+       of it. Of sdm_generate(), _batch(), _jacobian(), _jvp() and _grid(); an axis of one voxel has
+       no border. */
     bool cut;
 } sdm_result;
 
@@ -96,7 +97,8 @@ SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, 
    error of the derivatives is, relative to the largest derivative by the same parameter, 2e-4 root
    mean square, 1.5e-3 at most. These are roundings: derivatives are those of the network's map,
    whose error against exact distances changes with the parameters. Training measures them for the
-   worst parameter (sdm_model_quality.derivative_error); where walls are thin beside the voxels they
+   worst parameter, and sdm_model_check_use(SDM_USE_DERIVATIVE) tells whether they are right within
+   20 %; where walls are thin beside the voxels they
    may be wrong several times: sdm_exact_shape_jacobian() is exact. Errors as for sdm_generate() and
    sdm_exact_shape_jacobian(). [any thread] */
 SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params,
@@ -104,15 +106,16 @@ SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *param
                                          float *jacobian, sdm_result *result, sdm_error *err);
 
 /* Map and directional derivative: tangent[nz][ny][nx] = J direction, mm, with direction[n_params]
-   and the Jacobian J of sdm_generate_jacobian(). Takes less time than the Jacobian; otherwise as
-   sdm_generate_jacobian(). [any thread] */
+   and the Jacobian J of sdm_generate_jacobian(), with its errors. Takes less time than the
+   Jacobian; otherwise as sdm_generate_jacobian(). [any thread] */
 SDM_API sdm_status sdm_generate_jvp(const sdm_model *m, const double *params,
                                     const double *direction, const sdm_generate_opts *opts,
                                     float *values, float *tangent, sdm_result *result,
                                     sdm_error *err);
 
 /* gradient[n_params] = J^T adjoint[nz][ny][nx]: if `adjoint` is the derivative of a function of the
-   map with respect to the voxels, this is its derivative with respect to the parameters. Costs as
+   map with respect to the voxels, this is its derivative with respect to the parameters, with the
+   errors of J; of the volume, sdm_model_check_use(SDM_USE_VOLUME_DERIVATIVE) judges it. Costs as
    much as 4 to 6 maps, whatever the number of parameters; with "deepsdf" and "imnet" as much as
    the Jacobian. No map is computed, so `check` and `max_error_mm` have no effect; otherwise as
    sdm_generate_jacobian(). [any thread] */

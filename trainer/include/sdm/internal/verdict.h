@@ -4,7 +4,7 @@
 #pragma once
 
 #include "sdm/internal/text.h"
-#include "sdm/status.h"
+#include "sdm/model.h" /* SDM_VOLUME_BAD, SDM_DERIVATIVE_BAD */
 
 #ifdef __cplusplus
 extern "C" {
@@ -94,10 +94,6 @@ const char *sdm_cause_name(sdm_cause cause);
 
 /* How the part was measured, a few words. [any thread] */
 const char *sdm_cause_text(sdm_cause cause);
-
-/* Relative errors from which on volumes and derivatives are told to be bad. */
-#define SDM_VOLUME_BAD 0.02
-#define SDM_DERIVATIVE_BAD 0.2
 
 /* A model is poor if its grid cuts a larger fraction of the held-out shapes. */
 #define SDM_CUT_POOR 0.5

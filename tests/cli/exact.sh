@@ -165,7 +165,7 @@ expect 5 'other points need --outside bound or exact' sdmgen generate "$model" -
 expect 0 '^sdmgen: warning: no voxel of the grid is inside the surface' sdmgen exact --mesh cube.off --origin 900,0,0 --size 4,4,4 --spacing 0.5 --quiet -o x.npy
 expect 0 - sdmgen exact --mesh cube.off --origin 900,0,0 --size 1,4,4 --spacing 0.5 --quiet -o x.npy
 expect 0 - sdmgen exact --mesh cube.off --origin -4,-4,0 --size 17,17,1 --spacing 0.5 --quiet -o x.npy
-expect 3 '`sdmgen mesh --mesh FILE --audit` checks a mesh' sdmgen verify cube.off
+expect 3 '`sdmgen mesh --mesh FILE --audit` checks it' sdmgen verify cube.off
 
 # --certify: signs compared with crossings along y and z.
 expect 0 '343 of 343 voxels compared with crossings along y and z, all agree' sdmgen exact --mesh cube.off "${grid[@]}" --json --certify

@@ -21,14 +21,16 @@ while IFS='|' read -r _ options yes_no; do
         rows=$((rows + 1))
         [ -n "${value[$option]+there}" ] || bad "no value for $option"
         for i in "${!targets[@]}"; do
+            given="$option ${value[$option]}"
+            [[ ${targets[i]} != *"$option"* ]] || given='' # the target has the option already
             if [ "${cells[i]} $option" = 'yes --find' ]; then
                 expect 2 '^sdmgen: error: fit: --find searches for the start: leave --start-points out' \
                     sdmgen fit $shape ${targets[i]} --find --start-points missing.csv
             elif [ "${cells[i]}" = yes ]; then
-                expect 1 'missing.csv: ' sdmgen fit $shape ${targets[i]} $option ${value[$option]} --start-points missing.csv
+                expect 1 'missing.csv: ' sdmgen fit $shape ${targets[i]} $given --start-points missing.csv
             else
                 expect 2 "^sdmgen: error: fit: $option does nothing in a fit to [a-z]+( with --image-model labels)?; of the options .* apply: --" \
-                    sdmgen fit $shape ${targets[i]} $option ${value[$option]} --start-points missing.csv
+                    sdmgen fit $shape ${targets[i]} $given --start-points missing.csv
             fi
         done
     done < <(grep -o '`--[^`]*`' <<<"$options" | tr -d '`')

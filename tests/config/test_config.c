@@ -706,7 +706,8 @@ static void test_locale_does_not_matter(void **state)
     expect_ok(BASE "data: {static_share: 0.25}\n", NULL);
     assert_true(config.data.static_share == 0.25);
     expect_mistake(BASE "data: {static_share: \"0,25\"}\n", NULL,
-                   "x.yaml:4:22: data.static_share: needs a finite number, got the text '0,25'");
+                   "x.yaml:4:22: data.static_share: needs a finite number, got the text '0,25'; a "
+                   "decimal number has a point: 0.25");
     setlocale(LC_ALL, "C");
 }
 

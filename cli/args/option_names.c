@@ -18,7 +18,8 @@ static size_t structure_length(const char *at)
 /* Each name of the C interface, and the option that replaces it in messages of the program. The
  * option must not be longer than the name, because the text is changed in place. */
 static const char *const NAMES[][2] = {{"sdm_fit_source.grid", "--exact --spacing"},
-                                       {"sdm_registry_load()", "--plugin FILE"}};
+                                       {"sdm_registry_load()", "--plugin FILE"},
+                                       {"sdm_fit_opts.max_polish_iterations", "--polish"}};
 
 /* The pair of names that begins at `at`; NULL: none. */
 static const char *const *find_name(const char *at)

@@ -38,6 +38,9 @@ typedef struct cli_fit {
     /* fit_source.c: the maps are made by a network, the exact engine or both */
     sdm_registry *registry;
     sdm_instance *shape;
+    /* a fit with a network alone: its shape, where it is known, for the checks; else NULL */
+    sdm_registry *judge_registry;
+    sdm_instance *judge_shape;
     sdm_model *model;
     const char *shape_name;
     sdm_param *params; /* [n_params] */

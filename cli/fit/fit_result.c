@@ -62,4 +62,6 @@ void cli_fit_dispose(cli_fit *f)
     sdm_instance_free(f->shape);
     sdm_instance_free(f->other_shape);
     sdm_registry_free(f->registry);
+    sdm_instance_free(f->judge_shape);
+    sdm_registry_free(f->judge_registry);
 }

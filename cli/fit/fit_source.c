@@ -9,18 +9,16 @@
 #include "report/terminal.h"
 #include "sdm/memory.h"
 
-/* Warns if --plugin names a shape that was changed after the training of the model: the fit takes
- * the network alone and would not notice. */
-static void warn_changed(const cli_fit *f)
+/* Finds the shape of the model, if it is a built-in one or a plug-in that is loaded, for the checks
+ * that compare the network with it. Warns if --plugin names a shape that was changed after the
+ * training: the fit takes the network alone and would not notice. */
+static void find_shape(cli_fit *f)
 {
-    sdm_registry *registry = NULL;
-    sdm_instance *shape = NULL;
     sdm_error why = {0};
-    if (!cli_open_registry(f->args, &registry, &why) &&
-        sdm_runtime_instance(f->model, registry, &shape, &why) == SDM_E_PLUGIN)
+    if (!cli_open_registry(f->args, &f->judge_registry, &why) &&
+        sdm_runtime_instance(f->model, f->judge_registry, &f->judge_shape, &why) == SDM_E_PLUGIN &&
+        f->args->plugins.n)
         cli_warn("%s", why.text);
-    sdm_instance_free(shape);
-    sdm_registry_free(registry);
 }
 
 static sdm_status open_model(cli_fit *f, sdm_error *err)
@@ -44,7 +42,7 @@ static sdm_status open_model(cli_fit *f, sdm_error *err)
                                : args->measure    ? "measure"
                                                   : "policy exact");
     }
-    if (!f->registry && args->plugins.n) warn_changed(f);
+    if (!f->registry) find_shape(f);
     if (!args->fit.exact) {
         f->source.model = f->model;
         f->n_params = info->n_params;
@@ -114,7 +112,7 @@ sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err)
     if (!s) s = cli_read_params(f->params, f->n_params, &f->args->params, f->start, err);
     if (!s) s = check_start(f, err);
     if (s) return s;
-    f->source.shape = f->shape;
+    f->source.shape = f->shape ? f->shape : f->judge_shape;
     warn_shape(f);
     return SDM_OK;
 }

@@ -297,6 +297,51 @@ static void test_points_and_a_network(void **state)
     sdm_instance_free(ball);
 }
 
+// The derivative by the radius of a network that errs by a tenth.
+static double nine_tenths(const double x[3])
+{
+    (void)x;
+    return 0.9;
+}
+
+static double radius_variance(const sdm_fit_result *r)
+{
+    const double *c = r->covariance;
+    const size_t size = r->n_params + 6;
+    return c[0] + 0.2 * c[1] + 0.01 * c[size + 1];
+}
+
+/* A network whose map is that of a ball of 1.25 + 0.9 (radius - 1.25) mm takes points of one of 1.3
+ * mm for one of 1.25 + 0.05 / 0.9 mm. Where the shape is known, the covariance holds the square of
+ * this error. */
+static void test_the_error_of_a_network_is_measured(void **state)
+{
+    (void)state;
+    const sdm_grid grid = sdm_grid_centred((int64_t[3]){17, 17, 17}, 0.25, (double[3]){0, 0, 0});
+    const double p[2] = {1.3, 0}, error = 0.05 / 0.9 - 0.05;
+    sdm_instance *ball = instance_of(&ball_shape);
+    sdm_model *model = ball_model("bulge", &grid, nine_tenths);
+    double *x = points_on(ball, p, POINTS, ERROR, 23, 0), variance[2];
+    const sdm_fit_target target = {.kind = SDM_FIT_POINTS, .points = x, .n_points = POINTS};
+    for (int known = 0; known < 2; known++) {
+        const sdm_fit_source source = {.model = model, .shape = known ? ball : NULL};
+        const sdm_fit_opts o = sdm_fit_defaults();
+        sdm_fit_result r;
+        sdm_error err = {0};
+        const sdm_status s = sdm_fit(&source, &target, &o, &r, &err);
+        if (s && s != SDM_E_QUALITY) fail_msg("%s", err.text);
+        assert_true(fabs(ball_radius(r.params) - 1.3 - error) < 0.001);
+        assert_true(known == !isnan(r.network_error_sd));
+        variance[known] = radius_variance(&r);
+        sdm_fit_dispose(&r);
+    }
+    const double found = sqrt(variance[1] - variance[0]);
+    if (!(fabs(found - error) < 0.1 * error)) fail_msg("%g mm, not %g mm", found, error);
+    free(x);
+    sdm_model_free(model);
+    sdm_instance_free(ball);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -307,6 +352,7 @@ int main(void)
         cmocka_unit_test(test_ends_have_the_stated_deviations),
         cmocka_unit_test(test_points_without_errors_pass),
         cmocka_unit_test(test_points_and_a_network),
+        cmocka_unit_test(test_the_error_of_a_network_is_measured),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -29,7 +29,9 @@ const char *sdm_fit_check_name(sdm_fit_check_kind kind)
                                                         [SDM_FIT_CHECK_VOXELS] = "map voxels",
                                                         [SDM_FIT_CHECK_NEXT_POSE] = "next pose",
                                                         [SDM_FIT_CHECK_PATCH] = "patch",
-                                                        [SDM_FIT_CHECK_COVERED] = "covered"};
+                                                        [SDM_FIT_CHECK_COVERED] = "covered",
+                                                        [SDM_FIT_CHECK_NETWORK_ERROR] =
+                                                            "network bias"};
     return kind >= 0 && kind < SDM_FIT_N_CHECKS ? names[kind] : NULL;
 }
 

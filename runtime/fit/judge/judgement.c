@@ -45,6 +45,8 @@
 #define BORDER_MAX 0.1
 // largest fraction of the shapes of its family that a good network's grid cuts
 #define CUT_MAX 0.05
+// largest change of a parameter by exact maps, in standard deviations, that is not told
+#define NETWORK_ERROR_MAX 1.0
 
 // the tissue with the largest weight
 static const sdm_fit_law *main_law(const sdm_fit_law *law, size_t n)
@@ -356,6 +358,20 @@ static void check_maps(const fit_problem *p, sdm_fit_verdict *v)
         q->grade, 100 * q->cut);
 }
 
+// whether the error of the network moves a parameter by more than the data determine it
+static void check_network_error(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)
+{
+    if (isnan(r->network_error_sd)) return;
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_NETWORK_ERROR, r->network_error_sd <= NETWORK_ERROR_MAX,
+                      SDM_FIT_DOUBTFUL, r->network_error_sd, NETWORK_ERROR_MAX,
+                      "exact maps would move '%s' by about %.2g standard deviations: the error of "
+                      "the network limits this fit, and the standard deviations contain an "
+                      "estimate of it; a polish with exact maps "
+                      "(sdm_fit_opts.max_polish_iterations) ends it",
+                      sdm_model_get_info(p->source->model)->params[r->network_error_param].name,
+                      r->network_error_sd);
+}
+
 // The finding that explains a refusal: the first one that failed. Points that show too little come
 // before it; where a large part of the shape is not in the data, that it is not, instead of the
 // residuals that this makes; where the image shows a shape, a grid that cuts it; and a parameter
@@ -395,6 +411,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     if (!s && labels) s = sdm_fit_measure_beyond(p, r, &bounds, err);
     check_basics(p, r, v);
     check_maps(p, v);
+    check_network_error(p, r, v);
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     if (!s && points) sdm_fit_residuals_use_feet(p, &residuals);
     if (!s && points) s = sdm_fit_misfit(p, &residuals, &feet, err);

@@ -10,6 +10,7 @@
 #include "fit/solver/prior.h"
 #include "fit/solver/solve.h"
 #include "map_bias.h"
+#include "network_bias.h"
 #include "pose_params.h"
 #include "score_covariance.h"
 #include "sdm/memory.h"
@@ -122,11 +123,21 @@ static double model_error(const fit_problem *p)
 // sd of a variance; NaN for a negative one, since 0 would mean that the unknown is known exactly
 static double sd_of(double variance) { return variance >= 0 ? sqrt(variance) : NAN; }
 
+// keeps the parameter that the error of the network moves most: `more` and `variance`, the squared
+// move and the variance without it
+static void network_error_add(sdm_fit_result *out, size_t param, double more, double variance)
+{
+    const double moves = variance > 0 ? sqrt(more / variance) : 0;
+    if (out->network_error_sd >= moves) return;
+    out->network_error_sd = moves;
+    out->network_error_param = param;
+}
+
 // covariance, sd and correlation from the sandwich; bias[n][n]: what the voxels of the maps add to
-// the covariance; spread[n][n]: scratch memory
+// the covariance; change[n]: what exact maps change, NULL: not known; spread[n][n]: scratch memory
 static void covariance_fill(const fit_problem *p, const fit_score_covariance *scatter,
-                            const double *influence, const double *bias, double *spread,
-                            sdm_fit_result *out)
+                            const double *influence, const double *bias, const double *change,
+                            double *spread, sdm_fit_result *out)
 {
     const size_t n = p->information.n_unknowns, size = p->n_params + 6;
     const bool points = p->target->kind == SDM_FIT_POINTS;
@@ -150,8 +161,10 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
     // covariance, sd, correlation
     for (size_t i = 0; i < size; i++)
         for (size_t j = 0; j <= i; j++) {
-            const double c = sandwich(n, influence, spread, i, j) + bias[i * n + j];
-            out->covariance[i * size + j] = out->covariance[j * size + i] = c;
+            const double c = sandwich(n, influence, spread, i, j) + bias[i * n + j],
+                         more = change ? change[i] * change[j] : 0;
+            out->covariance[i * size + j] = out->covariance[j * size + i] = c + more;
+            if (change && i == j && i < p->n_params) network_error_add(out, i, more, c);
         }
     sdm_fit_pose_params_spread(p, out->covariance);
     for (size_t i = 0; i < 6; i++)
@@ -205,14 +218,22 @@ sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_erro
     double *work = NULL;
     sdm_status s = SDM_ALLOC(&work, 5 * n * n, "matrices of the fit", err);
     if (s) return s;
-    double *influence = work + 3 * n * n, *bias = work + 4 * n * n;
+    double *influence = work + 3 * n * n, *bias = work + 4 * n * n, change[FIT_UNKNOWNS_MAX];
     const bool known = influence_compute(p, true, influence, work);
     s = sdm_fit_score_covariance_create(p, model_mm, known ? influence : NULL, &scatter, err);
     out->noise_factor = scatter.noise_factor;
     memset(bias, 0, n * n * sizeof *bias);
     if (!s && known && p->target->kind == SDM_FIT_POINTS && !fit_maps_direct(&p->maps))
         s = sdm_fit_map_bias(p, influence, bias, err);
-    if (!s && known) covariance_fill(p, &scatter, influence, bias, work, out);
+    bool measured = !s && known && !p->is_rival && sdm_fit_can_measure_network(p);
+    if (measured) {
+        s = sdm_fit_network_bias(p, influence, change, err);
+        // a shape without a mesh here leaves the error unknown
+        measured = !s;
+        if (s != SDM_E_NOMEM && s != SDM_E_CANCELLED) s = SDM_OK;
+    }
+    if (!s && known)
+        covariance_fill(p, &scatter, influence, bias, measured ? change : NULL, work, out);
     if (!s && !known)
         s = sdm_fail(err, SDM_E_QUALITY,
                      "the image does not determine the shape: its information is singular");

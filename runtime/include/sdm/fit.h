@@ -42,8 +42,9 @@ extern "C" {
 typedef struct sdm_fit_source {
     /* the network that makes the maps; NULL: the exact engine makes them */
     const sdm_model *model;
-    /* the shape for the exact engine. May be NULL with a model: then there is no polish, and
-       SDM_RANGE_EXACT is not allowed. With a model, the parameters of the shape must be those of
+    /* the shape for the exact engine. May be NULL with a model: then there is no polish,
+       SDM_RANGE_EXACT is not allowed, and the error of the network is not measured
+       (sdm_fit_result.network_error_sd). With a model, the parameters of the shape must be those of
        the model, see sdm_runtime_instance() */
     const sdm_instance *shape;
     /* without a model: grid of the exact maps in the shape's frame; it must hold the shape with a
@@ -339,6 +340,8 @@ typedef enum sdm_fit_check_kind {
        the data may show a part of the shape only; failed beside more strays than 0.1 or
        sdm_fit_opts.tolerance */
     SDM_FIT_CHECK_COVERED,
+    /* network: sdm_fit_result.network_error_sd, at most 1; doubtful above */
+    SDM_FIT_CHECK_NETWORK_ERROR,
     SDM_FIT_N_CHECKS
 } sdm_fit_check_kind;
 
@@ -496,6 +499,12 @@ typedef struct sdm_fit_result {
     /* standard deviations of the pose as in sd[n_params ...], without those along open_motions:
        rad, mm; the same as in sd where there are none. NaN as sd */
     double pose_sd_determined[6];
+    /* network, with the shape in the source: the largest change of a parameter, over its standard
+       deviation, if exact maps on the same grid took the place of the network's, to first order;
+       and the index of this parameter. The squared changes are part of the covariance. NaN: not
+       measured */
+    double network_error_sd;
+    size_t network_error_param;
 } sdm_fit_result;
 
 /* Fits the shape of source to target. Errors: SDM_E_ARG: source, options or start, or no voxel near

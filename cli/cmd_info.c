@@ -18,6 +18,21 @@
 #include "sdm/model.h"
 #include "ssm/report_ssm.h"
 
+/* The uses for which the model is not good, in one line after the figures that tell why. */
+static void print_unfit(const sdm_model *model)
+{
+    static const char *const uses[] = {[SDM_USE_VOLUME] = "volumes",
+                                       [SDM_USE_DERIVATIVE] = "derivatives of maps",
+                                       [SDM_USE_VOLUME_DERIVATIVE] = "derivatives of volumes"};
+    bool first = true;
+    for (int use = SDM_USE_VOLUME; use <= SDM_USE_VOLUME_DERIVATIVE; use++) {
+        if (sdm_model_check_use(model, (sdm_model_use)use, NULL) != SDM_E_QUALITY) continue;
+        cli_print("%s%s", first ? "not for      " : ", ", uses[use]);
+        first = false;
+    }
+    if (!first) cli_print("\n");
+}
+
 static void print_model(const char *path, const sdm_model *model)
 {
     char hash[SDM_SHA256_TEXT];
@@ -50,6 +65,7 @@ static void print_model(const char *path, const sdm_model *model)
         "%.5f mm\n",
         a->q50_mm, a->q90_mm, a->q99_mm);
     cli_print_quality(&m->quality);
+    print_unfit(model);
     cli_print("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
               (long long)m->train_samples, (unsigned long long)m->seed, m->version);
     if (m->fine_width) cli_print("fine level   %zu units a layer (docs/grids.md)\n", m->fine_width);

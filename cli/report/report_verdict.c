@@ -87,12 +87,10 @@ static void print_unfit(const sdm_verdict *v)
             printf("volumes of surfaces (.stl): voxels of %.3g mm cut the edges of its parts, the "
                    "thinnest of which is %.2g mm thick%s\n",
                    v->coarse_mm, v->thickness_mm, advised_spacing(v, "keeps more of them", advice));
-    if (v->derivative_error > SDM_DERIVATIVE_BAD)
-        not_for(&first), printf("derivatives of maps by %s: off by %s %%\n", v->derivative_by,
-                                percent(v->derivative_error, text));
-    if (v->volume_derivative_error > SDM_DERIVATIVE_BAD)
-        not_for(&first), printf("derivatives of the volume by %s: off by %s %%\n",
-                                v->volume_derivative_by, percent(v->volume_derivative_error, text));
+    if (v->derivatives_bad[0])
+        not_for(&first), printf("derivatives of maps by %s\n", v->derivatives_bad);
+    if (v->volume_derivatives_bad[0])
+        not_for(&first), printf("derivatives of the volume by %s\n", v->volume_derivatives_bad);
     if (v->triangles_by[0])
         not_for(&first),
             printf("derivatives of exact maps (exact --jacobian, fit --exact or --polish) where "

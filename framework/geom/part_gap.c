@@ -1,9 +1,14 @@
-/* How far a part of a mesh lies from the other parts. */
+/* How far a part of a mesh lies from the other parts. The points of two surfaces that are nearest
+   to each other are found from many points of the one surface by projections from each surface to
+   the other in turn (Cheney and Goldstein 1959). */
 #include <math.h>
+#include <string.h>
 
 #include "sdm/exact.h"
 #include "sdm/internal/part_audit.h"
 #include "sdm/memory.h"
+
+enum { STEPS = 200 }; // projections
 
 // true if the vertices of another part have numbers among those of part `index`
 static bool is_mixed(const sdm_part_audit *a, size_t index)
@@ -16,38 +21,68 @@ static bool is_mixed(const sdm_part_audit *a, size_t index)
     return false;
 }
 
-// the triangles of all parts but one; vertices of that one stay, unused
-static sdm_status others_of(const sdm_mesh *mesh, const sdm_part *part, sdm_mesh *out)
+// the triangles of one part, or of all others; the vertices of the rest stay, unused
+static sdm_status triangles_of(const sdm_mesh *mesh, const sdm_part *part, bool own, sdm_mesh *out)
 {
     const sdm_status s = sdm_mesh_copy(mesh, out, NULL);
     if (s) return s;
     out->n_tri = 0;
     for (size_t t = 0; t < mesh->n_tri; t++) {
         const uint32_t *corner = mesh->tri + 3 * t;
-        if (corner[0] >= part->first_vert && corner[0] <= part->last_vert) continue;
+        if ((corner[0] >= part->first_vert && corner[0] <= part->last_vert) != own) continue;
         for (int k = 0; k < 3; k++) out->tri[3 * out->n_tri + (size_t)k] = corner[k];
         out->n_tri++;
     }
     return SDM_OK;
 }
 
+// a point of the surface of `own` that is near to that of `others`: the nearest one of the corners,
+// the middles of the edges and of the triangles
+static double near_point(const sdm_mesh *own, const sdm_exact *others, double x[3])
+{
+    static const double at[7][3] = {{1, 0, 0},
+                                    {0, 1, 0},
+                                    {0, 0, 1},
+                                    {0.5, 0.5, 0},
+                                    {0, 0.5, 0.5},
+                                    {0.5, 0, 0.5},
+                                    {1. / 3, 1. / 3, 1. / 3}};
+    double least = INFINITY;
+    for (size_t t = 0; t < own->n_tri; t++)
+        for (int k = 0; k < 7; k++) {
+            double p[3] = {0};
+            for (size_t c = 0; c < 3; c++)
+                for (size_t a = 0; a < 3; a++)
+                    p[a] += at[k][c] * own->vert[3 * (size_t)own->tri[3 * t + c] + a];
+            const double d = sdm_exact_distance(others, p);
+            if (d < least) least = d, memcpy(x, p, sizeof p);
+        }
+    return least;
+}
+
 double sdm_part_gap(const sdm_mesh *m, const sdm_part_audit *a, size_t index)
 {
     const sdm_part *part = &a->part[index];
-    const size_t n = part->last_vert - part->first_vert + 1;
-    sdm_mesh others = {0};
-    sdm_exact *engine = NULL;
-    double *distance = NULL, least = NAN;
+    const sdm_exact_opts opts = {.keep_overlap = true, .n_threads = 1};
+    sdm_mesh mesh[2] = {{0}};
+    sdm_exact *engine[2] = {NULL};
+    double x[3], least = NAN;
     if (a->n < 2 || is_mixed(a, index)) return NAN;
-    sdm_status s = others_of(m, part, &others);
-    if (!s) s = sdm_exact_create(&others, NULL, &engine, NULL);
-    if (!s) s = SDM_ALLOC(&distance, n, "distances", NULL);
-    if (!s)
-        s = sdm_exact_points(engine, m->vert + 3 * part->first_vert, n,
-                             &(sdm_exact_at){.distance = distance}, NULL);
-    for (size_t i = 0; i < n && !s; i++) least = fmin(least, fabs(distance[i]));
-    sdm_free(distance);
-    sdm_exact_free(engine);
-    sdm_mesh_dispose(&others);
+    sdm_status s = SDM_OK;
+    for (int own = 0; own < 2 && !s; own++) {
+        s = triangles_of(m, part, own, &mesh[own]);
+        if (!s) s = sdm_exact_create(&mesh[own], &opts, &engine[own], NULL);
+    }
+    if (!s) least = near_point(&mesh[1], engine[0], x);
+    for (int i = 0; i < STEPS && !s; i++) {
+        double nearest[3];
+        const double d = fabs(sdm_exact_point(engine[i % 2], x, nearest, NULL, NULL));
+        memcpy(x, nearest, sizeof nearest);
+        least = fmin(least, d);
+    }
+    for (int own = 0; own < 2; own++) {
+        sdm_exact_free(engine[own]);
+        sdm_mesh_dispose(&mesh[own]);
+    }
     return least;
 }

@@ -6,6 +6,7 @@ model=../files-of-train/run/model.sdm
 present $model
 
 expect 0 - sdmgen info $model
+has "^not for +volumes, derivatives of maps, derivatives of volumes$" # a network of seconds
 has "of shape 'cochlea'"
 has '^parameters +a +2 \.\. 5 mm, default [0-9.]+, uniform$'
 has '^verdict +(good|usable|poor); the grid cuts [0-9.]+ % of the held-out shapes$'

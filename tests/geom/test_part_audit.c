@@ -175,6 +175,22 @@ static void test_cavity_and_parts_apart(void **state)
     sdm_mesh_dispose(&m);
 }
 
+/* A long bar beside a small box: its vertices lie far from the box, its middle near. */
+static void test_gap_of_a_bar(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    add_box(&m, -1, 1, 1, false);
+    add_box(&m, -1, 1, 1, false);
+    for (size_t v = 8; v < 16; v++) m.vert[3 * v + 1] *= 100, m.vert[3 * v] += 5.25;
+    sdm_part_audit a = audit_of(&m);
+    assert_int_equal(a.n, 2);
+    near(sdm_part_gap(&m, &a, 0), 3.25);
+    near(sdm_part_gap(&m, &a, 1), 3.25);
+    sdm_part_audit_dispose(&a);
+    sdm_mesh_dispose(&m);
+}
+
 /* An open box: the engine turns nothing, and the closed box beside it that is inside out is not
  * solid. */
 static void test_open_and_flat_parts(void **state)
@@ -341,6 +357,7 @@ int main(void)
         cmocka_unit_test(test_parts_that_share_an_edge),
         cmocka_unit_test(test_boxes_with_a_common_face),
         cmocka_unit_test(test_cavity_and_parts_apart),
+        cmocka_unit_test(test_gap_of_a_bar),
         cmocka_unit_test(test_open_and_flat_parts),
         cmocka_unit_test(test_thickness),
         cmocka_unit_test(test_outline_that_crosses_itself),

@@ -177,10 +177,16 @@ static void take_largest(const slope_sums *sums, size_t n, derivative_check *out
     for (size_t k = 0; k < n; k++) {
         const double slope = sqrt(sums[k].error / sums[k].size),
                      volume = sqrt(sums[k].volume_error / sums[k].volume_size);
+        out->slopes[k] = slope, out->volume_slopes[k] = volume;
         if (!(slope <= out->slope) && isfinite(slope)) out->slope = slope, out->slope_param = k;
         if (!(volume <= out->volume_slope) && isfinite(volume))
             out->volume_slope = volume, out->volume_slope_param = k;
     }
+}
+
+void trainer_derivatives_unknown(derivative_check *out)
+{
+    *out = (derivative_check){.volume = NAN, .volume_max = NAN, .slope = NAN, .volume_slope = NAN};
 }
 
 static size_t least_of(size_t a, size_t b) { return a < b ? a : b; }
@@ -197,7 +203,7 @@ sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, deriva
     slope_sums sums[SDM_POD_MAX_PARAMS] = {{0}};
     double square = 0, largest = 0, p[SDM_POD_MAX_PARAMS];
     size_t n = 0, n_slopes = 0;
-    *out = (derivative_check){NAN, NAN, NAN, NAN, 0, 0};
+    trainer_derivatives_unknown(out);
     sdm_status s = memory_create(t, m, slopes, &c, err);
     for (size_t i = 0; i < least_of(d->n_holdout, 4 * VOLUMES) && n < VOLUMES && !s; i++)
         s = check_volume(t, m, i, &c, &square, &largest, &n, err);

@@ -16,6 +16,8 @@ typedef struct derivative_check {
        than 5 % over its range, these 5 % count as its root mean square. NaN: not measured. */
     double slope, volume_slope;
     size_t slope_param, volume_slope_param;
+    /* the same of every parameter */
+    double slopes[SDM_POD_MAX_PARAMS], volume_slopes[SDM_POD_MAX_PARAMS];
 } derivative_check;
 
 /* Measures m. Computes about 64 exact maps, or two for each parameter if that is more. A model
@@ -24,3 +26,6 @@ typedef struct derivative_check {
    bits for any number] */
 sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, derivative_check *out,
                                     sdm_error *err);
+
+/* Sets *out to figures that are not known. */
+void trainer_derivatives_unknown(derivative_check *out);

@@ -371,7 +371,7 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
     sdm_error why = {0};
     if (!s && trainer_derivative_check(t, model, &more.derivatives, &why)) {
         // no reason to lose the network: a notice only
-        more.derivatives = (derivative_check){NAN, NAN, NAN, NAN, 0, 0};
+        trainer_derivatives_unknown(&more.derivatives);
         trainer_message(t, "volumes and derivatives were not measured: %s", why.text);
     }
     sdm_model_free(model);

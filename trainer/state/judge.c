@@ -321,6 +321,26 @@ static void set_parts(const error_measures *m, const model_errors *errors, doubl
     }
 }
 
+/* text[size] = the parameters p[n] whose errors exceed SDM_DERIVATIVE_BAD, the worst first. */
+static void list_bad(const sdm_param *p, const double *error, size_t n, char *text, size_t size)
+{
+    size_t used = 0;
+    double last = INFINITY;
+    for (;;) {
+        size_t worst = n;
+        for (size_t k = 0; k < n; k++)
+            if (error[k] < last && (worst == n || error[k] > error[worst])) worst = k;
+        if (worst == n || !(error[worst] > SDM_DERIVATIVE_BAD)) return;
+        last = error[worst];
+        char one[112];
+        const int length = snprintf(one, sizeof one, "%s%.60s: off by %.0f %%", used ? "; by " : "",
+                                    p[worst].name, 100 * last);
+        const bool fits = used + (size_t)length + sizeof "; ..." <= size;
+        used += (size_t)snprintf(text + used, size - used, "%s", fits ? one : "; ...");
+        if (!fits) return;
+    }
+}
+
 static void set_derivatives(const trainer *t, const derivative_check *c, sdm_verdict *v)
 {
     size_t n;
@@ -329,6 +349,10 @@ static void set_derivatives(const trainer *t, const derivative_check *c, sdm_ver
     v->volume_error_max = c->volume_max;
     v->derivative_error = c->slope;
     v->volume_derivative_error = c->volume_slope;
+    list_bad(p, c->slopes, isfinite(c->slope) ? n : 0, v->derivatives_bad,
+             sizeof v->derivatives_bad);
+    list_bad(p, c->volume_slopes, isfinite(c->volume_slope) ? n : 0, v->volume_derivatives_bad,
+             sizeof v->volume_derivatives_bad);
     if (isfinite(c->slope))
         snprintf(v->derivative_by, sizeof v->derivative_by, "%.60s", p[c->slope_param].name);
     if (isfinite(c->volume_slope))

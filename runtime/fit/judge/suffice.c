@@ -77,8 +77,8 @@ static sdm_status spread(const fit_problem *p, double *wide, sdm_error *err)
     return SDM_OK;
 }
 
-sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sdm_fit_verdict *v,
-                                sdm_error *err)
+sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, double noise_factor,
+                                sdm_fit_verdict *v, sdm_error *err)
 {
     const size_t unknowns = free_unknowns(p);
     size_t n = 0;
@@ -88,7 +88,17 @@ sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sd
     (void)sdm_fit_extent(&p->maps, &e, NULL);
     const sdm_status status = spread(p, &wide, err);
     if (status) return status;
-    if (n < unknowns)
+    // points whose residuals agree with those of their neighbours tell little more than one of them
+    const double independent = (double)n / fmax(noise_factor, 1);
+    if (n >= unknowns && independent < (double)unknowns)
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_DOUBTFUL, independent,
+                          (double)unknowns,
+                          "%zu points count as few as %.2g independent ones, less than the %zu "
+                          "unknowns, because whole neighbourhoods lie on one side of the surface: "
+                          "the points show another shape than this, and the standard deviations "
+                          "cannot be trusted",
+                          n, independent, unknowns);
+    else if (n < unknowns)
         sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_FAILED, (double)n, (double)unknowns,
                           "%zu points on the surface cannot determine %zu unknowns: give at least "
                           "as many, or keep the parameters or the pose",

@@ -4,9 +4,10 @@
 
 #include "residuals.h"
 
-/* Adds the findings "data" and "size" of a fit to points. SDM_E_NOMEM. */
-sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, sdm_fit_verdict *v,
-                                sdm_error *err);
+/* Adds the findings "data" and "size" of a fit to points. noise_factor: see sdm_fit_result.
+   SDM_E_NOMEM. */
+sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, double noise_factor,
+                                sdm_fit_verdict *v, sdm_error *err);
 
 /* What the voxels of the maps show. */
 typedef struct fit_coarseness {

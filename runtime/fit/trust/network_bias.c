@@ -19,7 +19,8 @@ static void sample_add(const fit_problem *p, const fit_maps *exact, size_t i, do
 {
     const fit_samples *s = &p->samples;
     const fit_observation *obs = &p->observation;
-    const float *column = s->jacobian + s->row[i] * s->n_columns, *weights = fit_sample_weights(s, i);
+    const float *column = s->jacobian + s->row[i] * s->n_columns,
+                *weights = fit_sample_weights(s, i);
     const double value = (double)s->value[i],
                  field = sdm_fit_maps_at(exact, &p->state, s->world + 3 * i);
     fit_likelihood by_network, by_exact;

@@ -309,7 +309,9 @@ typedef enum sdm_fit_check_kind {
        where the training graded the network poor, see sdm_model_quality */
     SDM_FIT_CHECK_NETWORK,
     /* points: number of those on the surface, at least that of the unknowns: the pose, and the
-       parameters without a normal distribution; doubtful below three times as many.
+       parameters without a normal distribution; doubtful below three times as many, and where as
+       many independent ones (the number over sdm_fit_result.noise_factor, the figure then) are
+       fewer than the unknowns.
        Labels: the longest edge of their voxels, mm, at most the thickness of the thinnest part of
        the shape; doubtful above. All data: failed where they determine none of the parameters
        (sdm_fit_result.by_prior) */

@@ -66,11 +66,14 @@ sdm_status cli_fit_explain_contrast(cli_fit *f, sdm_error *err)
     for (size_t i = 0; i < v->n_findings; i++) *v->findings[i].text = '\0';
     sdm_fit_finding why = {
         .kind = SDM_FIT_CHECK_CONTRAST, .grade = SDM_FIT_FAILED, .figure = a - b, .limit = 0};
+    const bool given = !isnan(f->args->fit.inside[0]) || !isnan(f->args->fit.outside[0]);
     snprintf(why.text, sizeof why.text,
              "the values of the inside and the outside are exchanged: at the start the image is "
-             "%.4g within the shape and %.4g around it, but the inside was given as %.4g and the "
-             "outside as %.4g: exchange --inside and --outside",
-             a, b, inside, outside);
+             "%.4g within the shape and %.4g around it, but the inside %s %.4g and the outside "
+             "%.4g: %s",
+             a, b, given ? "was given as" : "has the default value", inside, outside,
+             given ? "exchange --inside and --outside"
+                   : "give the values of this image with --inside and --outside");
     sdm_fit_verdict_add(v, &why);
     snprintf(f->doubt.text, sizeof f->doubt.text, "%s", why.text);
     f->exchanged = true;

@@ -40,6 +40,8 @@
 #define PATCH_MAX_UNCOVERED 0.01
 #define UNCOVERED_MAX 0.02
 #define STRAYS_MAX_UNCOVERED 0.1
+// share of the surface without points from which on parameters at their bounds are no chance
+#define MOSTLY_UNCOVERED 0.5
 
 typedef struct cloud {
     double (*x)[3];
@@ -163,6 +165,15 @@ static double share_uncovered(const cloud *surface, const cloud *on, const cloud
     return surface->n ? (double)bare / (double)surface->n : 0;
 }
 
+/* Share of the parameters that end at a bound. */
+static double share_at_bounds(const fit_problem *p)
+{
+    size_t at = 0;
+    for (size_t k = 0; k < p->n_params; k++)
+        at += !(p->state.params[k] > p->low[k] && p->state.params[k] < p->high[k]);
+    return p->n_params && !p->opts->keep_params ? (double)at / (double)p->n_params : 0;
+}
+
 sdm_status sdm_fit_check_coverage(const fit_problem *p, sdm_fit_verdict *v, sdm_error *err)
 {
     cloud on = {0}, strays = {0}, surface = {0};
@@ -177,6 +188,7 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, sdm_fit_verdict *v, sdm_
                      patch = (double)count_patch(&strays, spacing) / (double)(on.n + strays.n),
                      bare = share_uncovered(&surface, &on, &strays, REACH * spacing + 3 * sd),
                      stray = (double)strays.n / (double)(on.n + strays.n);
+        const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
         const bool both = bare > UNCOVERED_MAX && patch > fmin(PATCH_MAX_UNCOVERED, most);
         const bool failed = patch > most || both;
@@ -192,13 +204,16 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, sdm_fit_verdict *v, sdm_
                           "(sdm_fit_opts.tolerance allows more)",
                           100 * patch);
         sdm_fit_judge_add(v, SDM_FIT_CHECK_COVERED, bare <= UNCOVERED_MAX,
-                          grown ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, bare, UNCOVERED_MAX,
+                          grown || other ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, bare, UNCOVERED_MAX,
                           "%.0f %% of the fitted surface has no points near it, and %.0f %% of the "
                           "points lie on no surface of the shape: %s",
                           100 * bare, 100 * stray,
-                          grown ? "a fit that stopped at a wrong shape; give a better start, or "
-                                  "take the strays out (sdm_fit_opts.tolerance allows more)"
-                                : "the data show a part of the shape only, or it is too large");
+                          grown   ? "a fit that stopped at a wrong shape; give a better start, or "
+                                    "take the strays out (sdm_fit_opts.tolerance allows more)"
+                          : other ? "most of it, and half of the parameters or more end at their "
+                                    "bounds: the data show another shape, or their lengths are in "
+                                    "another unit"
+                                  : "the data show a part of the shape only, or it is too large");
     }
     sdm_free(on.x);
     sdm_free(strays.x);

@@ -22,6 +22,8 @@
 #include "sdm/internal/vec3.h"
 
 // a surface that has this Dice coefficient with that of the fit is no rival
+// log-likelihood by which another shape or pose must be better to refuse a fit to points
+#define CLEARLY_BETTER 30.0
 #define ALIKE 0.9
 // a turn to a surface with a higher one is a symmetry of the shape, up to the voxels of the map
 #define SYMMETRIC 0.9875
@@ -406,10 +408,13 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
         snprintf(where, sizeof where, "with another value of %.60s, %.4g,", name, least.value);
     snprintf(text, sizeof text,
              "the shape %s explains the data %s (log-likelihood of the fit less that of the other: "
-             "%.2g): give a nearer start, or more turns",
-             where, least.gain < 0 ? "better" : "as well", least.gain);
-    // errors of coarse maps at sharp edges weigh more in fits to points than such a gain
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, false, points ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED,
+             "%.2g): %s",
+             where, least.gain < 0 ? "better" : "as well", least.gain,
+             name ? "start from this value (sdm_fit_opts.start_params)"
+                  : "give a nearer start, or more turns");
+    // errors of coarse maps at sharp edges weigh more in fits to points than a small gain
+    const bool doubt = points && least.gain > -CLEARLY_BETTER;
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, false, doubt ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED,
                       least.gain, SDM_FIT_PREFERRED, "%s", text);
-    return points ? SDM_OK : sdm_fail(err, SDM_E_QUALITY, "%s", text);
+    return doubt ? SDM_OK : sdm_fail(err, SDM_E_QUALITY, "%s", text);
 }

@@ -331,7 +331,7 @@ typedef enum sdm_fit_check_kind {
        as sdm_fit_compare(). Poses in which the surface is nearly the same (Dice coefficient above
        0.9) do not count. Left out where every such start leads back to the fit, where the pose is
        kept, where a check failed, and where points lie too far apart to be tested. Points: doubtful
-       at most */
+       above -30 */
     SDM_FIT_CHECK_NEXT_POSE,
     /* points: share of those that lie on no surface of the shape but form one: neighbours as near
        as those on the shape, or in a thin layer; at most 0.05 or sdm_fit_opts.tolerance, and 0.01
@@ -340,7 +340,8 @@ typedef enum sdm_fit_check_kind {
     SDM_FIT_CHECK_PATCH,
     /* points: share of the fitted surface without points near it, at most 0.02. Doubtful, because
        the data may show a part of the shape only; failed beside more strays than 0.1 or
-       sdm_fit_opts.tolerance */
+       sdm_fit_opts.tolerance, and where more than 0.5 are without points and half of the
+       parameters end at their bounds */
     SDM_FIT_CHECK_COVERED,
     /* network: sdm_fit_result.network_error_sd, at most 1; doubtful above */
     SDM_FIT_CHECK_NETWORK_ERROR,

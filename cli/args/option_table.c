@@ -236,8 +236,9 @@ const cli_option cli_options[] = {
      "head); default: the grid is centred on the mesh"},
     {"size", 0, CLI_INT3, "NX,NY,NZ", NULL, 1, 1048576, ON(CLI_GENERATE), AT(size),
      "number of voxels along x, y, z (default: the grid fills the box of the model's voxel "
-     "centres). In "
-     "other proportions than this box the grid leaves it unless --spacing is given: --outside"},
+     "centres). "
+     "Without --spacing the voxels are cubes that cover this box; where its proportions are "
+     "others, the grid reaches beyond it, which --outside must allow"},
     {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_GENERATE), AT(spacing),
      "edge of a voxel, mm: one number, or three for x, y, z (default: the model's; with --size the "
      "smallest one "

@@ -1,7 +1,7 @@
 /* Distances of points from the surface of a shape, without voxels: their derivatives and those of
  * the area against differences, on the surface and on a map; and fits to points of a hollow shape,
  * whose walls hold its ends at wrong places.
- * Tests: shape_surface.c map_area.c even_points.c map_bias.c averaged_gradient.c */
+ * Tests: shape_surface.c map_area.c even_points.c map_bias.c network_bias.c averaged_gradient.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

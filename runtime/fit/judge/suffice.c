@@ -37,6 +37,10 @@
 // from this share on, thin walls bend the distance, not edges
 #define WALLS_MIN 0.3
 
+// scatter of points about the surface, over the radius of the largest ball inside, from which on
+// residuals that agree with their neighbours show another shape
+#define SCATTER_OVER_RADIUS 0.05
+
 // points for each unknown that also test the fit: with fewer, most shapes pass close by all points
 #define POINTS_PER_UNKNOWN 3
 
@@ -90,7 +94,9 @@ sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, do
     if (status) return status;
     // points whose residuals agree with those of their neighbours tell little more than one of them
     const double independent = (double)n / fmax(noise_factor, 1);
-    if (n >= unknowns && independent < (double)unknowns)
+    // residuals of a surface that fits are small and agree, too: they are errors of triangles and maps
+    const bool scattered = p->state.point_sd > SCATTER_OVER_RADIUS * sdm_fit_inradius(&p->maps);
+    if (n >= unknowns && scattered && independent < (double)unknowns)
         sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_DOUBTFUL, independent,
                           (double)unknowns,
                           "%zu points count as few as %.2g independent ones, less than the %zu "

@@ -140,6 +140,26 @@ static bool compares_surface(const job *j)
     return cli_writes_surface(j->args) || (cli_writes_level_set(j->args) && j->n_rows == 1);
 }
 
+/* Warns if the shape of the model is that of a plug-in that was changed after the training. */
+static void warn_changed(const job *j)
+{
+    sdm_registry *registry = NULL;
+    sdm_instance *shape = NULL;
+    sdm_error why = {0};
+    size_t i = 0;
+    if (!cli_open_registry(j->args, &registry, NULL)) {
+        while (i < sdm_registry_count(registry) &&
+               strcmp(sdm_registry_at(registry, i)->name, j->info->shape))
+            i++;
+        if (i < sdm_registry_count(registry) &&
+            strcmp(sdm_registry_origin(registry, i), "built in") &&
+            sdm_runtime_instance(j->model, registry, &shape, &why) == SDM_E_PLUGIN)
+            cli_warn("%s: %s", j->args->files.items[0], why.text);
+    }
+    sdm_instance_free(shape);
+    sdm_registry_free(registry);
+}
+
 /* Creates the shape if --check, --max-error, --measure, --policy exact or --outside exact need
  * it; also, if it is known, to compare surfaces with. */
 static sdm_status open_shape(job *j, sdm_error *err)
@@ -148,7 +168,10 @@ static sdm_status open_shape(job *j, sdm_error *err)
     const bool checks = args->check || args->max_error > 0 || args->measure;
     const bool exact =
         cli_policy(args) == SDM_RANGE_EXACT || cli_outside(args) == SDM_OUTSIDE_EXACT;
-    if (!checks && !exact && !compares_surface(j)) return SDM_OK;
+    if (!checks && !exact && !compares_surface(j)) {
+        warn_changed(j);
+        return SDM_OK;
+    }
     sdm_error why = {0};
     sdm_status s = cli_open_registry(args, &j->registry, &why);
     if (!s) s = sdm_runtime_instance(j->model, j->registry, &j->shape, &why);

@@ -10,14 +10,13 @@
 #include "sdm/memory.h"
 
 /* Finds the shape of the model, if it is a built-in one or a plug-in that is loaded, for the checks
- * that compare the network with it. Warns if --plugin names a shape that was changed after the
+ * that compare the network with it. Warns if the shape was changed after the
  * training: the fit takes the network alone and would not notice. */
 static void find_shape(cli_fit *f)
 {
     sdm_error why = {0};
     if (!cli_open_registry(f->args, &f->judge_registry, &why) &&
-        sdm_runtime_instance(f->model, f->judge_registry, &f->judge_shape, &why) == SDM_E_PLUGIN &&
-        f->args->plugins.n)
+        sdm_runtime_instance(f->model, f->judge_registry, &f->judge_shape, &why) == SDM_E_PLUGIN)
         cli_warn("%s", why.text);
 }
 

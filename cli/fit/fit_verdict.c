@@ -34,7 +34,6 @@ static const char *const MEANINGS[SDM_FIT_N_CHECKS] = {
     [SDM_FIT_CHECK_MIRROR] = "gain over the mirror image",
     [SDM_FIT_CHECK_GRID] = "depth of the border of the maps in the shape, mm",
     [SDM_FIT_CHECK_NETWORK] = "share of the shapes that the model's grid cuts",
-    [SDM_FIT_CHECK_DATA] = "points on the surface; labels: their voxel, mm",
     [SDM_FIT_CHECK_SIZE] = "spread of the points, mm",
     [SDM_FIT_CHECK_VOXELS] = "voxel of the maps, mm",
     [SDM_FIT_CHECK_NEXT_POSE] = "gain over the next best pose or parameter",
@@ -63,26 +62,35 @@ static const char *bound_name(const sdm_fit_finding *x)
     }
 }
 
+/* Prints one check: its name, grade and figure, and why it did not pass or what the figure is. */
+static void print_finding(const cli_fit *f, const sdm_fit_finding *x)
+{
+    const bool points = f->target.kind == SDM_FIT_POINTS;
+    const char *meaning = x->kind != SDM_FIT_CHECK_DATA ? MEANINGS[x->kind]
+                          : points                      ? "points on the surface"
+                                   : "longest edge of a voxel of the labels, mm";
+    char figure[64] = "";
+    int n = 0;
+    // + 0: no negative zero
+    if (!isnan(x->figure)) n = snprintf(figure, sizeof figure, "%.3g", x->figure + 0);
+    if (!isnan(x->limit))
+        snprintf(figure + n, sizeof figure - (size_t)n, ", need %s %.3g", bound_name(x), x->limit);
+    printf("  %-12s %-9s", sdm_fit_check_name(x->kind), GRADES[x->grade]);
+    if (*x->text)
+        printf(" %s%s%s\n", figure, *figure ? ": " : "", x->text);
+    else
+        printf(" %-28s %s\n", figure, meaning);
+}
+
 void cli_fit_print_verdict(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
     if (!v->n_findings) return;
     printf("verdict: %s\n", cli_fit_grade_name(v->grade));
-    for (size_t i = 0; i < v->n_findings; i++) {
-        const sdm_fit_finding *x = &v->findings[i];
-        char figure[64] = "";
-        int n = 0;
-        // + 0: no negative zero
-        if (!isnan(x->figure)) n = snprintf(figure, sizeof figure, "%.3g", x->figure + 0);
-        if (!isnan(x->limit))
-            snprintf(figure + n, sizeof figure - (size_t)n, ", need %s %.3g", bound_name(x),
-                     x->limit);
-        printf("  %-12s %-9s", sdm_fit_check_name(x->kind), GRADES[x->grade]);
-        if (*x->text)
-            printf(" %s%s%s\n", figure, *figure ? ": " : "", x->text);
-        else
-            printf(" %-28s %s\n", figure, MEANINGS[x->kind]);
-    }
+    // the worst first
+    for (int grade = SDM_FIT_FAILED; grade >= SDM_FIT_PASSED; grade--)
+        for (size_t i = 0; i < v->n_findings; i++)
+            if ((int)v->findings[i].grade == grade) print_finding(f, &v->findings[i]);
     if (v->grade == SDM_FIT_FAILED && !f->exchanged && f->opts.turns == SDM_FIT_TURNS_NONE &&
         !isnan(f->args->pose.rotation[0]))
         printf("  --rotation gives one start: without it the fit tries 60 rotations\n");

@@ -94,7 +94,8 @@ sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, do
     if (status) return status;
     // points whose residuals agree with those of their neighbours tell little more than one of them
     const double independent = (double)n / fmax(noise_factor, 1);
-    // residuals of a surface that fits are small and agree, too: they are errors of triangles and maps
+    // residuals of a surface that fits are small and agree, too: they are errors of triangles and
+    // maps
     const bool scattered = p->state.point_sd > SCATTER_OVER_RADIUS * sdm_fit_inradius(&p->maps);
     if (n >= unknowns && scattered && independent < (double)unknowns)
         sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_DOUBTFUL, independent,

@@ -28,9 +28,10 @@ expect 0 - $torus turned.nii --json
 has '"rotation_sd_determined_rad": *\[0\.0'
 
 # Exchanged values of the tissues are the only cause that is named, for a thin shape beside its place, too.
-expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside are exchanged: .*: exchange --inside and --outside$' \
+expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside are exchanged: .*: exchange --inside and --outside, or give the values of this image$' \
     $torus turned.nii --inside 1300,270 --outside 40,170
-has '^  given values doubtful  [0-9.]+, limit 3$'
+has '^  given values doubtful  [0-9.]+, need at most 3 '
+grep -q 'other values than those of this kind of image' out && bad 'another cause beside exchanged values'
 grep -q -- '--rotation gives one start' out && bad 'advice on the start beside exchanged values'
 expect 0 - sdmgen phantom --shape cochlea -O edge=0.6 --spacing 0.4 --random-pose 10,0.3 --seed 1 -o thin.nii --quiet
 expect 4 '^sdmgen: error: thin.nii: the values of the inside and the outside are exchanged: [^;]*$' \

@@ -28,7 +28,7 @@ expect 0 - $torus turned.nii --json
 has '"rotation_sd_determined_rad": *\[0\.0'
 
 # Exchanged values of the tissues are the only cause that is named, for a thin shape beside its place, too.
-expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside are exchanged: .*: exchange --inside and --outside, or give the values of this image$' \
+expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside are exchanged: .*: exchange --inside and --outside$' \
     $torus turned.nii --inside 1300,270 --outside 40,170
 has '^  given values doubtful  [0-9.]+, need at most 3 '
 grep -q 'other values than those of this kind of image' out && bad 'another cause beside exchanged values'

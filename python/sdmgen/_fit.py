@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from . import _abi
 from ._arrays import Float32, Float64, Triple, address, choice, copied, finite, flag, float32, float64, instance, number, triple, whole, words
-from ._errors import FormatError, QualityError, argument_error, with_arguments
+from ._errors import Error, FormatError, QualityError, argument_error, with_arguments
 from ._files import IMAGES, MESHES, _ends, read_array, read_image
 from ._grid import Grid, Pose, grid_around
 from ._library import Callbacks, call, function, make
@@ -282,13 +282,21 @@ def _open_source(
     if policy == "clamp":
         start = np.clip(start, low, high)
     if isinstance(source, Model):
-        shape = source.shape if exact or polish or policy == "exact" else None
+        shape = source.shape if exact or polish or policy == "exact" else _known_shape(source)
         if not exact:
             return _Source(source, shape, None, rule), start, clamped
         assert shape is not None
         grid = source.grid if spacing is None else _exact_grid(shape, start, spacing)
         return _Source(None, shape, grid, rule), start, clamped
     return _Source(None, source, _exact_grid(source, start, spacing), rule), start, clamped
+
+
+def _known_shape(model: Model) -> Optional[Shape]:
+    """The shape of a model for the checks of a fit through its network; None: not known, or another one."""
+    try:
+        return model.shape
+    except Error:
+        return None
 
 
 def _exact_grid(shape: Shape, start: Float64, spacing: Any) -> Grid:

@@ -195,6 +195,41 @@ static void test_many_points(void **state)
     subject_dispose(&s);
 }
 
+/* Many points for each triangle, most of them near the surface, so that vectors of two registers
+ * are searched: as one by one, by every instruction set. */
+static void test_dense_points(void **state)
+{
+    (void)state;
+    enum { N = 4000 };
+    sdm_error err = {0};
+    static double x[N][3], distance[N];
+    static uint32_t triangle[N];
+    for (uint64_t i = first; i < first + n_meshes; i += 8) {
+        subject s;
+        subject_make(&s, i, NULL);
+        for (size_t k = 0; k < N; k++) {
+            random_point(&s.mesh, &s.dice, x[k]);
+            for (int a = 0; a < 3; a++)
+                x[k][a] += (k % 4 ? 0.02 : 1) * s.size * roll(&s.dice, -1, 1);
+        }
+        for (int level = SDM_PROCESSOR_BASELINE; level < SDM_PROCESSOR_AVX512VNNI; level++) {
+            if (sdm_processor_select(level) != level) continue;
+            if (sdm_exact_points(s.engine, &x[0][0], N,
+                                 &(sdm_exact_at){.distance = distance, .triangle = triangle}, &err))
+                fail_msg("%s", err.text);
+            for (size_t k = 0; k < N; k++) {
+                uint32_t nearest;
+                const double d = sdm_exact_point(s.engine, x[k], NULL, NULL, &nearest);
+                CHECK(distance[k] == d && triangle[k] == nearest, &s, x[k],
+                      "%.17g to triangle %u, one by one %.17g to %u", distance[k], triangle[k], d,
+                      nearest);
+            }
+        }
+        sdm_processor_select(-1);
+        subject_dispose(&s);
+    }
+}
+
 /* Memory limit and cancellation. */
 static bool stop_now(void *user) { return *(bool *)user; }
 static void test_limits(void **state)
@@ -225,9 +260,8 @@ int main(int argc, char **argv)
 {
     subject_range(argc, argv, &n_meshes, &first);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points),
-        cmocka_unit_test(test_points_match_maps),
-        cmocka_unit_test(test_many_points),
+        cmocka_unit_test(test_points),      cmocka_unit_test(test_points_match_maps),
+        cmocka_unit_test(test_many_points), cmocka_unit_test(test_dense_points),
         cmocka_unit_test(test_limits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -16,7 +16,8 @@
 #include "simd/lanes_two.h"
 
 #define CHUNK ((size_t)1 << 22) // points that are sorted together; bounds the memory
-#define BLOCKS 16               // blocks of points that a thread takes at a time
+#define BLOCKS 8                // blocks of points that a thread takes at a time
+#define WIDE 5 // points for each triangle from which on vectors of two registers take less time
 
 /* Is x a usable point? False for NaN and for coordinates whose squares could overflow. */
 static bool is_point(const double x[3])
@@ -164,6 +165,8 @@ typedef struct chunk {
     bool usable;
     // so they are, and distances are wanted and nothing else
     bool plain;
+    // vectors of two registers are tried first
+    bool wide;
     // a point farther from the surface than this, mm, lies on the side that its feature tells
     double certain;
     const sdm_exact_at *out;
@@ -175,7 +178,7 @@ typedef struct chunk {
 static int8_t side_by_neighbour(const chunk *c, const sdm_point_scratch *s, size_t i, double d)
 {
     for (size_t k = 0; k < SDM_POINT_BLOCK; k++) {
-        // those of the same vector first
+        // those of the same register first
         const size_t other = i ^ k;
         if (s->side[other] == SDM_SIDE_UNKNOWN) continue;
         const double free = fmax(d, sqrt(s->d2[other])) - c->certain;
@@ -210,16 +213,13 @@ static void block_finish(const sdm_points_job *job, const chunk *c, const sdm_po
 }
 
 /* Answers for the block of sorted points key[n], 0 < n <= SDM_POINT_BLOCK. The first `ahead` of the
-   keys are those of this block and the next one. */
+   keys are those of this block and the next one: sorted points and their distances lie anywhere in
+   memory, and the processor fetches those of the next block while it works on this one. */
 static void block_find(const sdm_points_job *job, const chunk *c, sdm_point_kernel *kernel,
                        sdm_point_scratch *s, const sdm_point_key *key, size_t n, size_t ahead)
 {
-    // sorted points and their distances lie anywhere in memory: the processor fetches those of the
-    // next block while it works on this one
-    for (size_t i = n; i < ahead; i++) {
-        __builtin_prefetch(c->x + 3 * (size_t)key[i].index);
-        if (c->out->distance) __builtin_prefetch(c->out->distance + key[i].index, 1);
-    }
+    s->wide = c->wide;
+    s->next = (sdm_points_next){key + n, (int)(ahead - n), c->x, c->out->distance};
     for (size_t i = 0; i < SDM_POINT_BLOCK; i++) {
         const double *p = c->x + 3 * (size_t)key[i < n ? i : n - 1].index;
         // a point that is not usable is replaced by any other
@@ -274,6 +274,7 @@ static chunk chunk_start(const sdm_points_job *job, const double *x, size_t n,
     }
     c.plain = c.usable && out->distance && !out->triangle && !out->closest && !out->gradient;
     c.certain = side_margin(job, largest);
+    c.wide = n / WIDE >= job->surface->tree.n_tri;
     return c;
 }
 

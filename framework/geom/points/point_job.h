@@ -1,21 +1,30 @@
 /* Distances of many points: what the kernel, its driver and its scratch memory share.
 
-   Points are sorted along a space-filling curve and cut into blocks. A block has eight vectors, a
-   vector has eight points, one in each SIMD lane. Other terms are those of map/map.inc. */
+   Points are sorted along a space-filling curve and cut into blocks. A block has 16 registers of
+   eight points, one in each SIMD lane; they are searched as eight vectors of two registers, or half
+   of them as eight vectors of one. Other terms are those of map/map.inc. */
 #pragma once
 
 #include "features/nearest.h"
 #include "map/grid_scratch.h"
+#include "point_order.h"
 
-/* Points of a vector, vectors of a block, points of a block. */
-enum { SDM_LANES = 8, SDM_POINT_VECTORS = 8, SDM_POINT_BLOCK = SDM_LANES * SDM_POINT_VECTORS };
+/* Vectors that are searched together, registers of a block, points of a block. */
+enum { SDM_POINT_VECTORS = 8, SDM_POINT_REGISTERS = 16, SDM_POINT_BLOCK = 8 * SDM_POINT_REGISTERS };
 
-/* Pairs of a vector and a cluster beyond which a search for each of the points of a block takes
-   less time. */
+/* Pairs of a vector and a cluster beyond which less time is taken by vectors of one register in
+   place of two, and by a search for each point in place of vectors of one register. */
 #define SDM_PAIRS_MAX 704
 
+/* The points of the next block: x[3 * key[i].index], i < n, and their distances, or NULL. */
+typedef struct sdm_points_next {
+    const sdm_point_key *key;
+    int n;
+    const double *x, *distance;
+} sdm_points_next;
+
 /* A candidate of the current vector. bit i of `lanes`: the feature may be the nearest one of point
-   i. */
+   i of the vector. */
 typedef struct sdm_point_candidate {
     uint32_t number;
     uint32_t lanes;
@@ -23,8 +32,8 @@ typedef struct sdm_point_candidate {
 
 /* Scratch memory of one thread. */
 typedef struct sdm_point_scratch {
-    /* the points of the block, mm, [vector][coordinate][lane]; all of them are finite */
-    _Alignas(64) double x[SDM_POINT_VECTORS][3][SDM_LANES];
+    /* the points of the block, mm, [register][coordinate][lane]; all of them are finite */
+    _Alignas(64) double x[SDM_POINT_REGISTERS][3][8];
     /* result: number of the nearest feature of each point and its squared distance, mm^2. Of
        several features with the same squared distance, bit for bit, the highest number */
     uint32_t number[SDM_POINT_BLOCK];
@@ -40,6 +49,9 @@ typedef struct sdm_point_scratch {
     size_t near_end[SDM_POINT_VECTORS];
     /* nodes of these clusters */
     uint32_t node[SDM_PAIRS_MAX];
+    sdm_points_next next;
+    /* are vectors of two registers tried first? */
+    bool wide;
     /* candidates of the current vector */
     sdm_point_candidate *candidate;
     size_t n_candidate;

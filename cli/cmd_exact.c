@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "inputs/grid_cut.h"
+#include "inputs/grid_hits.h"
 #include "inputs/points_file.h"
 #include "inputs/setup.h"
 #include "measure/measures.h"
@@ -272,6 +273,13 @@ static void tell_nothing_inside(const sdm_grid *g)
         cli_notice("%s", text);
 }
 
+static bool writes_labels(const cli_args *args)
+{
+    for (size_t i = 0; i < args->outputs.n; i++)
+        if (cli_ends_with_any(args->outputs.items[i], ".seg.nrrd")) return true;
+    return false;
+}
+
 static void notice_mesh(const job *j)
 {
     const sdm_audit *a = &j->report.audit;
@@ -300,6 +308,8 @@ static void notice_mesh(const job *j)
     // a part that is too thin, told above, is the cause of both
     if (!thin && inside) warn_torn(j);
     if (!thin && !inside) tell_nothing_inside(&j->grid);
+    if (inside && a->closed && !j->args->points)
+        cli_tell_hits(&j->mesh, &j->grid, writes_labels(j->args), !j->args->like);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "
                    "triangles (error at most %.2g mm)",

@@ -307,6 +307,38 @@ static void tell_large_grid(teller *t)
     tell(t, SDM_E_QUALITY, &text);
 }
 
+void cli_describe_hits(const sdm_face_hits *h, sdm_text *text)
+{
+    const char *between = "";
+    sdm_text_add(text, "flat faces lie exactly on planes of voxel centres along ");
+    for (int a = 0; a < 3; a++) {
+        if (!h->axis[a]) continue;
+        sdm_text_add(text, "%s%c", between, "xyz"[a]);
+        between = " and ";
+    }
+    sdm_text_add(text,
+                 ": distances are right, but these voxels have the distance 0 and count as inside "
+                 "or outside by rounding; labels and counts of voxels may be off by %.2g %% of the "
+                 "volume",
+                 fmin(99, 100 * h->share));
+}
+
+/* One line about faces that stay where voxel centres are. */
+static void tell_hits(teller *t)
+{
+    const sdm_face_hits *h = &t->s->found.hits;
+    const sdm_grid *g = &h->moved;
+    sdm_text text = {0};
+    if (!(h->share >= SDM_FACE_HITS_MIN)) return;
+    cli_describe_hits(h, &text);
+    sdm_text_add(&text, "; with grid.centre: [");
+    for (int a = 0; a < 3; a++)
+        sdm_text_add(&text, "%s%.10g", a ? ", " : "",
+                     g->origin[a] + 0.5 * (double)(g->n[a] - 1) * g->spacing[a]);
+    sdm_text_add(&text, "] in place of grid.origin they lie between the planes");
+    tell(t, SDM_OK, &text);
+}
+
 /* One line about the thinnest part of the shape in which it is thinnest. */
 static void tell_thin(teller *t)
 {
@@ -522,6 +554,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_cut(&t);
     tell_large_grid(&t);
     tell_thin(&t);
+    tell_hits(&t);
     tell_callbacks(&t);
     tell_notes(&t);
     tell_apart(&t);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen shapes check, and what mesh, exact, config and train say about a shape with faults (tests/shape/faulty_shape.h): one line each.
-# Tests: report_survey.c report_audit.c shapes_check.c cmd_mesh.c crash_guard.c callback.c
+# Tests: report_survey.c report_audit.c grid_hits.c shapes_check.c cmd_mesh.c crash_guard.c callback.c
 . "$(dirname "$0")/common.sh"
 plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
 
@@ -60,6 +60,12 @@ train: {minutes: 0.02}
 YAML
 expect 0 - sdmgen shapes check good.yaml --plugin "$plugin" --samples 16
 has '^fine: the shape can be trained$'
+# The sides of the handle, which stay, lie on planes of voxel centres.
+planes='flat faces lie exactly on planes of voxel centres along y and z: .* may be off by [0-9.]+ % of the volume; with grid.centre: \[0, [-0-9.]+, [-0-9.]+\] in place of grid.origin'
+has "^note +$planes"
+centre=$(grep -oE 'grid.centre: \[[^]]*\]' out)
+expect 0 - sdmgen shapes check good.yaml "${centre/: /=}" --plugin "$plugin" --samples 16
+if grep -q planes out; then bad "the centre proposed has faces on planes: $(cat out)"; fi
 expect 4 mend sdmgen shapes check good.yaml 'grid.size=[29,33,33]' --plugin "$plugin" --samples 16 -o cut.svg
 cuts='over the parameters the shape reaches from \(-2, -2, -2\) to \(4, 2, 2\) mm; the grid covers \(-3\.5, -4, -4\) to \(3\.5, 4, 4\) mm and cuts [0-9.]+ % of the shapes \(by up to 0\.5 mm at the upper end of x\); use grid: \{spacing: 0\.25\} \(size: \[[0-9, ]+\], spacing: 0\.25, origin: \[[-0-9., ]+\]\)'
 has "^warning +$cuts$"

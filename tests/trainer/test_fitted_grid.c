@@ -1,5 +1,5 @@
 /* Grids that are fitted to the shapes of a configuration.
- * Tests: fitted_grid.c grid_faces.c shape_grid.c shape_box.c shape_thickness.c */
+ * Tests: fitted_grid.c flat_faces.c grid_faces.c shape_grid.c shape_box.c shape_thickness.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -236,6 +236,43 @@ static void test_faces(void **state)
     sdm_instance_free(plate);
 }
 
+// The plate on a grid whose planes of voxel centres hold its faces: those at x = -5 and 5 and z = 0
+// lie in half voxels of 0.05 and 0.25 / 0.4 of the volume. The grid that is moved has none of them.
+static void test_faces_on_planes(void **state)
+{
+    (void)state;
+    const double range[1][2] = {{0.4, 0.5}}, p[1] = {0.5};
+    sdm_grid g = {.n = {21, 21, 9},
+                  .spacing = {1, 1, 0.5},
+                  .origin = {-10, -9.7, -2},
+                  .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    sdm_error e = {0};
+    sdm_instance *plate = NULL;
+    sdm_face_hits h;
+    sdm_mesh m = {0};
+    assert_int_equal(sdm_instance_create(&plate_shape, NULL, 0, NULL, &plate, &e), SDM_OK);
+    if (sdm_grid_family_hits(plate, range, 8, 1, &g, &h, &e)) fail_msg("%s", e.text);
+    assert_true(h.axis[0] && !h.axis[1] && h.axis[2]);
+    assert_true(h.share > 0.1 + 0.25 / 0.5 && h.share < 0.1 + 0.25 / 0.4);
+    g = h.moved;
+    if (sdm_grid_family_hits(plate, range, 8, 1, &g, &h, &e)) fail_msg("%s", e.text);
+    assert_true(h.share == 0 && g.origin[0] != -10 && g.origin[1] == -9.7);
+    // of a single plate the upper face counts, too; a grid with other axes; a slice has no planes
+    if (sdm_instance_mesh(plate, p, &m, &e)) fail_msg("%s", e.text);
+    const double turned[9] = {0, 0, 1, 0, 1, 0, 1, 0, 0};
+    g = (sdm_grid){.n = {9, 21, 21}, .spacing = {0.5, 1, 1}, .origin = {-10, -9.7, -2}};
+    memcpy(g.dir, turned, sizeof turned);
+    if (sdm_grid_face_hits(&m, &g, &h, &e)) fail_msg("%s", e.text);
+    assert_true(h.axis[0] && !h.axis[1] && h.axis[2] && fabs(h.share - 1.1) < 1e-12);
+    g.n[0] = 1;
+    if (sdm_grid_face_hits(&m, &g, &h, &e)) fail_msg("%s", e.text);
+    assert_true(!h.axis[0] && fabs(h.share - 0.1) < 1e-12);
+    assert_int_equal(sdm_grid_face_hits(&m, NULL, &h, &e), SDM_E_ARG);
+    assert_int_equal(sdm_grid_family_hits(NULL, range, 8, 1, &g, &h, &e), SDM_E_ARG);
+    sdm_mesh_dispose(&m);
+    sdm_instance_free(plate);
+}
+
 // A proposal keeps the spacing of the configuration and reads as the keys that it names; where the
 // spacing makes too many voxels, it says so.
 static void test_proposal(void **state)
@@ -273,9 +310,13 @@ static void test_proposal(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_around),  cmocka_unit_test(test_capsule),
-        cmocka_unit_test(test_thin),    cmocka_unit_test(test_faces),
-        cmocka_unit_test(test_surplus), cmocka_unit_test(test_proposal),
+        cmocka_unit_test(test_around),
+        cmocka_unit_test(test_capsule),
+        cmocka_unit_test(test_thin),
+        cmocka_unit_test(test_faces),
+        cmocka_unit_test(test_surplus),
+        cmocka_unit_test(test_proposal),
+        cmocka_unit_test(test_faces_on_planes),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -22,6 +22,7 @@ enum {
     FOLD_SAMPLES = 32,
     VELOCITIES = 4,
     REPEATS = 8,
+    FACE_SAMPLES = 8,
     BOX_SAMPLES = 64
 };
 
@@ -480,6 +481,9 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
     }
     if (!s && opts->grid)
         out->surplus = sdm_grid_surplus(opts->grid, out->low, out->high, out->surplus_along);
+    if (!s && opts->grid && !opts->brief && !out->failed.shapes && !out->untested)
+        s = sdm_grid_family_hits(shape, opts->range, FACE_SAMPLES, opts->seed, opts->grid,
+                                 &out->hits, err);
     if (!s) s = sdm_survey_measure_scale(&v.family, out, err);
     sdm_free(v.found);
     sdm_free(v.fold);

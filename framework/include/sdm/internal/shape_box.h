@@ -74,6 +74,29 @@ sdm_status sdm_grid_around(const double low[3], const double high[3], int voxels
 sdm_status sdm_grid_avoid_faces(const sdm_instance *shape, const double (*range)[2], size_t samples,
                                 uint64_t seed, sdm_grid *g, sdm_error *err);
 
+/* Flat faces that lie on planes of voxel centres: these voxels have the distance 0, so that
+ * rounding alone decides whether they are inside. */
+typedef struct sdm_face_hits {
+    bool axis[3]; /* there are such faces perpendicular to this axis of the grid */
+    /* part of the volume in the half voxels behind these faces: by so much counts of voxels may be
+     * off; 0: there are none */
+    double share;
+    sdm_grid moved; /* the grid, moved by up to half a voxel along these axes to avoid the faces */
+} sdm_face_hits;
+
+/* A smaller share is not worth a message. */
+#define SDM_FACE_HITS_MIN 0.01
+
+/* *out = the hits of one mesh. SDM_E_ARG, SDM_E_NOMEM. [any thread] */
+sdm_status sdm_grid_face_hits(const sdm_mesh *m, const sdm_grid *g, sdm_face_hits *out,
+                              sdm_error *err);
+
+/* *out = the hits of faces that have the same place in `samples` random shapes, as above. [any
+ * thread] */
+sdm_status sdm_grid_family_hits(const sdm_instance *shape, const double (*range)[2], size_t samples,
+                                uint64_t seed, const sdm_grid *g, sdm_face_hits *out,
+                                sdm_error *err);
+
 #ifdef __cplusplus
 }
 #endif

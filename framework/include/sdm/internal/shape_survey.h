@@ -4,6 +4,7 @@
 
 #include "sdm/grid.h"
 #include "sdm/internal/part_audit.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/registry.h"
 
 #ifdef __cplusplus
@@ -139,7 +140,8 @@ typedef struct sdm_shape_survey {
     size_t velocity_param, velocity_shape, velocity_vertex;
     size_t
         unlike; /* shapes whose mesh had other bits when it was made again or by several threads */
-    double ms_mesh; /* median time of a mesh, ms */
+    double ms_mesh;     /* median time of a mesh, ms */
+    sdm_face_hits hits; /* of the grid, sdm_grid_family_hits(); zero without a grid */
 } sdm_shape_survey;
 
 /* Surveys the shape. A mesh that cannot be made is a finding (`failed`), no error. Without a limit

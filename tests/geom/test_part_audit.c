@@ -298,9 +298,9 @@ static void test_refusals(void **state)
 /* A solid of revolution: the outline of n points (radius, z), from the axis to the axis. */
 static sdm_mesh revolve(const double (*outline)[2], size_t n)
 {
-    enum { SECTORS = 24 };
-    static double vert[8 * SECTORS][3];
-    static uint32_t tri[16 * SECTORS][3];
+    enum { SECTORS = 24, POINTS = 64 };
+    static double vert[POINTS * SECTORS][3];
+    static uint32_t tri[2 * POINTS * SECTORS][3];
     size_t n_tri = 0;
     const double turn = 2 * acos(-1) / SECTORS;
     // vertices of ring i: SECTORS * i and the following; an end of the outline, on the axis, is a
@@ -350,6 +350,46 @@ static void test_outline_that_crosses_itself(void **state)
     }
 }
 
+/* The thickness of a body whose radius is radius(z) for -1 <= z <= 1. */
+static double thickness_of(double (*radius)(double z))
+{
+    enum { N = 61 };
+    double outline[N][2];
+    sdm_part_audit a;
+    for (int i = 0; i < N; i++) {
+        const double z = -cos(acos(-1) * i / (N - 1));
+        outline[i][0] = i && i < N - 1 ? radius(z) : 0;
+        outline[i][1] = z;
+    }
+    const sdm_mesh m = revolve((const double(*)[2])outline, N);
+    if (sdm_part_audit_make(&m, false, &a, &err)) fail_msg("%s", err.text);
+    assert_int_equal(a.n, 1);
+    const double thick = a.part[0].thick;
+    sdm_part_audit_dispose(&a);
+    return thick;
+}
+
+static double ball(double z) { return sqrt(1 - z * z); }
+static double needle(double z) { return 0.1 * sqrt(1 - z * z); }
+static double drop(double z) { return 0.2 * (1 - z); }
+/* Two balls with a thin neck. */
+static double dumbbell(double z)
+{
+    const double d = fabs(z) - 0.6;
+    return fabs(d) < 0.4 ? fmax(0.05, sqrt(0.16 - d * d)) : 0.05;
+}
+
+// A neck counts also where it is a small part of the surface (4 % of it); tips and edges do not.
+static void test_thickness_of_necks(void **state)
+{
+    (void)state;
+    assert_true(fabs(thickness_of(ball) - 2) < 0.05);
+    const double along = thickness_of(needle);
+    assert_true(along > 0.1 && along < 0.21);
+    assert_true(thickness_of(drop) > 0.15);
+    assert_true(fabs(thickness_of(dumbbell) - 0.1) < 0.005);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -360,6 +400,7 @@ int main(void)
         cmocka_unit_test(test_gap_of_a_bar),
         cmocka_unit_test(test_open_and_flat_parts),
         cmocka_unit_test(test_thickness),
+        cmocka_unit_test(test_thickness_of_necks),
         cmocka_unit_test(test_outline_that_crosses_itself),
         cmocka_unit_test(test_refusals),
     };

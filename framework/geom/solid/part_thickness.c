@@ -1,6 +1,8 @@
 /* Measures the thickness of the parts of a mesh by chords: rays from points of the surface, against
- * the normal, to the wall of the union on the other side. The thickness is their median: shorter
- * ones belong to edges and tips, which every solid has. */
+ * the normal, to the wall of the union on the other side. The thickness is the length that a
+ * fiftieth of the surface does not reach, among chords between walls that are nearly parallel: at a
+ * neck they are, at edges and tips, where chords of every solid shrink to nothing, they are not.
+ * Where hardly any walls are parallel (a cone), it is the median of all chords. */
 #include "part_thickness.h"
 
 #include <math.h>
@@ -9,12 +11,16 @@
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
-enum { CHORDS = 64, CHORDS_MIN = 8, CROSSINGS_MAX = 128 };
+enum { CHORDS = 256, CHORDS_MIN = 32, THIN_RANK = CHORDS / 50, CROSSINGS_MAX = 128 };
+
+/* Walls that enclose a smaller angle, 10 degrees, count as parallel: its cosine. */
+static const double PARALLEL = 0.9848;
 
 /* A place where a ray crosses the surface. */
 typedef struct crossing {
-    double at; /* along the ray, mm */
-    int step;  /* of the winding number: -1 where the ray leaves, 1 where it enters */
+    double at;         /* along the ray, mm */
+    int step;          /* of the winding number: -1 where the ray leaves, 1 where it enters */
+    uint32_t triangle; /* that it crosses */
 } crossing;
 
 typedef struct ray {
@@ -28,8 +34,9 @@ typedef struct ray {
 /* The chords of one part. */
 typedef struct chords {
     double area; /* of its triangles so far, mm^2 */
-    size_t tried, n;
-    double length[CHORDS]; /* [n] mm */
+    size_t tried, n, n_parallel;
+    double length[CHORDS];   /* [n] mm */
+    double parallel[CHORDS]; /* [n_parallel] mm, of those between parallel walls */
 } chords;
 
 static bool meets_box(const ray *r, const sdm_bvh_node *node)
@@ -49,6 +56,11 @@ static const double *corner(const sdm_mesh *m, size_t t, size_t c)
     return m->vert + 3 * (size_t)m->tri[3 * t + c];
 }
 
+static void normal_of(const sdm_mesh *m, size_t t, double n[3])
+{
+    v3_triangle_normal(corner(m, t, 0), corner(m, t, 1), corner(m, t, 2), n);
+}
+
 /* Adds the crossing with triangle t, if there is one (Moeller and Trumbore 1997). */
 static void cross(ray *r, const sdm_mesh *m, uint32_t t)
 {
@@ -65,7 +77,7 @@ static void cross(ray *r, const sdm_mesh *m, uint32_t t)
     const int step = det > 0 ? 1 : -1;
     // far away the winding number is 0: that at the origin is minus the sum of all steps
     r->inner -= step;
-    if (r->n < CROSSINGS_MAX) r->found[r->n] = (crossing){at, step};
+    if (r->n < CROSSINGS_MAX) r->found[r->n] = (crossing){at, step, t};
     r->n++;
 }
 
@@ -90,18 +102,17 @@ static int by_place(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The way from the origin to the first place outside the union, mm; NaN: the origin does not lie on
- * the surface of the union. */
-static double chord(ray *r)
+/* The first place outside the union; NULL: the origin does not lie on the surface of the union. */
+static const crossing *way_out(ray *r)
 {
     int64_t winding = r->inner;
-    if (winding != 1 || r->n > CROSSINGS_MAX) return NAN;
+    if (winding != 1 || r->n > CROSSINGS_MAX) return NULL;
     qsort(r->found, r->n, sizeof *r->found, by_place);
     for (size_t i = 0; i < r->n; i++) {
         winding += r->found[i].step;
-        if (winding <= 0) return r->found[i].at;
+        if (winding <= 0) return &r->found[i];
     }
-    return NAN;
+    return NULL;
 }
 
 /* Starts chord number k in triangle t, whose normal is n[3]. The places follow the golden ratio, so
@@ -119,14 +130,27 @@ static void add_chord(const sdm_mesh *m, const sdm_bvh *tree, uint32_t t, const 
     }
     c->tried++;
     follow(&r, m, tree);
-    const double mm = chord(&r);
-    if (mm > 0) c->length[c->n++] = mm;
+    const crossing *end = way_out(&r);
+    if (!end) return;
+    double wall[3];
+    normal_of(m, end->triangle, wall);
+    c->length[c->n++] = end->at;
+    if (v3_dot(wall, r.dir) > PARALLEL * v3_norm(wall)) c->parallel[c->n_parallel++] = end->at;
 }
 
 static int by_length(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
+}
+
+static double thickness(chords *c)
+{
+    qsort(c->length, c->n, sizeof *c->length, by_length);
+    const double median = c->length[c->n / 2];
+    if (c->n_parallel <= THIN_RANK) return median;
+    qsort(c->parallel, c->n_parallel, sizeof *c->parallel, by_length);
+    return fmin(median, c->parallel[THIN_RANK]);
 }
 
 sdm_status sdm_part_thickness(const sdm_mesh *m, const sdm_bvh *tree, const uint32_t *part_of,
@@ -139,7 +163,7 @@ sdm_status sdm_part_thickness(const sdm_mesh *m, const sdm_bvh *tree, const uint
         const uint32_t i = part_of[t];
         if (i >= n || parts[i].state != SDM_PART_SOLID) continue;
         double normal[3];
-        v3_triangle_normal(corner(m, t, 0), corner(m, t, 1), corner(m, t, 2), normal);
+        normal_of(m, t, normal);
         of[i].area += 0.5 * v3_norm(normal);
         // chord k begins where the sum of the areas passes (k + 1/2) / CHORDS of the whole
         while (of[i].tried < CHORDS &&
@@ -147,9 +171,7 @@ sdm_status sdm_part_thickness(const sdm_mesh *m, const sdm_bvh *tree, const uint
             add_chord(m, tree, t, normal, &of[i]);
     }
     for (size_t i = 0; i < n; i++) {
-        if (of[i].n < CHORDS_MIN) continue;
-        qsort(of[i].length, of[i].n, sizeof *of[i].length, by_length);
-        parts[i].thick = of[i].length[of[i].n / 2];
+        if (of[i].n >= CHORDS_MIN) parts[i].thick = thickness(&of[i]);
     }
     sdm_free(of);
     return SDM_OK;

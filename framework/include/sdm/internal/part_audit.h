@@ -40,8 +40,10 @@ typedef struct sdm_part {
     double min[3], max[3]; /* bounding box, mm */
     bool turned;           /* the engine reverses its triangles, alone or with the whole mesh */
     sdm_part_state state;
-    /* thickness, mm: median of the chords through the union, from points of this part's surface
-     * against the normal. Where another part takes over, chords go on through it. NaN:
+    /* thickness, mm: of chords through the union, from points of this part's surface against the
+     * normal, to walls that are nearly parallel. A fiftieth of the surface may be thinner. Where
+     * hardly any walls are parallel, the median of all chords. Where another part takes over,
+     * chords go on through it. NaN:
      * the mesh is open, the part is not solid or lies inside others, or it is not one of the first
      * 1000 parts. */
     double thick;

@@ -286,10 +286,6 @@ static void notice_mesh(const job *j)
     int64_t inside = 1; // a level set without voxels inside is refused when it is written
     float min, max;
     if (j->values) find_range(j, &min, &max, &inside);
-    if (j->report.turned) cli_notice("the mesh was inside out; its orientation has been reversed");
-    if (j->report.parts_turned)
-        cli_notice("%zu parts were inside out; their orientation has been reversed",
-                   j->report.parts_turned);
     if (inside && !j->args->points)
         cli_warn_cut_shape(&j->grid, j->mesh.vert, j->mesh.n_vert,
                            "a larger grid (--size, --spacing, --origin) holds it");
@@ -303,8 +299,10 @@ static void notice_mesh(const job *j)
     if (a->components > 1 || !a->closed || j->args->shape)
         thin = cli_warn_mesh(&j->mesh, j->args->points ? 0 : sdm_grid_coarsest(&j->grid),
                              j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
-    else
+    else {
         cli_warn_audit(a);
+        if (j->report.turned) cli_notice("the mesh is inside out; maps turn it");
+    }
     // a part that is too thin, told above, is the cause of both
     if (!thin && inside) warn_torn(j);
     if (!thin && !inside) tell_nothing_inside(&j->grid);

@@ -151,7 +151,7 @@ static sdm_status read_mesh(cli_fit *f, sdm_error *err)
     sdm_mesh mesh = {0};
     sdm_status s = cli_read_mesh(f->path, &mesh, err);
     if (s) return s;
-    if (mesh.n_tri) cli_warn_mesh(&mesh, 0, "sdmgen mesh --turn-parts reverses it");
+    if (mesh.n_tri) cli_warn_mesh(&mesh, 0, "sdmgen mesh --turn-parts mends this");
     const size_t n = mesh.n_tri ? SURFACE_POINTS : mesh.n_vert;
     s = SDM_ALLOC(&f->points, 3 * n, "points", err);
     if (!s && !mesh.n_tri && n) memcpy(f->points, mesh.vert, 3 * n * sizeof *f->points);

@@ -10,8 +10,8 @@
 #include "sdm/internal/vec3.h"
 #include "terminal.h"
 
-/* Parts in the table and in JSON, and notices about parts. */
-enum { ROWS = 20, JSON_PARTS = 1000, NOTICES = 3 };
+/* Parts in the table, in JSON and in a line of text. */
+enum { ROWS = 20, JSON_PARTS = 1000, NAMED = 4 };
 
 /* Whether the vertices of a part's triangles are to be reversed. Where maps turn the whole mesh for
  * the larger parts, these are, not the ones that are subtracted then. */
@@ -22,10 +22,12 @@ static bool inside_out(const sdm_part_audit *a, size_t i)
     return p->state == SDM_PART_SOLID && a->mesh.inverted && a->inside_out > 0 && p->volume < 0;
 }
 
-static size_t count_inside_out(const sdm_part_audit *a)
+typedef bool part_test(const sdm_part_audit *a, size_t index);
+
+static size_t count_parts(const sdm_part_audit *a, part_test *counts)
 {
     size_t n = 0;
-    for (size_t i = 0; i < a->n; i++) n += inside_out(a, i);
+    for (size_t i = 0; i < a->n; i++) n += counts(a, i);
     return n;
 }
 
@@ -65,9 +67,9 @@ void cli_print_audit(const sdm_part_audit *audit)
     printf("parts                %zu\n", audit->n);
     printf("closed               %s\n", a->closed ? "yes" : "no");
     printf("manifold             %s\n", a->manifold ? "yes" : "no");
-    const size_t inside_out = count_inside_out(audit);
-    if (inside_out > 0 && audit->n > 1)
-        printf("inside out           %zu of %zu parts\n", inside_out, audit->n);
+    const size_t wrong = count_parts(audit, inside_out);
+    if (wrong > 0 && audit->n > 1)
+        printf("inside out           %zu of %zu parts\n", wrong, audit->n);
     else
         printf("inside out           %s\n", a->inverted ? "yes" : "no");
     printf("boundary edges       %zu\n", a->boundary_edges);
@@ -121,7 +123,7 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
 {
     sdm_json_real(json, "union_volume_mm3", a->union_volume);
     sdm_json_real(json, "union_area_mm2", a->union_area);
-    sdm_json_int(json, "parts_inside_out", (int64_t)count_inside_out(a));
+    sdm_json_int(json, "parts_inside_out", (int64_t)count_parts(a, inside_out));
     sdm_json_text(json, "verdict", cli_verdict_name(cli_audit_verdict(a, "", NULL)));
     sdm_json_open(json, "parts", '[');
     for (size_t i = 0; i < a->n && i < JSON_PARTS; i++) {
@@ -169,6 +171,21 @@ void cli_name_part(const sdm_part_audit *a, size_t index, sdm_text *text)
                  p->min[2], p->max[0], p->max[1], p->max[2]);
 }
 
+/* The smallest solid part whose box holds that of part `index`; a->n: there is none. */
+static size_t part_around(const sdm_part_audit *a, size_t index)
+{
+    const sdm_part *p = &a->part[index];
+    size_t around = a->n;
+    for (size_t i = 0; i < a->n; i++) {
+        const sdm_part *q = &a->part[i];
+        bool holds = i != index && q->state == SDM_PART_SOLID;
+        for (int d = 0; d < 3; d++)
+            holds = holds && q->min[d] <= p->min[d] && q->max[d] >= p->max[d];
+        if (holds && (around == a->n || fabs(q->volume) < fabs(a->part[around].volume))) around = i;
+    }
+    return around;
+}
+
 void cli_describe_apart(const sdm_mesh *mesh, const sdm_part_audit *audit, sdm_text *text)
 {
     size_t at = audit->n;
@@ -179,11 +196,19 @@ void cli_describe_apart(const sdm_mesh *mesh, const sdm_part_audit *audit, sdm_t
     }
     if (at == audit->n || audit->n < 2) return;
     const double gap = sdm_part_gap(mesh, audit, at);
+    const size_t around = gap < 0 ? part_around(audit, at) : audit->n;
     cli_name_part(audit, at, text);
-    if (isfinite(gap))
-        sdm_text_add(text, "lies %.2g mm from the others", gap);
+    if (around < audit->n)
+        sdm_text_add(text,
+                     "lies inside part %zu and changes nothing; if it is to be a cavity, reverse "
+                     "the vertices of its triangles",
+                     around + 1);
+    else if (isfinite(gap))
+        sdm_text_add(text,
+                     "lies %.2g mm from the others; where they belong together, let them overlap",
+                     fabs(gap));
     else
-        sdm_text_add(text, "meets no other");
+        sdm_text_add(text, "meets no other; where they belong together, let them overlap");
 }
 
 void cli_describe_open(const sdm_part_audit *a, sdm_text *text)
@@ -202,24 +227,65 @@ void cli_describe_open(const sdm_part_audit *a, sdm_text *text)
                  a->part[most].open_edges, x[0], x[1], x[2]);
 }
 
-void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text)
+static bool is_lost(const sdm_part_audit *a, size_t i)
 {
-    const sdm_part *p = &a->part[index];
-    if (p->volume > 0) {
-        size_t largest = 0;
-        for (size_t i = 1; i < a->n; i++)
-            if (a->part[i].volume < a->part[largest].volume) largest = i;
-        cli_name_part(a, largest, text);
+    return a->part[i].state == SDM_PART_INSIDE_OUT;
+}
+
+static bool is_mended(const sdm_part_audit *a, size_t i)
+{
+    return a->part[i].turned && a->part[i].volume < 0;
+}
+
+/* Appends "part 2 of 9 (...) " or "parts 2 (...), 3 (...), 5 (...), 6 (...) and 2 more of 9 ";
+ * brief: only the numbers. Returns how many there are. */
+static size_t add_parts(const sdm_part_audit *a, part_test *counts, bool brief, sdm_text *text)
+{
+    const size_t n = count_parts(a, counts);
+    size_t told = 0;
+    for (size_t i = 0; i < a->n && told < NAMED; i++) {
+        const sdm_part *p = &a->part[i];
+        if (!counts(a, i)) continue;
+        if (n == 1 && !brief) {
+            cli_name_part(a, i, text);
+            return n;
+        }
+        sdm_text_add(text, "%s%zu", told++ ? ", " : n > 1 ? "parts " : "part ", i + 1);
+        if (!brief)
+            sdm_text_add(text, " (vertices %zu .. %zu, box %.4g %.4g %.4g .. %.4g %.4g %.4g mm)",
+                         p->first_vert, p->last_vert, p->min[0], p->min[1], p->min[2], p->max[0],
+                         p->max[1], p->max[2]);
+    }
+    if (n > told) sdm_text_add(text, " and %zu more", n - told);
+    sdm_text_add(text, " of %zu ", a->n);
+    return n;
+}
+
+void cli_describe_inside_out(const sdm_part_audit *a, sdm_text *text)
+{
+    size_t first = 0;
+    while (first < a->n && !is_lost(a, first)) first++;
+    if (first == a->n) return;
+    if (a->part[first].volume > 0) {
+        const size_t n = add_parts(a, inside_out, false, text);
         sdm_text_add(text,
-                     "is inside out and larger than the rest: maps turn the whole mesh for it, and "
-                     "subtract part %zu of %zu from what that overlaps",
-                     index + 1, a->n);
+                     "%s inside out and larger than the rest: maps turn the whole mesh for %s, and "
+                     "subtract ",
+                     n > 1 ? "are" : "is", n > 1 ? "them" : "it");
+        const size_t lost = add_parts(a, is_lost, true, text);
+        sdm_text_add(text, "from what %s", lost > 1 ? "these overlap" : "that overlaps");
         return;
     }
-    cli_name_part(a, index, text);
-    sdm_text_add(text,
-                 "is inside out%s: it is subtracted from what it overlaps and is not solid itself",
-                 p->met ? " and overlaps another" : "");
+    const bool many = add_parts(a, is_lost, false, text) > 1, met = a->part[first].met > 0;
+    if (many)
+        sdm_text_add(text,
+                     "are inside out%s: they are subtracted from what they overlap and are not "
+                     "solid themselves",
+                     met ? " and overlap others" : "");
+    else
+        sdm_text_add(
+            text, "is inside out%s: it is subtracted from what it overlaps and is not solid itself",
+            met ? " and overlaps another" : "");
 }
 
 bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text)
@@ -270,17 +336,28 @@ static bool warn_thin(const sdm_part_audit *audit, double voxel)
 
 static void warn_inside_out(const sdm_part_audit *audit, const char *mend)
 {
-    size_t told = 0;
-    for (size_t i = 0; i < audit->n && told < NOTICES; i++) {
-        if (audit->part[i].state != SDM_PART_INSIDE_OUT) continue;
-        sdm_text text = {0};
-        cli_describe_part(audit, i, &text);
-        if (!text.failed) cli_warn("%s; %s", text.data, mend);
-        sdm_text_dispose(&text);
-        told++;
-    }
-    if (audit->inside_out > told)
-        cli_warn("%zu more parts are inside out", audit->inside_out - told);
+    sdm_text text = {0};
+    if (!audit->inside_out) return;
+    cli_describe_inside_out(audit, &text);
+    if (!text.failed) cli_warn("%s; %s", text.data, mend);
+    sdm_text_dispose(&text);
+}
+
+/* Parts that are inside out and that maps turn. */
+static void notice_turned(const sdm_part_audit *audit)
+{
+    size_t turned = 0;
+    sdm_text text = {0};
+    if (audit->inside_out || !count_parts(audit, is_mended)) return;
+    for (size_t i = 0; i < audit->n; i++) turned += audit->part[i].turned;
+    if (turned == audit->n)
+        sdm_text_add(&text, "the mesh is inside out; maps turn it");
+    else if (add_parts(audit, is_mended, false, &text) > 1)
+        sdm_text_add(&text, "are inside out; maps turn them");
+    else
+        sdm_text_add(&text, "is inside out; maps turn it");
+    if (!text.failed) cli_notice("%s", text.data);
+    sdm_text_dispose(&text);
 }
 
 static void warn_folded(const sdm_part_audit *audit)
@@ -298,6 +375,7 @@ bool cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend)
     warn_open(&audit);
     cli_warn_audit(&audit.mesh);
     warn_inside_out(&audit, mend);
+    notice_turned(&audit);
     warn_folded(&audit);
     const bool thin = warn_thin(&audit, voxel);
     sdm_part_audit_dispose(&audit);
@@ -311,12 +389,11 @@ const char *cli_verdict_name(sdm_status verdict)
 
 sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_error *err)
 {
-    size_t open = 0, first = a->n;
+    size_t open = 0;
     bool encloses = false;
-    for (size_t i = a->n; i-- > 0;) {
+    for (size_t i = 0; i < a->n; i++) {
         open += a->part[i].open_edges;
         encloses = encloses || a->part[i].state == SDM_PART_SOLID;
-        if (a->part[i].state == SDM_PART_INSIDE_OUT) first = i;
     }
     if (open > 0) {
         sdm_text text = {0};
@@ -328,9 +405,9 @@ sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_erro
         sdm_text_dispose(&text);
         return s;
     }
-    if (first < a->n) {
+    if (a->inside_out) {
         sdm_text text = {0};
-        cli_describe_part(a, first, &text);
+        cli_describe_inside_out(a, &text);
         const sdm_status s = sdm_fail(err, SDM_E_QUALITY, "%s; %s",
                                       text.failed ? "a part is inside out" : text.data, mend);
         sdm_text_dispose(&text);

@@ -19,13 +19,13 @@ void cli_warn_audit(const sdm_audit *a);
 /* Appends "part 2 of 3 (12 triangles, vertices 8 .. 15, box ...) ". */
 void cli_name_part(const sdm_part_audit *a, size_t index, sdm_text *text);
 
-/* Appends "part 2 of 2 (...) lies 2.2 mm from the others" about the smallest part that meets no
- * other; appends nothing if there is none. */
+/* Appends "part 2 of 2 (...) lies 2.2 mm from the others; ..." about the smallest part that meets
+ * no other, or that it lies inside one; appends nothing if there is none. */
 void cli_describe_apart(const sdm_mesh *mesh, const sdm_part_audit *audit, sdm_text *text);
 
-/* Writes one line about part `index`, which is inside out, to `text`: its number, box and vertices,
- * and what becomes of it. */
-void cli_describe_part(const sdm_part_audit *a, size_t index, sdm_text *text);
+/* Writes one line about all parts that are inside out and not turned to `text`: numbers, vertices
+ * and boxes of the first four, and what becomes of them; nothing if there are none. */
+void cli_describe_inside_out(const sdm_part_audit *a, sdm_text *text);
 
 /* Writes one line about the part with most open edges to `text`: where it is, where its first open
  * edge is, and what to do; nothing if the mesh is closed. */
@@ -47,8 +47,8 @@ sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_erro
 /* "fine", "warning" or "broken", for the results of cli_audit_verdict(). */
 const char *cli_verdict_name(sdm_status verdict);
 
-/* Audits the mesh and warns as cli_warn_audit() does, and of the part with most open edges, of each
- * of the first parts that are inside out and that the engine does not turn, and of the thinnest
+/* Audits the mesh and warns as cli_warn_audit() does, and of the part with most open edges, of
+ * parts that are inside out, and of the thinnest
  * part if it is too thin for voxels of this size (mm; 0: there is no grid). mend: what the user can
  * do about an inside-out part. Says nothing if the audit fails: the engine reports that. Returns
  * whether it warned of a thin part. */
@@ -64,5 +64,5 @@ sdm_status cli_turn_parts(sdm_mesh *mesh, sdm_error *err);
     "spacing of at most %.2g mm shows it"
 
 /* What to do about an inside-out part: of the mesh of a shape, and of a mesh file. */
-#define CLI_MEND_SHAPE "reverse the vertices of its triangles in mesh() of the shape"
-#define CLI_MEND_FILE "--turn-parts reverses it"
+#define CLI_MEND_SHAPE "reverse the vertices of these triangles in mesh() of the shape"
+#define CLI_MEND_FILE "--turn-parts mends this"

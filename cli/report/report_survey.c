@@ -113,19 +113,15 @@ static void tell_inside_out(teller *t)
     sdm_part_audit audit;
     if (!c->shapes) return;
     if (audit_worst(t, c, &audit)) {
-        for (size_t i = 0; i < audit.n; i++) {
-            sdm_text text = {0};
-            if (audit.part[i].state != SDM_PART_INSIDE_OUT) continue;
-            cli_describe_part(&audit, i, &text);
-            // in other shapes it may be another part
-            sdm_text_add(&text, " (at ");
-            add_params(t->s, c->worst, SIZE_MAX, &text);
-            sdm_text_add(&text, "; parts are inside out ");
-            add_share(t->s, c, &text);
-            sdm_text_add(&text, "); " CLI_MEND_SHAPE);
-            tell(t, SDM_E_QUALITY, &text);
-            break;
-        }
+        sdm_text text = {0};
+        cli_describe_inside_out(&audit, &text);
+        // in other shapes it may be another part
+        sdm_text_add(&text, " (at ");
+        add_params(t->s, c->worst, SIZE_MAX, &text);
+        sdm_text_add(&text, "; parts are inside out ");
+        add_share(t->s, c, &text);
+        sdm_text_add(&text, "); " CLI_MEND_SHAPE);
+        tell(t, SDM_E_QUALITY, &text);
     }
     sdm_part_audit_dispose(&audit);
 }
@@ -492,7 +488,6 @@ static void tell_apart(teller *t)
     sdm_text_add(&text, ": ");
     if (make(t->s, f->apart.worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL))
         cli_describe_apart(&mesh, &audit, &text);
-    sdm_text_add(&text, "; where they belong together, let them overlap");
     tell(t, SDM_OK, &text);
     sdm_part_audit_dispose(&audit);
     sdm_mesh_dispose(&mesh);

@@ -66,7 +66,7 @@ double sdm_part_gap(const sdm_mesh *m, const sdm_part_audit *a, size_t index)
     const sdm_exact_opts opts = {.keep_overlap = true, .n_threads = 1};
     sdm_mesh mesh[2] = {{0}};
     sdm_exact *engine[2] = {NULL};
-    double x[3], least = NAN;
+    double x[3], least = NAN, side = NAN;
     if (a->n < 2 || is_mixed(a, index)) return NAN;
     sdm_status s = SDM_OK;
     for (int own = 0; own < 2 && !s; own++) {
@@ -76,13 +76,14 @@ double sdm_part_gap(const sdm_mesh *m, const sdm_part_audit *a, size_t index)
     if (!s) least = near_point(&mesh[1], engine[0], x);
     for (int i = 0; i < STEPS && !s; i++) {
         double nearest[3];
-        const double d = fabs(sdm_exact_point(engine[i % 2], x, nearest, NULL, NULL));
+        const double d = sdm_exact_point(engine[i % 2], x, nearest, NULL, NULL);
+        if (!i) side = d; // of a point of this part from the others
         memcpy(x, nearest, sizeof nearest);
-        least = fmin(least, d);
+        least = fmin(least, fabs(d));
     }
     for (int own = 0; own < 2; own++) {
         sdm_exact_free(engine[own]);
         sdm_mesh_dispose(&mesh[own]);
     }
-    return least;
+    return copysign(least, side);
 }

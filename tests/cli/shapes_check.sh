@@ -21,6 +21,9 @@ done
 expect 0 - sdmgen shapes check faulty -O fault=apart --plugin "$plugin" --samples 16
 has '^note +parts that meet no other part in all 21 shapes, up to 2 at .*: part 2 of 2 \(12 triangles, .*\) lies 0\.5 mm from the others; where they belong together, let them overlap$'
 
+expect 0 - sdmgen shapes check faulty -O fault=within --plugin "$plugin" --samples 16
+has '^note +parts that meet no other part .*: part 2 of 2 \(12 triangles, .*\) lies inside part 1 and changes nothing; if it is to be a cavity, reverse'
+
 # faulty FAULT CODE PATTERN: the finding is a line of the output.
 faulty() {
     local word=warning
@@ -135,8 +138,30 @@ present z.nrrd
 expect 0 'the triangles get other vertices' sdmgen train good.yaml shape.options.fault=wires 'shape.ranges.size=[1,3]' data='{static: 0, start: 16, online: 0, holdout: 4}' --plugin "$plugin" --out wires -q
 has '^(  not for| ) +derivatives of exact maps \(exact --jacobian, fit --exact or --polish\) where the triangles change with size: vertices'
 
+# Several parts: all are named, once. Boxes along x, each overlapping the one before; those of which the digit is 1 are inside out.
+boxes() {
+    awk -v parts="$1" 'BEGIN {
+        n = length(parts); print "OFF\n" 8 * n, 12 * n, 0
+        for (k = 0; k < n; k++) for (i = 0; i < 8; i++) print 3 * k + 4 * (i % 2), (k ? 2 : 9) * (int(i / 2) % 2), (k ? 2 : 9) * int(i / 4)
+        split("0 2 1 1 2 3 4 5 6 5 7 6 0 1 4 1 5 4 2 6 3 3 6 7 0 4 2 2 4 6 1 3 5 3 7 5", t, " ")
+        for (k = 0; k < n; k++) for (i = 1; i < 36; i += 3) {
+            turned = substr(parts, k + 1, 1)
+            print 3, t[i] + 8 * k, t[i + 1 + turned] + 8 * k, t[i + 2 - turned] + 8 * k } }' >boxes.off
+}
+boxes 0111111
+sdmgen exact --mesh boxes.off -q -o x.npy 2>err || bad "exact of boxes: $(cat err)"
+told '^sdmgen: warning: parts 2 \(vertices 8 \.\. 15, box 3 0 0 \.\. 7 2 2 mm\), 3 \(.*\), 4 \(.*\), 5 \(.*\) and 2 more of 7 are inside out and overlap others: they'
+[ "$(wc -l <err)" -eq 1 ] || bad "more than one line: $(cat err)"
+boxes 1000
+sdmgen exact --mesh boxes.off -o x.npy 2>err || bad "exact of boxes: $(cat err)"
+told 'warning: part 1 of 4 .* is inside out and larger than the rest: maps turn the whole mesh for it, and subtract parts 2, 3, 4 of 4 from what these overlap'
+[ "$(grep -c 'inside out' err)" -eq 1 ] || bad "told more than once: $(cat err)"
+boxes 11
+sdmgen exact --mesh boxes.off -o x.npy 2>err || bad "exact of boxes: $(cat err)"
+told '^sdmgen: the mesh is inside out; maps turn it$'
+
 # Mending a file: --turn-parts.
-expect 4 'is inside out and overlaps another.*--turn-parts reverses it' sdmgen mesh --mesh x.ply --json
+expect 4 'is inside out and overlaps another.*--turn-parts mends this' sdmgen mesh --mesh x.ply --json
 near "$(json union_volume_mm3)" 124.875 1e-9
 near "$(json parts_inside_out)" 1 0
 expect 0 'parts turned: 1' sdmgen mesh --mesh x.ply --turn-parts -o mended.ply

@@ -19,7 +19,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
-     "edge|centimetres|small|wall|step|apart|twins|changed",
+     "edge|centimetres|small|wall|step|apart|within|twins|changed",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -99,6 +99,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
                  reach = strcmp(fault, "step") ? p[1] : 1 + (p[1] > 1.75);
     const double begin = p[0] + (strcmp(fault, "apart") ? -0.5 : 0.5);
     double handle[2][3] = {{begin, -half, -half + shift}, {p[0] + reach, half, half + shift}};
+    if (!strcmp(fault, "within")) handle[0][0] -= 1, handle[1][0] -= 2.2;
     if (!strcmp(fault, "twins")) memcpy(handle, body, sizeof handle);
     if (boxes == 3) {
         const double far[2][3] = {{10, 10, 10}, {11, 11, 11}};

@@ -189,6 +189,14 @@ sdm_status cli_fit_read_truth(cli_fit *f, sdm_error *err);
 void cli_fit_print_truth_pose(const cli_fit *f);
 void cli_fit_json_truth_pose(const cli_fit *f, sdm_json *json);
 
+/* After the fit: the distance (mm) between the centres of the shape in its pose and in that of
+ * --truth; NaN where the file has no pose. */
+double cli_fit_truth_shift(const cli_fit *f);
+
+/* After cli_fit_compare(): warns where the labels of --reference hardly overlap the shape of a
+ * trustworthy fit, and where the pose of --truth is farther from it than its size. */
+void cli_fit_warn_mismatch(const cli_fit *f);
+
 /* After cli_fit_make_map(): fills f->overlap, unless there is no reference or no surface. */
 sdm_status cli_fit_compare(cli_fit *f, sdm_error *err);
 

@@ -44,8 +44,14 @@ static void print_overlap(const cli_fit *f)
 {
     const cli_overlap *o = &f->overlap;
     if (!o->measured) return;
-    printf("%s: Dice %.4f (%zu voxels fitted, %zu labelled",
-           f->reference_is_target ? "labels" : "reference", o->dice, o->n_fit, o->n_reference);
+    const char *labels = f->reference_is_target ? "labels" : "reference";
+    if (isnan(o->dice)) {
+        printf("%s: no Dice: none of its voxels lies in the image and in the shape or a label\n",
+               labels);
+        return;
+    }
+    printf("%s: Dice %.4f (%zu voxels fitted, %zu labelled", labels, o->dice, o->n_fit,
+           o->n_reference);
     if (!isnan(f->args->fit.label_close)) printf(", closed by %g mm", f->args->fit.label_close);
     printf(")\n");
     if (o->has_surface)

@@ -136,6 +136,12 @@ static double compare_pose(const cli_fit *f, double *degrees)
     return sqrt(v3_dist2(a, b));
 }
 
+double cli_fit_truth_shift(const cli_fit *f)
+{
+    double degrees;
+    return f->has_truth_pose ? compare_pose(f, &degrees) : NAN;
+}
+
 void cli_fit_print_truth_pose(const cli_fit *f)
 {
     double degrees;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: a phantom is recovered, every kind of target and output, fits that must fail, mistakes.
-# Tests: fit_truth.c shell_word.c cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_options.c fit_picture.c fit_repeat.c fit_report.c fit_result.c
+# Tests: fit_truth.c shell_word.c cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_mismatch.c fit_options.c fit_picture.c fit_repeat.c fit_report.c fit_result.c
 # fit_start.c fit_target.c progress_bar.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
@@ -193,6 +193,12 @@ expect 0 - sdmgen fit $fit points.csv --rotation 0,0,0 -p rx=3.2 -p ry=3.2 --spa
 near "$(param rx)" 3 0.05
 near "$(param ry)" 3.5 0.05
 cp out xyz.json
+# a reference and a truth that lie elsewhere
+sdmgen fit $fit points.csv --rotation 0,0,0 -p rx=3.2 -p ry=3.2 --reference label.nrrd --truth truth.json -q >out 2>err
+grep -q 'warning: --reference label.nrrd: its labels do not overlap the fitted shape, and their middle lies 37.[0-9]* mm off: are they in another frame' err ||
+    bad "no word about the reference: $(cat err)"
+grep -q 'warning: --truth truth.json: its pose is 37.[0-9]* mm off the fitted one, more than the [0-9.]* mm that the shape measures' err ||
+    bad "no word about the truth: $(cat err)"
 awk -F, '{ print $3 "," $1 "," $2 }' points.csv >zxy.csv # the header names the columns
 expect 0 - sdmgen fit $fit zxy.csv --rotation 0,0,0 -p rx=3.2 -p ry=3.2 --spacing 0.35 --json
 [ "$(param rx)" = "$(sed -n 's/.*"parameters": {[^}]*"rx": \([^,}]*\).*/\1/p' xyz.json)" ] || bad 'another order of the columns'

@@ -7,6 +7,7 @@
 #include "inputs/grid_cut.h"
 #include "inputs/grid_hits.h"
 #include "inputs/points_file.h"
+#include "inputs/points_unit.h"
 #include "inputs/setup.h"
 #include "measure/measures.h"
 #include "report/exact_layers.h"
@@ -180,6 +181,11 @@ static sdm_status run_points(job *j, sdm_error *err)
     double *x = NULL;
     size_t n = 0;
     sdm_status s = cli_read_points(j->args->points, &x, NULL, &n, err);
+    if (!s) {
+        sdm_box shape = SDM_BOX_EMPTY;
+        for (size_t v = 0; v < j->mesh.n_vert; v++) sdm_box_add(&shape, j->mesh.vert + 3 * v);
+        cli_warn_points_unit(j->args->points, x, n, &shape, "the shape");
+    }
     if (!s) s = cli_points_allocate(&j->points, n, err);
     if (!s) s = sdm_exact_create(&j->mesh, &opts, &engine, err);
     if (!s) j->report = *sdm_exact_get_report(engine);

@@ -7,6 +7,7 @@
 #include "inputs/grid_cut.h"
 #include "inputs/model_grade.h"
 #include "inputs/points_file.h"
+#include "inputs/points_unit.h"
 #include "inputs/setup.h"
 #include "measure/measures.h"
 #include "report/generate_files.h"
@@ -546,6 +547,20 @@ static sdm_status compute_points(job *j, point_answers *a, sdm_result *result, s
                                    a->slopes, result, err);
 }
 
+/* The model's grid is hardly larger than its shapes. */
+static void warn_unit(const job *j, const point_answers *a)
+{
+    const sdm_grid *g = &j->info->grid;
+    sdm_box box = SDM_BOX_EMPTY;
+    for (int corner = 0; corner < 8; corner++) {
+        double index[3], world[3];
+        for (int i = 0; i < 3; i++) index[i] = corner >> i & 1 ? (double)(g->n[i] - 1) : 0;
+        sdm_grid_world(g, index, world);
+        sdm_box_add(&box, world);
+    }
+    cli_warn_points_unit(j->args->points, a->x, a->n, &box, "the model's grid");
+}
+
 /* Puts the line of the first point outside of the model's grid before the message. */
 static sdm_status fail_point(const job *j, const point_answers *a, sdm_status s, sdm_error *err)
 {
@@ -622,6 +637,7 @@ static sdm_status run_points(job *j, sdm_error *err)
     if (!s) s = open_shape(j, err);
     if (!s) s = check_rows(j, err);
     if (!s) s = cli_read_points(j->args->points, &a.x, &a.lines, &a.n, err);
+    if (!s) warn_unit(j, &a);
     if (!s) s = compute_points(j, &a, &result, err);
     if (s == SDM_E_RANGE && a.lines) s = fail_point(j, &a, s, err);
     if (!s && result.clamped) notice_clamped(j, 0);

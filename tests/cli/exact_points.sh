@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen exact --points: columns, input and output formats, mistakes with line numbers, no partial files.
-# Tests: points_file.c points_table.c
+# Tests: points_file.c points_unit.c points_table.c
 . "$(dirname "$0")/common.sh"
 
 # row FILE N COLUMNS: these columns of line N, rounded to six decimals, without the sign of zero.
@@ -45,6 +45,18 @@ expect 0 - sdmgen exact --mesh cube.off --points d.csv -o again.csv --quiet
 [ "$(wc -l <d.csv)" -eq 4 ] || bad "$(wc -l <d.csv) lines"
 head -c 128 d.npy | tr -d '\0' | grep -a -q "'<f8', 'fortran_order': False, 'shape': (3, 8)" || bad "header of d.npy"
 [ "$(od -An -v -t f8 -w64 -j $(($(wc -c <d.npy) - 192)) d.npy | awk '{ printf "%.6f ", $1 }')" = '2.000000 -0.500000 5.000000 ' ] || bad 'values of d.npy'
+
+# Points in m and in um beside a shape in mm; as close together, but away from the origin, they are no mistake.
+printf '0.0015,0,0\n0,0.0005,0\n0,0,-0.001\n' >m.csv
+expect 0 'warning: m.csv: the points measure 0.00187 mm across, the shape 3.46 mm: are they in m\? lengths are mm$' \
+    sdmgen exact --mesh cube.off --points m.csv -o no-unit.csv --quiet
+sed 's/\([0-9.]*[1-9]\)/\1e6/g' m.csv >um.csv
+expect 0 'warning: um.csv: .*: are they in um\? lengths are mm$' sdmgen exact --mesh cube.off --points um.csv -o no-unit.csv --quiet
+printf '0.004,0,0\n0,0.003,0\n0,0,-0.003\n' >model.csv
+expect 0 "warning: model.csv: .*, the model's grid 18.9 mm: are they in m\\?" \
+    sdmgen generate "$source_folder/tests/golden/pod_f32.sdm" --points model.csv -o no-unit.csv --quiet
+sed 's/^0/1/' m.csv >close.csv
+expect 0 - sdmgen exact --mesh cube.off --points close.csv -o no-unit.csv --quiet
 
 # The columns in another order; points from an array and from the vertices of a mesh.
 expect 0 - sdmgen exact --mesh cube.off --points p.csv -o xyz.npy --columns closest --quiet

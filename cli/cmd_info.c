@@ -64,7 +64,7 @@ static void print_model(const char *path, const sdm_model *model)
         "             RMSE of single maps: 50 %% below %.5f mm, 90 %% below %.5f mm, 99 %% below "
         "%.5f mm\n",
         a->q50_mm, a->q90_mm, a->q99_mm);
-    cli_print_quality(&m->quality);
+    cli_print_quality(m);
     print_unfit(model);
     cli_print("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
               (long long)m->train_samples, (unsigned long long)m->seed, m->version);

@@ -9,6 +9,7 @@
 #include "report/report_audit.h"
 #include "report/terminal.h"
 #include "sdm/internal/shape_box.h"
+#include "sdm/internal/verdict.h"
 
 /* Largest fraction of the shapes that the grid of a good model cuts (docs/network.md). */
 #define CUT_MAX 0.05
@@ -44,14 +45,16 @@ void cli_warn_derivatives(const char *path, const sdm_model *m)
         cli_warn("%s: %s", path, why.text);
 }
 
-void cli_print_quality(const sdm_model_quality *q)
+void cli_print_quality(const sdm_model_info *m)
 {
+    const sdm_model_quality *q = &m->quality;
+    char few[SDM_GRADE_FEW];
     if (!*q->grade) {
         cli_print("verdict      not stored: trained by an earlier version\n");
         return;
     }
-    cli_print("verdict      %s; the grid cuts %.3g %% of the held-out shapes\n", q->grade,
-              100 * q->cut);
+    cli_print("verdict      %s%s; the grid cuts %.3g %% of the held-out shapes\n", q->grade,
+              sdm_grade_few(m->accuracy.samples, few), 100 * q->cut);
     if (!isnan(q->between_mm))
         cli_print(
             "             between the voxels exact maps, interpolated linearly, miss the surface "

@@ -15,4 +15,4 @@ void cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_gr
 void cli_warn_derivatives(const char *path, const sdm_model *m);
 
 /* Prints the verdict as lines of `info`. */
-void cli_print_quality(const sdm_model_quality *q);
+void cli_print_quality(const sdm_model_info *m);

@@ -119,10 +119,11 @@ static void print_derivatives(const sdm_verdict *v)
 void cli_print_verdict(const sdm_verdict *v)
 {
     const double voxel = v->voxel_mm;
-    char text[SDM_GRADE_TEXT];
+    char text[SDM_GRADE_TEXT], few[SDM_GRADE_FEW], grade[48];
+    snprintf(grade, sizeof grade, "%s%s", sdm_grade_name(v->grade), sdm_grade_few(v->heldout, few));
     printf("  in voxels   all %.4f, within a voxel of the surface %.4f; Dice %.4f, smallest %.4f\n",
            v->rmse_mm / voxel, v->rmse_voxel_mm / voxel, v->dice, v->dice_min);
-    printf("  %-11s %s\n", sdm_grade_name(v->grade), sdm_grade_text(v, text));
+    printf("  %-11s %s\n", grade, sdm_grade_text(v, text));
     print_unfit(v);
     print_far(v);
     print_derivatives(v);

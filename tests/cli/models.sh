@@ -9,7 +9,7 @@ expect 0 - sdmgen info $model
 has "^not for +volumes, derivatives of maps, derivatives of volumes$" # a network of seconds
 has "of shape 'cochlea'"
 has '^parameters +a +2 \.\. 5 mm, default [0-9.]+, uniform$'
-has '^verdict +(good|usable|poor); the grid cuts [0-9.]+ % of the held-out shapes$'
+has '^verdict +(good|usable|poor) \(from 8 shapes only\); the grid cuts [0-9.]+ % of the held-out shapes$'
 expect 0 - sdmgen info $model --json
 has '"quality": *\{"grade": *"(good|usable|poor)", "cut": [0-9.]+, "between_mm": [0-9.e-]+, "thickness_mm": [0-9.e-]+, "volume_error": [0-9.e-]+, "derivative_error": [0-9.e-]+, "volume_derivative_error": [0-9.e-]+\}'
 for key in checksum train_seconds rmse_mm q99_mm weight_bytes; do [ -n "$(json $key)" ] || bad "info: no $key"; done

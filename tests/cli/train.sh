@@ -54,6 +54,7 @@ grep -q '^sdmgen: the run took [0-9]* s longer than train.minutes: ' err || awk 
     bad "no word about the time: $(cat err)"
 has '^  (good|usable|poor) '
 has '^  error from  bases +[0-9.]+ mm +[0-9]+ %  '
+has '^  (good|usable|poor) \(from 8 shapes only\) +(for|not) '
 has '^  verdict     .*(raise|lower|set) '
 
 # Pictures that cannot be written do not make the training fail.

@@ -127,6 +127,15 @@ static void length_of_the_training(void **state)
     assert_string_equal(v.key, "train.steps");
     // the advice is about the budget of the run, not about the part that this kind had
     assert_true(v.from == 1500 && v.to == 3000);
+    sdm_config timed = c;
+    timed.train.steps = 0, timed.train.minutes = 1.19;
+    const verdict_input in_time = {.config = &timed, .maps = 200, .steps = 1500, .budget = 1.5};
+    v = figures();
+    v.part_mm2[SDM_CAUSE_NETWORK] = 1e-4;
+    trainer_verdict_decide(&in_time, &v);
+    assert_string_equal(v.key, "network.width");
+    assert_true(v.minutes == 3);
+    assert_non_null(strstr(v.sentence, "train.minutes from 1.5 to 3 for a larger network"));
 }
 
 // The other kind is a choice, not a remedy. An error of less than a voxel, or near the
@@ -197,6 +206,27 @@ static void grades(void **state)
         // without any measured part
         assert_true(!v.limited && !v.key[0] && isnan(v.at_best_mm));
         assert_int_equal(strstr(v.sentence, "The grid cuts") == v.sentence, cases[i].cut > 0);
+    }
+}
+
+// Few held-out shapes are told beside the grade and in the sentence.
+static void few_heldout_shapes(void **state)
+{
+    (void)state;
+    const sdm_config c = config_of(NULL, 0);
+    const verdict_input in = {.config = &c};
+    char text[SDM_GRADE_FEW];
+    assert_string_equal(sdm_grade_few(1, text), " (from 1 shape only)");
+    assert_string_equal(sdm_grade_few(9, text), " (from 9 shapes only)");
+    assert_string_equal(sdm_grade_few(10, text), "");
+    assert_string_equal(sdm_grade_few(0, text), "");
+    for (int n = 9; n <= 10; n++) {
+        sdm_verdict v = figures();
+        v.heldout = n;
+        trainer_verdict_decide(&in, &v);
+        const bool told = strstr(v.sentence, " All figures come from 9 held-out shapes: raise "
+                                             "data.holdout to 10 or more.");
+        assert_int_equal(told, n == 9);
     }
 }
 
@@ -612,6 +642,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(error_far_from_the_surface),
         cmocka_unit_test(grid_limits),
         cmocka_unit_test(grades),
+        cmocka_unit_test(few_heldout_shapes),
+        cmocka_unit_test(few_heldout_shapes),
         cmocka_unit_test(uses_and_spacing),
         cmocka_unit_test(triangles_change),
         cmocka_unit_test(grid_cuts),

@@ -186,7 +186,7 @@ static double minutes_for(const verdict_input *in, const sdm_verdict *v)
     if (!strcmp(v->key, "grid.spacing")) factor = pow(v->from / v->to, 3);
     if (v->limit == SDM_CAUSE_MAPS && !in->cut) factor = 2;
     if (v->limit == SDM_CAUSE_NETWORK && !strncmp(v->key, "network.", 8)) factor = 2;
-    return c->train.minutes > 0 && factor > 1 ? ceil(10 * factor * c->train.minutes) / 10 : 0;
+    return c->train.minutes > 0 && factor > 1 ? ceil(10 * factor * in->budget) / 10 : 0;
 }
 
 /* The sentence, with the other keys that must change together with v->key. */
@@ -215,8 +215,8 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
         snprintf(also, sizeof also, " and data.memory_gb to %.0f", ceil(gb));
     v->minutes = minutes_for(in, v);
     if (v->minutes > 0)
-        snprintf(time, sizeof time, ", and train.minutes from %.3g to %.3g for %s",
-                 c->train.minutes, v->minutes,
+        snprintf(time, sizeof time, ", and train.minutes from %.3g to %.3g for %s", in->budget,
+                 v->minutes,
                  v->limit == SDM_CAUSE_MAPS      ? "the maps"
                  : v->limit == SDM_CAUSE_NETWORK ? "a larger network"
                                                  : "more voxels");
@@ -277,6 +277,16 @@ static void tell_inside_out(sdm_verdict *v)
              "parts).");
 }
 
+/* Ends the sentence with the number of held-out shapes, where they are few. */
+static void tell_few(sdm_verdict *v)
+{
+    const size_t used = strlen(v->sentence);
+    if (v->heldout > 0 && v->heldout < SDM_HELDOUT_FEW)
+        snprintf(v->sentence + used, sizeof v->sentence - used,
+                 " All figures come from %d held-out %s: raise data.holdout to %d or more.",
+                 (int)v->heldout, v->heldout == 1 ? "shape" : "shapes", SDM_HELDOUT_FEW);
+}
+
 void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
 {
     v->grade = grade_of(v);
@@ -291,6 +301,7 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
         tell_inside_out(v);
     else if (v->cut > 0)
         tell_cut(v);
+    tell_few(v);
 }
 
 /* Distributes the error of the model over its causes. What a template leaves besides its correction
@@ -391,6 +402,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                          .largest_at_mm = errors->largest_at_mm,
                          .dice = errors->dice,
                          .dice_min = errors->dice_min,
+                         .heldout = t->accuracy.samples,
                          .modes_mm2 = m.modes,
                          .motion_mm = m.motion_mm,
                          .warp_mm = m.warp_mm,

@@ -37,6 +37,15 @@ const char *sdm_grade_name(sdm_grade grade)
     return grade == SDM_GRADE_GOOD ? "good" : grade == SDM_GRADE_USABLE ? "usable" : "poor";
 }
 
+const char *sdm_grade_few(int64_t heldout, char *text)
+{
+    *text = '\0';
+    if (heldout > 0 && heldout < SDM_HELDOUT_FEW)
+        snprintf(text, SDM_GRADE_FEW, " (from %d %s only)", (int)heldout,
+                 heldout == 1 ? "shape" : "shapes");
+    return text;
+}
+
 bool sdm_verdict_lacks_part(const sdm_verdict *v)
 {
     return sdm_too_thin(v->thickness_mm, v->coarse_mm);

@@ -52,6 +52,7 @@ typedef struct sdm_verdict {
     double near_mm, rmse_near_mm, rmse_inside_mm, rmse_outside_mm;
     double largest_mm, largest_at_mm; /* largest error of a voxel; exact signed distance there */
     sdm_grade grade;
+    int64_t heldout;             /* number of the shapes on which the figures were measured */
     double part_mm2[SDM_CAUSES]; /* parts of the mean square error; of the grid: of the surface */
     /* Part of the held-out root mean square error, beyond that of the bases, that the last third of
        the steps took away. */
@@ -107,6 +108,15 @@ const char *sdm_cause_text(sdm_cause cause);
 
 /* "good", "usable" or "poor". [any thread] */
 const char *sdm_grade_name(sdm_grade grade);
+
+/* Figures from fewer held-out shapes say little. */
+enum { SDM_HELDOUT_FEW = 10 };
+
+/* What follows the name of a grade: " (from 3 shapes only)", or "" from SDM_HELDOUT_FEW held-out
+   shapes on and for 0, not known. `text` holds SDM_GRADE_FEW characters. Returns text. [any thread]
+ */
+enum { SDM_GRADE_FEW = 32 };
+const char *sdm_grade_few(int64_t heldout, char *text);
 
 /* What such a model is good for, without the uses that its other figures exclude; of a poor one why
    it is not for use. `text` holds SDM_GRADE_TEXT characters. Returns text. [any thread] */

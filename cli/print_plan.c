@@ -37,12 +37,28 @@ static double total_seconds(const sdm_train_work *w, int nodes, int cores)
     return plan.all_seconds;
 }
 
+/* What the run does in a stage. */
+static const char *stage_text(sdm_plan_stage stage)
+{
+    static const char *const texts[SDM_PLAN_STAGES] = {
+        [SDM_PLAN_TRIALS] = "short trainings that choose between template and pod, about",
+        [SDM_PLAN_DESIGN] = "the preparation of the template or the grid",
+        [SDM_PLAN_MAPS] = "exact maps for training and held-out ones",
+        [SDM_PLAN_BASES] = "basis functions of the maps",
+        [SDM_PLAN_MODES] = "modes of their coefficients",
+        [SDM_PLAN_FIT] = "training of the perceptron by the modes",
+        [SDM_PLAN_REFINE] = "training of all weights by the maps"};
+    return texts[stage];
+}
+
 static void print_stages(const sdm_train_work *w, const sdm_train_plan *p)
 {
     char time[32], bytes[32], count[64];
-    printf("  %-8s %-22s %10s  %s\n", "stage", "work", "time", "received by a node");
+    printf("  %-8s %-16s %10s  %-18s  %s\n", "stage", "work", "time", "received by a node",
+           "what it is");
     for (int i = 0; i < SDM_PLAN_STAGES; i++) {
-        const double n = i == SDM_PLAN_MAPS     ? w->n_maps + w->n_holdout
+        const double n = i == SDM_PLAN_TRIALS   ? w->trial_maps
+                         : i == SDM_PLAN_MAPS   ? w->n_maps + w->n_holdout
                          : i == SDM_PLAN_FIT    ? w->steps
                          : i == SDM_PLAN_REFINE ? w->refine_steps
                                                 : 0;
@@ -50,12 +66,13 @@ static void print_stages(const sdm_train_work *w, const sdm_train_plan *p)
         char words[32] = "";
         if (n > 0)
             snprintf(words, sizeof words, "%.20s %s", cli_format_count((int64_t)n, count),
-                     i == SDM_PLAN_MAPS ? "maps" : "steps");
-        printf("  %-8s %-22s %10s  %s\n", sdm_plan_stage_name((sdm_plan_stage)i), words,
-               format_seconds(p->seconds[i], time), format_bytes(p->received[i], bytes));
+                     i == SDM_PLAN_TRIALS || i == SDM_PLAN_MAPS ? "maps" : "steps");
+        printf("  %-8s %-16s %10s  %-18s  %s\n", sdm_plan_stage_name((sdm_plan_stage)i), words,
+               format_seconds(p->seconds[i], time), format_bytes(p->received[i], bytes),
+               stage_text((sdm_plan_stage)i));
     }
-    printf("  %-8s %-22s %10s  %s\n", "all", "", format_seconds(p->all_seconds, time),
-           format_bytes(p->all_received, bytes));
+    printf("  %-8s %-16s %10s  %-18s  %s\n", "total", "", format_seconds(p->all_seconds, time),
+           format_bytes(p->all_received, bytes), "the sum of these lines");
 }
 
 /* Says what a budget of time is for, or, if half of it is too short for the maps that the
@@ -94,6 +111,9 @@ static void print_text(const sdm_config *config, const sdm_train_work *w, const 
     if (w->fit_step > 0) printf(", %.3g steps a second on a core", 1 / w->fit_step);
     printf("\n");
     print_stages(w, p);
+    if (config->network.kind == SDM_NETWORK_AUTO)
+        printf("  auto     planned as pod; where the template is kept, seconds may be enough "
+               "(--plan network.kind=template)\n");
     print_budget(config, w, p);
     printf("  memory   %s on each node, with one rank on it\n", format_bytes(p->memory, a));
     printf("  files    model %s, checkpoint up to %s; all maps would take %s if they were kept "

@@ -6,8 +6,9 @@
 const char *sdm_plan_stage_name(sdm_plan_stage stage)
 {
     static const char *const names[SDM_PLAN_STAGES] = {
-        [SDM_PLAN_DESIGN] = "design", [SDM_PLAN_MAPS] = "maps", [SDM_PLAN_BASES] = "bases",
-        [SDM_PLAN_MODES] = "modes",   [SDM_PLAN_FIT] = "fit",   [SDM_PLAN_REFINE] = "refine"};
+        [SDM_PLAN_TRIALS] = "trials", [SDM_PLAN_DESIGN] = "design", [SDM_PLAN_MAPS] = "maps",
+        [SDM_PLAN_BASES] = "bases",   [SDM_PLAN_MODES] = "modes",   [SDM_PLAN_FIT] = "fit",
+        [SDM_PLAN_REFINE] = "refine"};
     return names[stage];
 }
 
@@ -22,6 +23,7 @@ static void gathered_bytes(const sdm_train_work *w, double nodes, double bytes[S
 {
     const double row = 8 * w->n_params;
     for (int i = 0; i < SDM_PLAN_STAGES; i++) bytes[i] = 0;
+    bytes[SDM_PLAN_TRIALS] = w->trial_maps * (2 * kept_voxels(w, nodes) + row + 4);
     bytes[SDM_PLAN_MAPS] =
         w->n_maps * (2 * kept_voxels(w, nodes) + row + 4) + w->n_holdout * (4 * w->n_voxels + row);
     if (!w->shared) return;
@@ -71,7 +73,8 @@ void sdm_train_plan_make(const sdm_train_work *w, int nodes, int cores, sdm_trai
     const double n = nodes, m = cores, steps_by = w->shared ? n : 1;
     double bytes[SDM_PLAN_STAGES];
     *out = (sdm_train_plan){
-        .seconds = {[SDM_PLAN_DESIGN] = w->design / m,
+        .seconds = {[SDM_PLAN_TRIALS] = w->trials / (n * m),
+                    [SDM_PLAN_DESIGN] = w->design / m,
                     [SDM_PLAN_MAPS] = (w->n_maps + w->n_holdout) * w->map / (n * m),
                     [SDM_PLAN_BASES] = w->bases / (n * m),
                     [SDM_PLAN_MODES] = (w->modes - w->modes_products * (1 - 1 / n)) / m,

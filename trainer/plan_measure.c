@@ -6,6 +6,7 @@
 #include "data/dataset_fill.h"
 #include "pod/mlp.h"
 #include "pod/pod_state.h"
+#include "race.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/team.h"
 #include "sdm/internal/text.h"
@@ -185,7 +186,8 @@ static void count_steps(const sdm_config *c, sdm_train_work *w)
     double steps = (double)c->train.steps;
     if (c->train.samples > 0) steps = ceil((double)c->train.samples / (double)c->train.batch);
     if (c->train.minutes > 0) {
-        const double before = w->design + (w->n_maps + w->n_holdout) * w->map + w->bases + w->modes,
+        const double before = w->trials + w->design + (w->n_maps + w->n_holdout) * w->map +
+                              w->bases + w->modes,
                      left = fmax(0, c->train.minutes * 60 * w->threads - before);
         w->steps = w->fit_step > 0 ? floor(left * (1 - share) / w->fit_step) : 0;
         w->refine_steps = w->refine_step > 0 ? floor(left * share / w->refine_step) : 0;
@@ -193,6 +195,20 @@ static void count_steps(const sdm_config *c, sdm_train_work *w)
     }
     w->steps = w->fit_step > 0 ? floor((1 - share) * steps + 0.5) : 0;
     w->refine_steps = share > 0 ? steps - w->steps : 0;
+}
+
+/* Work of the trials of network.kind: auto, where bases of n maps take fixed + per_map n. The maps
+ * of one of the two trials are maps of the training, too. Both kinds are taken to cost what pod
+ * does. */
+static void trials_work(const sdm_config *c, double fixed, double per_map, sdm_train_work *w)
+{
+    const double n = (double)trainer_trial_maps(c, (size_t)w->n_params),
+                 most = c->train.minutes > 0
+                            ? TRAINER_TRIALS_SHARE * 60 * c->train.minutes * w->threads
+                            : INFINITY;
+    if (c->network.kind != SDM_NETWORK_AUTO) return;
+    w->trial_maps = fmin(n + (double)trainer_trial_holdout(c), most / w->map);
+    w->trials = w->trial_maps * w->map + 2 * (fixed + per_map * fmin(n, w->trial_maps));
 }
 
 /* Work of a whole training from those of two small ones with few and with more maps. */
@@ -221,6 +237,7 @@ static void extrapolate(const measurement *few, measurement *more, const sdm_con
                  fixed = fmax(0, more->begin - per_map * n2);
     w->bases = fixed + per_map * maps;
     modes_times(flops_per_second, w);
+    trials_work(c, fixed, per_map, w);
 }
 
 /* Bytes of a weight in the model file. */

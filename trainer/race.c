@@ -25,9 +25,6 @@ static const double HOPELESS = 15;
 /* Part of the budget for a template that is trained before `pod`. */
 static const double TEMPLATE_SHARE = 1.0 / 3;
 
-/* No more maps are made for the trials once this part of a budget of time is used. */
-static const double TRIALS_SHARE = 0.25;
-
 /* A kind of network in the race. */
 typedef struct entrant {
     sdm_network_kind kind;
@@ -51,25 +48,35 @@ static void entrant_dispose(entrant *e)
     e->run.kind = NULL;
 }
 
+size_t trainer_trial_maps(const sdm_config *c, size_t n_params)
+{
+    // four maps determine a polynomial; of degree 2 where that is within bounds
+    size_t maps = 4 * sdm_poly_count(n_params, 2) + 4;
+    maps = maps < MAPS ? MAPS : maps > MAPS_MAX ? MAPS_MAX : maps;
+    size_t all = (size_t)c->data.start;
+    size_t grid = sdm_config_static_count(c, n_params, 0) > 0;
+    for (size_t i = 0; i < n_params && grid && grid < MAPS_MAX; i++)
+        grid *= (size_t)sdm_config_static_count(c, n_params, i);
+    all += grid < MAPS_MAX ? grid : MAPS_MAX;
+    return all < maps ? (all ? all : 1) : maps;
+}
+
+int64_t trainer_trial_holdout(const sdm_config *c)
+{
+    return c->data.holdout < HOLDOUT ? c->data.holdout : HOLDOUT;
+}
+
 /* The configuration of a trial: a few maps, no optimiser steps. */
 static void trial_config(const sdm_config *from, size_t n_params, sdm_network_kind kind,
                          sdm_config *c)
 {
     *c = *from;
     sdm_config_choose_kind(c, kind);
-    // four maps determine a polynomial; of degree 2 where that is within bounds
-    size_t maps = 4 * sdm_poly_count(n_params, 2) + 4;
-    maps = maps < MAPS ? MAPS : maps > MAPS_MAX ? MAPS_MAX : maps;
-    size_t all = (size_t)from->data.start;
-    size_t grid = sdm_config_static_count(from, n_params, 0) > 0;
-    for (size_t i = 0; i < n_params && grid && grid < MAPS_MAX; i++)
-        grid *= (size_t)sdm_config_static_count(from, n_params, i);
-    all += grid < MAPS_MAX ? grid : MAPS_MAX;
-    c->data.start = (int64_t)(all < maps ? (all ? all : 1) : maps);
+    c->data.start = (int64_t)trainer_trial_maps(from, n_params);
     c->data.n_static_counts = 0;
     c->data.online = 0;
     c->data.sampling = SDM_SAMPLING_UNIFORM;
-    if (c->data.holdout > HOLDOUT) c->data.holdout = HOLDOUT;
+    c->data.holdout = trainer_trial_holdout(from);
     c->network.depth = 0;
     c->network.modes = c->network.modes < 256 ? c->network.modes : 256;
     c->train.refine = 0;
@@ -81,7 +88,7 @@ static bool trial_cancelled(void *user) { return trainer_cancelled(((entrant *)u
 /* true when the trials have used their part of a time budget. */
 static bool trial_enough(void *user)
 {
-    return trainer_start_fraction(((entrant *)user)->race) > TRIALS_SHARE;
+    return trainer_start_fraction(((entrant *)user)->race) > TRAINER_TRIALS_SHARE;
 }
 
 /* *out = the errors of a trial. */

@@ -10,6 +10,13 @@ typedef struct trial_gain {
     dataset maps; /* trainer.tried */
 } trial_gain;
 
+/* No more maps are made for the trials once this part of a budget of time is used. */
+#define TRAINER_TRIALS_SHARE 0.25
+
+/* Numbers of the maps of a trial, for training and held out. */
+size_t trainer_trial_maps(const sdm_config *c, size_t n_params);
+int64_t trainer_trial_holdout(const sdm_config *c);
+
 /* Fills *out with the kinds to train. Each kind that the shape allows is trained on the same few
    hundred exact maps (bases and least squares, no steps) and measured on held-out shapes; the
    results are sent to the message callback and appended to t->metrics. gain[i] = what the trial of

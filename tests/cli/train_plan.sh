@@ -15,7 +15,7 @@ expect 0 - sdmgen train "$tiny" --plan --nodes 4 --cores 8 --json -q
 out' ] || bad "something was written: $(ls)"
 [ "$(json maps)/$(json heldout)/$(json steps)/$(json refine_steps)" = 176/8/36/24 ] || bad "work: $(cat out)"
 grep -o '"stage": "[a-z]*", "seconds": [^,]*, "received_bytes": [0-9.e+]*' out | sed 's/[",]//g' | awk '{ print $2, $4, $6 }' >stages
-[ "$(cut -d' ' -f1 stages | tr '\n' ' ')" = 'design maps bases modes fit refine ' ] || bad "stages: $(cat out)"
+[ "$(cut -d' ' -f1 stages | tr '\n' ' ')" = 'trials design maps bases modes fit refine ' ] || bad "stages: $(cat out)"
 read -r all_seconds all_bytes <<<"$(sed 's/.*"cores": 8, "seconds": \([^,]*\), "received_bytes": \([^,]*\),.*/\1 \2/' out)"
 equal "$all_seconds" "$(awk '{ s += $2 } END { printf "%.17g", s }' stages)"
 equal "$all_bytes" "$(awk '{ s += $3 } END { printf "%.17g", s }' stages)"
@@ -27,7 +27,7 @@ equal "$(bytes maps)" $(((176 * (2 * 2688 / 4 + 8 * 4 + 4) + 8 * (4 * 2688 + 8 *
 # 14 inputs (degree 2), one layer: weights and biases of 16 units, 16 modes
 equal "$(bytes fit)" $((36 * (16 * (8 + 4 * 16 + 8 * 16) + 4 * (15 * 16 + 16 * 16)) * 3 / 4))
 equal "$(json dataset_bytes)" $((184 * (4 * 2688 + 8 * 4 + 8)))
-awk '$1 != "design" && !($2 > 0) { exit 1 }' stages || bad "times: $(cat stages)"
+awk '$1 != "design" && $1 != "trials" && !($2 > 0) { exit 1 }' stages || bad "times: $(cat stages)"
 [ "$(grep -o '"nodes": [0-9]*, "seconds"' out | wc -l)" -eq 11 ] || bad "scaling: $(cat out)"
 
 # Memory: as nodes keep fewer voxels, they need less of it.
@@ -45,14 +45,17 @@ train: {steps: 20, batch: 4}
 END
 expect 0 - sdmgen train template.yaml --plan -q
 has '^plan for 1 node of [0-9]+ cores, from [0-9.]+ s on '
-has '^  maps     52 maps +[0-9.e-]+ s  0 B$'
+has '^  maps     52 maps +[0-9.e-]+ s  0 B  '
 has '^  design  '
 has '^  refine   20 steps '
 has '^  nodes    1: '
 has '; (more than one does not pay|it pays up to [0-9]+)'
-# A budget of time: what it is for, and for how many maps it is enough. Other budgets have no such line.
-grep -q '^  budget' out && bad 'a budget of time without train.minutes'
-expect 0 - sdmgen train template.yaml train.steps=0 train.minutes=600 --plan -q
+# A budget of time: what it is for, and for how many maps it is enough. Other budgets have no such line. The trials of `auto` are a part of it.
+grep -Eq '^  (budget|trials|auto) ' out && bad 'a budget of time or trials without train.minutes and auto'
+expect 0 - sdmgen train template.yaml network.kind=auto train.steps=0 train.minutes=600 --plan -q
+has '^  trials   36 maps +[0-9.e-]+ s  0 B +short trainings that choose between template and pod, about$'
+has '^  total +10 h  0 B +the sum of these lines$'
+has '^  auto     planned as pod; '
 has '^  budget   train\.minutes is 600: at most half of it is for the maps before training \([0-9.e-]+ s\), the rest for as many steps as fit$'
 # A template whose parts need no correction makes no maps for the training and no steps.
 expect 0 - sdmgen train "$source_folder/configs/linkage.yaml" network.kind=template grid=auto grid.voxels=24 --plan -q

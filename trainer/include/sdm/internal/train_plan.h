@@ -10,7 +10,8 @@ extern "C" {
 
 /* A stage of a training. The order is that of the run. */
 typedef enum sdm_plan_stage {
-    SDM_PLAN_DESIGN = 0, /* before any map: of a template, else nothing */
+    SDM_PLAN_TRIALS = 0, /* of network.kind: auto, else nothing */
+    SDM_PLAN_DESIGN,     /* before any map: of a template, else nothing */
     SDM_PLAN_MAPS,
     SDM_PLAN_BASES, /* local bases and projections of the maps */
     SDM_PLAN_MODES, /* global modes: nodes share the products, not the rest */
@@ -19,7 +20,7 @@ typedef enum sdm_plan_stage {
     SDM_PLAN_STAGES
 } sdm_plan_stage;
 
-/* "design", "maps", "bases", "modes", "fit" or "refine". */
+/* "trials", "design", "maps", "bases", "modes", "fit" or "refine". */
 const char *sdm_plan_stage_name(sdm_plan_stage stage);
 
 /* The work of a training. Times are core seconds: wall time on one core, or on n cores n times as
@@ -30,6 +31,7 @@ typedef struct sdm_train_work {
     double n_pool;            /* maps in memory at a time, but for the held-out ones */
     double n_params, n_voxels, n_map_voxels; /* n_voxels: of the maps that the network learns */
     double steps, refine_steps;
+    double trials, trial_maps;    /* of network.kind: auto; exact maps made for them alone */
     double design;                /* of all that precedes the maps */
     double map;                   /* of one exact map */
     double bases;                 /* of all maps */

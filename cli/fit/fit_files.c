@@ -17,13 +17,20 @@ static bool is_image(const char *path)
 
 /* ---- before any work ---- */
 
+static sdm_status check_type(const char *path, sdm_error *err)
+{
+    sdm_error why;
+    if (cli_ends_with(path, ".json")) return SDM_OK;
+    const sdm_status s = cli_check_type(path, false, &why);
+    const char *more = s == SDM_E_ARG ? "; or in .json, for the result" : "";
+    return s ? sdm_fail(err, s, "%s%s", why.text, more) : SDM_OK;
+}
+
 sdm_status cli_fit_check_types(const cli_args *args, sdm_error *err)
 {
     const char *label = args->fit.label_out;
     sdm_status s = SDM_OK;
-    for (size_t i = 0; i < args->outputs.n && !s; i++)
-        if (!cli_ends_with(args->outputs.items[i], ".json"))
-            s = cli_check_type(args->outputs.items[i], false, err);
+    for (size_t i = 0; i < args->outputs.n && !s; i++) s = check_type(args->outputs.items[i], err);
     if (!s && label && !cli_ends_with_any(label, CLI_VOLUME_ENDINGS))
         s = sdm_fail(err, SDM_E_ARG,
                      "--label-out '%s': its name must end in .nii .nii.gz .nrrd or .mha", label);

@@ -271,17 +271,26 @@ sdm_given *sdm_fields_given(sdm_reader *r, const char *section, const char *key)
     return &r->given[0][0];
 }
 
+/* Names of the keys of a section, of the top level with those of the sections. Returns their
+ * number.
+ */
+static size_t key_names(const sdm_reader *r, const sdm_section *section,
+                        const char *names[SDM_SECTION_FIELDS_MAX + SDM_SECTIONS_MAX])
+{
+    size_t n = 0;
+    for (size_t k = 0; k < section->n_fields; k++) names[n++] = section->fields[k].key;
+    for (size_t s = 0; s < r->n_sections && !*section->name; s++)
+        if (*r->sections[s].name) names[n++] = r->sections[s].name;
+    return n;
+}
+
 /* The key to suggest for an unknown one: the most similar key of the same section (with `full` its
  * dotted path), else the path of the same key in another section. NULL: none. */
 static const char *suggest(const sdm_reader *r, const sdm_section *section, const char *key,
                            bool full, char buf[SDM_KEY_PATH_MAX])
 {
     const char *names[SDM_SECTION_FIELDS_MAX + SDM_SECTIONS_MAX];
-    size_t n = 0;
-    for (size_t k = 0; k < section->n_fields; k++) names[n++] = section->fields[k].key;
-    for (size_t s = 0; s < r->n_sections && !*section->name; s++)
-        if (*r->sections[s].name) names[n++] = r->sections[s].name;
-    const char *near = sdm_nearest_name(key, names, n);
+    const char *near = sdm_nearest_name(key, names, key_names(r, section, names));
     if (near) {
         bool prefix = full && *section->name;
         snprintf(buf, SDM_KEY_PATH_MAX, "%s%s%s", prefix ? section->name : "", prefix ? "." : "",
@@ -299,18 +308,37 @@ static const char *suggest(const sdm_reader *r, const sdm_section *section, cons
     return NULL;
 }
 
-/* Records an unknown key as a mistake, with a suggestion if suggest() finds one. */
+/* Notes that a key of the section, or the key of a section that is probably meant, is unknown. */
+static void note_unknown(sdm_reader *r, const sdm_section *section, const char *meant)
+{
+    for (size_t s = 0; s < r->n_sections; s++)
+        if (&r->sections[s] == section || (meant && !strcmp(r->sections[s].name, meant)))
+            r->unknown[s] = true;
+}
+
+/* Records an unknown key as a mistake, with a suggestion if suggest() finds one, else with the keys
+ * that are known. */
 static void refuse_key(sdm_reader *r, const sdm_section *section, const sdm_tree_node *node)
 {
-    char quoted[SDM_QUOTE_MAX], buf[SDM_KEY_PATH_MAX];
+    const char *names[SDM_SECTION_FIELDS_MAX + SDM_SECTIONS_MAX];
+    char quoted[SDM_QUOTE_MAX], buf[SDM_KEY_PATH_MAX], list[256];
     const char *dot = *section->name ? "." : "", *key = sdm_quote(node->key, quoted);
     const char *near = suggest(r, section, node->key, node->key_mark.override > 0, buf);
     if (near)
         sdm_mistakes_add(r->mistakes, node->key_mark, "unknown key '%s%s%s'; did you mean '%s'?",
                          section->name, dot, key, near);
     else
-        sdm_mistakes_add(r->mistakes, node->key_mark, "unknown key '%s%s%s'", section->name, dot,
-                         key);
+        sdm_mistakes_add(r->mistakes, node->key_mark, "unknown key '%s%s%s'; the keys are %s",
+                         section->name, dot, key,
+                         sdm_list_names(names, key_names(r, section, names), list, sizeof list));
+    note_unknown(r, section, near);
+}
+
+bool sdm_fields_unknown(const sdm_reader *r, const char *section)
+{
+    size_t s = 0;
+    while (strcmp(r->sections[s].name, section) != 0) s++;
+    return r->unknown[s];
 }
 
 static void read_key(sdm_reader *r, size_t s, const sdm_tree_node *node)

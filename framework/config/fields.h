@@ -68,6 +68,8 @@ typedef struct sdm_reader {
     size_t n_sections;
     sdm_mark section_mark[SDM_SECTIONS_MAX]; /* first position of each section */
     sdm_given given[SDM_SECTIONS_MAX][SDM_SECTION_FIELDS_MAX];
+    /* a key of the section is unknown: what seems to be missing may be this one */
+    bool unknown[SDM_SECTIONS_MAX];
     double centre[3]; /* grid.centre; converted to grid.origin after all keys are read */
     int file_kind;    /* network.kind before the overrides are applied */
 } sdm_reader;
@@ -99,6 +101,9 @@ void sdm_fields_read(sdm_reader *r, const sdm_tree_node *root);
 
 /* The entry of r->given for section.key, which must exist in the tables. */
 sdm_given *sdm_fields_given(sdm_reader *r, const char *section, const char *key);
+
+/* True if a key of the section is unknown: then no other key of it is called missing. */
+bool sdm_fields_unknown(const sdm_reader *r, const char *section);
 
 /* Read one number in min .. max, or a text of at most `max` bytes; `path` names the key in
  * messages. Return false after a mistake was recorded; *out is then unchanged. */

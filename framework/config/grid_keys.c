@@ -49,6 +49,7 @@ static bool check_keys(sdm_reader *r, sdm_given *given[N_KEYS], unsigned has, sd
     const unsigned complete = 1 << SIZE | 1 << SPACING;
     if (has == 0 || has == 1 << SPACING || has == 1 << VOXELS) return true;
     if ((has & complete) == complete && !(has & 1 << VOXELS)) return true;
+    if (sdm_fields_unknown(r, "grid")) return false;
     char list[80] = "";
     sdm_mark last = section;
     for (int k = 0; k < N_KEYS; k++) {

@@ -396,7 +396,7 @@ static void check_budget(sdm_reader *r, sdm_mark section)
         sdm_mistakes_add(r->mistakes, given[zero]->mark,
                          "the training has no budget: one of train.minutes, train.steps and "
                          "train.samples must be positive");
-    else if (n == 0 && !refused)
+    else if (n == 0 && !refused && !sdm_fields_unknown(r, "train"))
         sdm_mistakes_add(
             r->mistakes, section,
             "missing key: one of train.minutes, train.steps and train.samples must be positive");
@@ -410,7 +410,8 @@ static void check_budget(sdm_reader *r, sdm_mark section)
 static void require(sdm_reader *r, const char *section, const char *key, sdm_mark mark,
                     const char *example)
 {
-    if (sdm_mark_is_set(sdm_fields_given(r, section, key)->mark)) return;
+    if (sdm_mark_is_set(sdm_fields_given(r, section, key)->mark) || sdm_fields_unknown(r, section))
+        return;
     sdm_mistakes_add(r->mistakes, mark, "missing key '%s.%s'; e.g. %s", section, key, example);
 }
 

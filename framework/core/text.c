@@ -157,7 +157,8 @@ bool sdm_is_name(const char *text)
     return !text[n] && n <= SDM_NAME_LENGTH_MAX;
 }
 
-/* A word of this length or longer may be the beginning of a name. */
+/* A word of this length or longer may be the beginning of a name; one that is longer by two, also
+ * without its last letter. */
 enum { SHORTEST_BEGINNING = 3 };
 
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n)
@@ -172,5 +173,7 @@ const char *sdm_nearest_name(const char *word, const char *const *names, size_t 
     // else the first name that begins with the word
     for (size_t i = 0; i < n && !nearest && length >= SHORTEST_BEGINNING; i++)
         if (!strncmp(word, names[i], (size_t)length)) nearest = names[i];
+    for (size_t i = 0; i < n && !nearest && length >= SHORTEST_BEGINNING + 2; i++)
+        if (!strncmp(word, names[i], (size_t)length - 1)) nearest = names[i];
     return nearest;
 }

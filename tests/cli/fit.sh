@@ -272,6 +272,7 @@ expect 2 'a MODEL and an IMAGE are needed' sdmgen fit ct.nii.gz -o no.stl
 expect 2 'either MODEL or --shape' sdmgen fit $fit model.sdm ct.nii.gz -o no.stl
 expect 2 "image 'ct.dcm': its name must end in" sdmgen fit $fit ct.dcm -o no.stl
 expect 2 "output 'no.txt': its name must end in" sdmgen fit $fit ct.nii.gz -o no.txt
+expect 2 "'no.abc': its name must end in .* or .pdf; or in .json, for the result$" sdmgen fit $fit ct.nii.gz -o no.abc
 expect 2 "'no.stl' is given twice" sdmgen fit $fit ct.nii.gz -o no.stl -o no.stl
 expect 2 "'no.nii' is given twice" sdmgen fit $fit ct.nii.gz -o no.nii --label-out no.nii
 expect 2 "label-out 'no.npy': its name must end in" sdmgen fit $fit ct.nii.gz --label-out no.npy

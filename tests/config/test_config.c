@@ -286,7 +286,9 @@ static void test_mistakes(void **state)
         {"network: {dpth: 4}", "x.yaml:4:11: unknown key 'network.dpth'; did you mean 'depth'?"},
         {"netwrok: 4", "x.yaml:4:1: unknown key 'netwrok'; did you mean 'network'?"},
         {"depth: 4", "x.yaml:4:1: unknown key 'depth'; did you mean 'network.depth'?"},
-        {"data: {qqqqqq: 4}", "x.yaml:4:8: unknown key 'data.qqqqqq'"},
+        {"data: {qqqqqq: 4}",
+         "x.yaml:4:8: unknown key 'data.qqqqqq'; the keys are static, online, start, holdout, "
+         "sampling, static_share, memory_gb, workers"},
         {"network: {depth: 4, depth: 5}",
          "x.yaml:4:21: duplicate key 'network.depth' (first at line 4)"},
         {"seed: 1\nseed: 2", "x.yaml:5:1: duplicate key 'seed' (first at line 4)"},
@@ -578,7 +580,9 @@ static void test_override_mistakes(void **state)
         {"network.depth=17",
          "argument 'network.depth=17': network.depth: 17 is out of range (0 .. 16)"},
         {"a.b.c.d.e.f.g.h.i=4", "argument 'a.b.c.d.e.f.g.h.i=4': unknown key"},
-        {"..=4", "argument '..=4': unknown key ''"},
+        {"..=4",
+         "argument '..=4': unknown key ''; the keys are seed, threads, shape, grid, network, data, "
+         "train, output"},
         {"shape.ranges.a=[3",
          "argument 'shape.ranges.a=[3': not valid YAML: did not find expected ',' or ']' (while "
          "parsing a flow sequence from line 1)"},
@@ -612,16 +616,26 @@ static void test_mistakes_are_sorted_and_counted(void **state)
     assert_non_null(strstr(err.text, "x.yaml:23:1: unknown key"));
     assert_non_null(strstr(err.text, "\n... and 12 more"));
 
-    // Three mistakes in the file and one in an argument give four lines.
+    // Three mistakes in the file and one in an argument give four lines. The name that is missing
+    // is that of the unknown key, which alone is told.
     assert_int_equal(
         parse("shape: {nam: b}\ngrid: {size: [4, 5], spacing: 1}\ntrain: {steps: x}\n", LATE, 1),
         SDM_E_CONFIG);
     assert_string_equal(err.text,
-                        "x.yaml:1:1: missing key 'shape.name'; e.g. name: cochlea\n"
                         "x.yaml:1:9: unknown key 'shape.nam'; did you mean 'name'?\n"
                         "x.yaml:2:14: grid.size: needs three integers [x, y, z], got a list of 2\n"
                         "x.yaml:3:16: train.steps: needs an integer, got 'x'\n"
                         "argument 'network.depth=99': network.depth: 99 is out of range (0 .. 16)");
+
+    // So it is with the grid, the budget, and the key of a section.
+    assert_int_equal(parse("shape: {name: b}\ngrid: {size: [4, 5, 5], space: 3}\n"
+                           "train: {stepps: 20}\n",
+                           NULL, 0),
+                     SDM_E_CONFIG);
+    assert_string_equal(err.text, "x.yaml:2:25: unknown key 'grid.space'; did you mean 'spacing'?\n"
+                                  "x.yaml:3:9: unknown key 'train.stepps'; did you mean 'steps'?");
+    assert_int_equal(parse("shape: {name: b}\ntrian: {steps: 20}\n", NULL, 0), SDM_E_CONFIG);
+    assert_string_equal(err.text, "x.yaml:2:1: unknown key 'trian'; did you mean 'train'?");
 
     // Long values are cut, and long file names cannot cut a message: only whole lines, then the
     // count of the rest.

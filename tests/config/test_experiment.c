@@ -286,7 +286,8 @@ static void test_mistakes_of_the_experiment(void **state)
     expect_mistake(SHAPE METHODS "variants: [{name: a, set: 3}]\n", NULL,
                    "dir/x.yaml:7:27: set: needs keys with values, got '3'");
     expect_mistake(SHAPE METHODS "output: {folder: x}\n", NULL,
-                   "dir/x.yaml:7:1: unknown key 'output'");
+                   "dir/x.yaml:7:1: unknown key 'output'; the keys are base, shape, grid, network, "
+                   "data, train, seed, threads, methods, variants, reference, experiment, fit");
 }
 
 /* Variants with the same training share the network of the first of them. */

@@ -165,6 +165,8 @@ static void numbers_and_names_are_parsed(void **state)
     assert_string_equal(sdm_nearest_name("dpeth", names, 3), "depth");
     assert_string_equal(sdm_nearest_name("withd", names, 3), "width");
     assert_null(sdm_nearest_name("colour", names, 3));
+    const char *const lengths[] = {"size", "spacing"};
+    assert_string_equal(sdm_nearest_name("space", lengths, 2), "spacing");
     const char *const parts[] = {"height", "head_radius"};
     assert_string_equal(sdm_nearest_name("head", parts, 2), "head_radius");
     assert_null(sdm_nearest_name("he", parts, 2));

@@ -73,7 +73,8 @@ bool sdm_is_name(const char *text);
     "names are a small letter, then small letters, digits and _, at most 63 in all"
 
 /* The most similar of names[n] to `word` by optimal string alignment distance; if none is similar,
- * the first that begins with `word`, if it has three characters or more; else NULL. */
+ * the first that begins with `word`, if it has three characters or more; else, if it has five, the
+ * first that begins with all but its last one; else NULL. */
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n);
 
 #ifdef __cplusplus

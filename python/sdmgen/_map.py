@@ -180,6 +180,11 @@ class Doubts:
             warn(text)
 
 
+class VolumeAdjoint(np.ndarray):  # type: ignore[type-arg]
+    """Derivatives of the volume by the values of a map: `Model.vjp` of them warns of derivatives of
+    volumes in place of those of maps."""
+
+
 class Map(Image):
     """A signed distance map: float32 [z, y, x], mm, NEGATIVE INSIDE, on a grid in LPS."""
 
@@ -225,7 +230,7 @@ class Map(Image):
         self._doubts.warn("volume_derivative")
         result = np.empty_like(self.values)
         call("sdm_map_volume_adjoint", self.grid, address(self.values), 0, address(result))
-        return result
+        return result.view(VolumeAdjoint)
 
 
 def surface(map: Image, level: float = 0.0) -> Surface:

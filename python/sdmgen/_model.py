@@ -15,7 +15,7 @@ from ._arrays import Float32, Float64, Triple, address, choice, finite, flag, fl
 from ._errors import QualityError, UnsupportedError, argument_error, warn
 from ._grid import Grid, grid_within
 from ._library import Handle, call, function, make
-from ._map import Band, Batch, Check, Doubts, Map, MapInfo, band_of, check_of, info_of
+from ._map import Band, Batch, Check, Doubts, Map, MapInfo, VolumeAdjoint, band_of, check_of, info_of
 from ._shape import InstanceShape, Param, Registry, Shape, param_of
 
 Params = Union[None, ArrayLike, Mapping[str, float]]
@@ -323,10 +323,10 @@ class Model:
                 raise
         return Batch(values, self.grid, [info_of(r) for r in results], self._doubts)
 
-    def _warn_derivatives(self, info: MapInfo) -> None:
+    def _warn_derivatives(self, info: MapInfo, of_volume: bool = False) -> None:
         """Warns once of derivatives by the network that its training found to be off by over 20 %."""
         if info.source == "network":
-            self._doubts.warn("derivative")
+            self._doubts.warn("volume_derivative" if of_volume else "derivative")
 
     def _differentiated(self, values: Float32, result: Any) -> Map:
         """The map of derivatives that have been computed."""
@@ -380,13 +380,15 @@ class Model:
         self, adjoint: ArrayLike, params: Params = None, *, policy: str = "refuse", threads: int = 0, **named: float
     ) -> Float64:
         """The transposed Jacobian times `adjoint` [z, y, x]: if the adjoint is the derivative of a
-        function of the map by the voxels, the result [k] is that by the parameters."""
+        function of the map by the voxels, the result [k] is that by the parameters. Warns once if
+        the training found derivatives to be off by over 20 %: those of the volume for an adjoint of
+        `Map.volume_adjoint`, else those of maps."""
         p = self.values(params, **named)
         w = float32(adjoint, self.grid.shape, "adjoint")
         opts, slopes, result = self._opts(policy, threads), np.empty(len(p)), make("sdm_result")
         exact = bool(opts.exact_shape)
         self._call(exact, "sdm_generate_vjp", self, address(p), address(w), byref(opts), address(slopes), byref(result))
-        self._warn_derivatives(info_of(result))
+        self._warn_derivatives(info_of(result), isinstance(adjoint, VolumeAdjoint))
         return slopes
 
     def check(self, params: Params = None, *, threads: int = 0, **named: float) -> Check:

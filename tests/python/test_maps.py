@@ -106,6 +106,7 @@ def test_derivatives_and_volumes_that_are_bad_warn_once(model_file, tmp_path):
     cases = [(work, "derivatives of its maps are off by") for work in derivatives]
     cases += [(work, "volumes of its maps are off by") for work in volumes]
     cases += [(lambda m: m(P).volume_adjoint(), "derivatives of volumes of its maps are off by")]
+    cases += [(lambda m: m.vjp(2 * m(P).volume_adjoint(), P), "derivatives of volumes of its maps are off by")]
     for work, text in cases:
         fresh = sdmgen.Model(model_file)
         with pytest.warns(UserWarning, match=f"model.sdm: {text}") as caught:

@@ -102,16 +102,17 @@ static double position(const sdm_sections *s, int axis, double at)
     return g->origin[w] + g->dir[3 * w + axis] * at * g->spacing[axis];
 }
 
-/* "x (mm)" for an axis parallel to a world axis, "20 degrees from -x (mm)", with the sign of
- * degrees, for an oblique one. */
-static void axis_text(const sdm_sections *s, int axis, char text[48])
+/* "x (mm)" for an axis parallel to a world axis, "20 degrees from -x (mm from the corner)", with
+ * the sign of degrees, for an oblique one. */
+static void axis_text(const sdm_sections *s, int axis, char text[64])
 {
     const int w = s->world[axis];
     const char name = "xyz"[w], *sign = s->grid->dir[3 * w + axis] < 0 ? "-" : "+";
     if (is_aligned(s, axis))
-        snprintf(text, 48, "%c (mm)", name);
+        snprintf(text, 64, "%c (mm)", name);
     else
-        snprintf(text, 48, "%.3g\xC2\xB0 from %s%c (mm)", s->degrees[axis], sign, name);
+        snprintf(text, 64, "%.3g\xC2\xB0 from %s%c (mm from the corner)", s->degrees[axis], sign,
+                 name);
 }
 
 /* Where the section normal to `axis` lies: "z = 12.5 mm"; an oblique one, whose z varies, "z = 12.5
@@ -137,7 +138,7 @@ static void draw_axis(sdm_canvas *c, const sdm_sections *s, sdm_box box, int axi
                  b = position(s, axis, last);
     const int length = upwards ? box.h : box.w;
     double first, step;
-    char text[48];
+    char text[64];
     const int n = sdm_ticks(fmin(a, b), fmax(a, b), length / 55 + 1, &first, &step);
     sdm_type type = {.size = 9, .align = upwards ? SDM_RIGHT : SDM_CENTRE, .colour = SDM_INK};
     for (int i = 0; i < n; i++) {

@@ -117,7 +117,8 @@ static size_t count_marks(const layout *l, size_t column)
 
 /* Line i of a panel. A map of distances has its own contours; under that of the first level, which
  * is then dashed, lies that of the first map, to compare. A map of errors has the contours of the
- * first map, to mark the surface: they are thin and white, so that they hide few errors. */
+ * first map, to mark the surface: they are thin and white, so that they hide few errors; those of
+ * further levels are dashed. */
 static mark mark_of(const layout *l, size_t column, size_t i)
 {
     const sdm_picture_map *map = &l->maps[column];
@@ -126,7 +127,9 @@ static mark mark_of(const layout *l, size_t column, size_t i)
         return (mark){l->maps, l->levels[0], {.width = 1.6, .colour = DARK, .rim = SDM_WHITE}};
     if (map->error)
         return (mark){
-            l->maps, l->levels[i], {.width = i ? 0.6 : 0.9, .colour = SDM_WHITE, .rim = DARK}};
+            l->maps,
+            l->levels[i],
+            {.width = i ? 0.6 : 0.9, .colour = SDM_WHITE, .rim = DARK, .turns = i ? 2 : 0}};
     return (mark){map,
                   l->levels[i],
                   {.width = i ? 1.4 : 1.8,

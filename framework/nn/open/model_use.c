@@ -32,6 +32,7 @@ sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error 
     if (f->error <= f->bad) return SDM_OK;
     return sdm_fail(err, SDM_E_QUALITY,
                     "%s of its maps are off by %.*f %%%s, more than %g %%: exact maps have right "
-                    "ones",
-                    f->name, f->error < 0.1, 100 * f->error, f->worst, 100 * f->bad);
+                    "ones%s",
+                    f->name, f->error < 0.1, 100 * f->error, f->worst, 100 * f->bad,
+                    use == SDM_USE_VOLUME ? "" : ", unless the parameters change the triangles");
 }

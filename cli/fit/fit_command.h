@@ -228,6 +228,10 @@ sdm_status cli_fit_write_results(const cli_fit *f, sdm_error *err);
 /* "passed", "doubtful" or "failed". */
 const char *cli_fit_grade_name(sdm_fit_grade grade);
 
+/* The verdict in a few words with the name of its worst check, for titles; empty: there is none. */
+enum { FIT_WORDS_MAX = 80 };
+void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX]);
+
 /* Prints the verdict as text; adds it to a JSON object. */
 void cli_fit_print_verdict(const cli_fit *f);
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);

@@ -62,10 +62,11 @@ static cli_block choose_block(const cli_fit *f)
 /* The fitted map with the points. */
 static sdm_status write_points(const cli_fit *f, const char *path, sdm_error *err)
 {
-    char title[700];
+    char title[700], verdict[FIT_WORDS_MAX];
     const char *slash = strrchr(f->path, '/');
-    int used = snprintf(title, sizeof title, "%.60s, fitted\nto %.60s:", f->shape_name,
-                        slash ? slash + 1 : f->path);
+    cli_fit_verdict_words(f, verdict);
+    int used = snprintf(title, sizeof title, "%.60s, fitted%s%s\nto %.60s:", f->shape_name,
+                        *verdict ? ": " : "", verdict, slash ? slash + 1 : f->path);
     for (size_t i = 0; i < f->n_params && used < (int)sizeof title; i++)
         used += snprintf(title + used, sizeof title - (size_t)used, " %s=%.4g", f->params[i].name,
                          f->result.params[i]);
@@ -94,7 +95,7 @@ sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *
                         map, err);
     // draw them
     if (!s) {
-        char title[200], fitted[120];
+        char title[250], fitted[120], verdict[FIT_WORDS_MAX];
         const sdm_picture_map maps[2] = {{.title = fitted, .values = map},
                                          {.title = "reference", .values = reference}};
         cli_block_copy(&f->target.grid, f->target.values, &block, image);
@@ -102,7 +103,9 @@ sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *
         snprintf(fitted, sizeof fitted, "%s, fitted%s", f->shape_name,
                  f->doubt.status ? " (not to be trusted)" : "");
         const char *slash = strrchr(f->path, '/');
-        snprintf(title, sizeof title, "%.150s", slash ? slash + 1 : f->path);
+        cli_fit_verdict_words(f, verdict);
+        snprintf(title, sizeof title, "%.150s%s%s", slash ? slash + 1 : f->path,
+                 *verdict ? ": " : "", verdict);
         s = sdm_picture_overlay(path, &g, image, maps, compared ? 2 : 1, title, err);
     }
     sdm_free(reference);

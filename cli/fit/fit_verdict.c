@@ -82,6 +82,21 @@ static void print_finding(const cli_fit *f, const sdm_fit_finding *x)
         printf(" %-28s %s\n", figure, meaning);
 }
 
+void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX])
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    const sdm_fit_finding *worst = NULL;
+    text[0] = 0;
+    if (!v->n_findings) return;
+    for (size_t i = 0; i < v->n_findings; i++)
+        if (v->findings[i].grade > (worst ? worst->grade : SDM_FIT_PASSED)) worst = &v->findings[i];
+    if (worst)
+        snprintf(text, FIT_WORDS_MAX, "%s (%s)", cli_fit_grade_name(v->grade),
+                 sdm_fit_check_name(worst->kind));
+    else
+        snprintf(text, FIT_WORDS_MAX, "%s", cli_fit_grade_name(v->grade));
+}
+
 void cli_fit_print_verdict(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;

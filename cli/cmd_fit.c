@@ -160,28 +160,12 @@ static sdm_status write_page(const cli_fit *f, sdm_error *err)
     return s;
 }
 
-/* The end of the error of a fit that is not trustworthy: what to try; "": nothing to add. */
-static const char *remedy(const cli_fit *f)
-{
-    if (f->exchanged) return "";
-    if (f->suspicion) return f->suspicion;
-    const bool network = f->model && f->shape && !f->args->fit.exact && !f->args->fit.polish;
-    if (f->found && !f->result.converged && network)
-        return "; if the network is the limit, --exact fits with exact maps";
-    bool contrast = false; // tissues that are the wrong way round are no matter of the start
-    for (size_t i = 0; i < f->result.verdict.n_findings && f->found; i++) {
-        const sdm_fit_finding *x = &f->result.verdict.findings[i];
-        contrast = contrast || (x->kind == SDM_FIT_CHECK_CONTRAST && x->grade == SDM_FIT_FAILED);
-    }
-    const bool turned = !isnan(f->args->pose.rotation[0]) && !f->opts.keep_pose && !contrast;
-    return turned ? "; a wrong start ends like this, too: without --rotation many are tried" : "";
-}
-
 /* Prints the result and writes the files; if the fit is not trustworthy, fails with the reason. */
 static sdm_status show_result(cli_fit *f, const char *json, sdm_error *err)
 {
     const bool files = f->args->outputs.n || f->args->fit.label_out,
                write = !f->doubt.status || f->args->force;
+    char text[400];
     sdm_status s = SDM_OK, measured = SDM_OK;
     if (f->found) {
         print_notices(f);
@@ -197,7 +181,8 @@ static sdm_status show_result(cli_fit *f, const char *json, sdm_error *err)
         if (!s) s = measured;
     }
     if (s || !f->doubt.status) return s;
-    return sdm_fail(err, f->doubt.status, "%s: %s%s%s", f->path, f->doubt.text, remedy(f),
+    return sdm_fail(err, f->doubt.status, "%s: %s%s%s", f->path, f->doubt.text,
+                    cli_fit_remedy(f, text, sizeof text),
                     files && f->found && !write ? "; no file was written (--force writes them)"
                                                 : "");
 }

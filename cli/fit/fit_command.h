@@ -241,6 +241,10 @@ void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);
  * of f->doubt and of the verdict, and sets f->exchanged. Errors of making the map. */
 sdm_status cli_fit_explain_contrast(cli_fit *f, sdm_error *err);
 
+/* After a fit that is not trustworthy: text[size] = the end of its error, "; " and what to try; "":
+ * nothing to add. Returns text. */
+const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size);
+
 /* Computes f->map and f->surface of the estimate. */
 sdm_status cli_fit_make_map(cli_fit *f, sdm_error *err);
 

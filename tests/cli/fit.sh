@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: a phantom is recovered, every kind of target and output, fits that must fail, mistakes.
-# Tests: fit_truth.c shell_word.c cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_mismatch.c fit_options.c fit_picture.c fit_repeat.c fit_report.c fit_result.c
+# Tests: fit_truth.c shell_word.c cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_mismatch.c fit_options.c fit_picture.c fit_remedy.c fit_repeat.c fit_report.c fit_result.c
 # fit_start.c fit_target.c progress_bar.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
@@ -199,6 +199,12 @@ grep -q 'warning: --reference label.nrrd: its labels do not overlap the fitted s
     bad "no word about the reference: $(cat err)"
 grep -q 'warning: --truth truth.json: its pose is 37.[0-9]* mm off the fitted one, more than the [0-9.]* mm that the shape measures' err ||
     bad "no word about the truth: $(cat err)"
+# What made a fit fail: a narrow prior; points on a part of the surface, with their middle as the start
+expect 4 'points.csv: .*; --prior-sd 0.01 holds rx, ry, rz near the middle of the range, whatever the data show: a wider one \(default 1\) lets them decide$' \
+    sdmgen fit $fit points.csv --rotation 0,0,0 --prior-sd 0.01 -q
+awk -F, 'NR == 1 || $1 > 1' points.csv >cap.csv
+expect 4 'cap.csv: .*; the points show a part of the shape, and the fit began at their middle: --start-centre X,Y,Z says where' \
+    sdmgen fit --shape torus -O edge=1 cap.csv --rotation 0,0,0 -q
 awk -F, '{ print $3 "," $1 "," $2 }' points.csv >zxy.csv # the header names the columns
 expect 0 - sdmgen fit $fit zxy.csv --rotation 0,0,0 -p rx=3.2 -p ry=3.2 --spacing 0.35 --json
 [ "$(param rx)" = "$(sed -n 's/.*"parameters": {[^}]*"rx": \([^,}]*\).*/\1/p' xyz.json)" ] || bad 'another order of the columns'
@@ -214,7 +220,7 @@ expect 0 - sdmgen phantom $shape $truth $turned --spacing 0.5 --inside 1300,225 
 expect 4 'bright.nii: the values of the inside and the outside are exchanged: at the start .* but the inside has the default value 40 and the outside 1300: give the values of this image with --inside and --outside' sdmgen fit $fit bright.nii $near_truth -o no.stl --label-out no.nrrd
 expect 0 - sdmgen fit $fit bright.nii $near_truth --inside 1300,250 --outside 40,150 --json
 within rx 3.5 4
-expect 4 'not converged after 1 iterations.*no file was written' sdmgen fit $fit ct.nii.gz $near_truth --max-iterations 1 -o no.stl ${vdb:+-o no.vdb}
+expect 4 'not converged after 1 iterations.*; --max-iterations 1 ended it too early to judge the fit; no file was written' sdmgen fit $fit ct.nii.gz $near_truth --max-iterations 1 -o no.stl ${vdb:+-o no.vdb}
 has 'NOT TO BE TRUSTED'
 has 'NOT CONVERGED'
 expect 4 'not converged' sdmgen fit $fit ct.nii.gz $near_truth --max-iterations 1 -o forced.json --json --force

@@ -1,0 +1,90 @@
+/* What to try after a fit that is not trustworthy: the end of its error. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "fit_command.h"
+
+/* Share of the surface without points from which on the points show a part of the shape, whose
+ * middle is not theirs. */
+#define UNCOVERED 0.1
+
+/* Farther from the middle of its range than this multiple of the prior's standard deviation, a
+ * parameter is held back by the prior. */
+#define FAR_FROM_PRIOR 2.0
+
+/* Does a check have one of these grades or a worse one, and at least this figure? */
+static bool found(const cli_fit *f, sdm_fit_check_kind kind, sdm_fit_grade grade, double figure)
+{
+    for (size_t i = 0; i < f->result.verdict.n_findings; i++) {
+        const sdm_fit_finding *x = &f->result.verdict.findings[i];
+        if (x->kind == kind && x->grade >= grade && !(x->figure < figure)) return true;
+    }
+    return false;
+}
+
+/* Did the fit begin at the middle of the points, because the command line gives no other place? */
+static bool began_at_points(const cli_fit *f)
+{
+    return f->points && isnan(f->args->pose.translation[0]) &&
+           isnan(f->args->fit.start_centre[0]) && !f->args->fit.start_points;
+}
+
+/* Is the parameter where the prior wants it, or pulled to it by data that disagree? */
+static bool is_held(const cli_fit *f, size_t k)
+{
+    const sdm_param *p = &f->params[k];
+    const double sd = f->result.prior_sd[k],
+                 even = 0.5 * f->opts.prior_sd * (p->max - p->min); // of a uniform distribution
+    return f->result.by_prior[k] ||
+           (fabs(sd - even) < 1e-6 * even &&
+            fabs(f->result.params[k] - 0.5 * (p->min + p->max)) > FAR_FROM_PRIOR * sd);
+}
+
+/* A --prior-sd below its default that holds parameters; false: there is none. */
+static bool name_prior(const cli_fit *f, char *text, size_t size)
+{
+    char list[200] = "";
+    for (size_t k = 0; k < f->n_params; k++) {
+        const size_t used = strlen(list);
+        if (is_held(f, k))
+            snprintf(list + used, sizeof list - used, "%s%s", used ? ", " : "", f->params[k].name);
+    }
+    if (!*list) return false;
+    snprintf(text, size,
+             "; --prior-sd %g holds %s near the middle of the range, whatever the data show: a "
+             "wider one (default 1) lets them decide",
+             f->opts.prior_sd, list);
+    return true;
+}
+
+const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
+{
+    const cli_fit_args *a = &f->args->fit;
+    const sdm_fit_result *r = &f->result;
+    const bool network = f->model && f->shape && !a->exact && !a->polish;
+    *text = '\0';
+    if (f->exchanged) return text;
+    if (f->found && !r->converged && a->max_iterations &&
+        r->n_iterations >= (size_t)a->max_iterations)
+        snprintf(text, size, "; --max-iterations %lld ended it too early to judge the fit",
+                 (long long)a->max_iterations);
+    else if (f->found && !f->opts.keep_params && f->opts.prior_sd > 0 && f->opts.prior_sd < 1 &&
+             name_prior(f, text, size))
+        return text;
+    else if (f->suspicion)
+        snprintf(text, size, "%s", f->suspicion);
+    else if (f->found && !r->converged && network)
+        snprintf(text, size, "; if the network is the limit, --exact fits with exact maps");
+    else if (f->found && began_at_points(f) &&
+             found(f, SDM_FIT_CHECK_COVERED, SDM_FIT_DOUBTFUL, UNCOVERED))
+        snprintf(text, size,
+                 "; the points show a part of the shape, and the fit began at their middle: "
+                 "--start-centre X,Y,Z says where the middle of the whole shape is, about");
+    // tissues that are the wrong way round are no matter of the start
+    else if (!isnan(f->args->pose.rotation[0]) && !f->opts.keep_pose &&
+             !(f->found && found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY)))
+        snprintf(text, size,
+                 "; a wrong start ends like this, too: without --rotation many are tried");
+    return text;
+}

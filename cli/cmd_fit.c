@@ -193,6 +193,7 @@ static sdm_status fit_one(const cli_args *args, const char *json, sdm_error *err
     cli_fit f = {.args = args};
     sdm_status s = check_arguments(&f, err);
     if (!s) s = cli_fit_open_source(&f, err);
+    if (!s) s = cli_fit_check_mirror(&f, err);
     if (!s) s = cli_fit_prepare_measures(&f, err);
     if (!s) s = cli_fit_read_options(&f, err);
     if (!s) s = cli_fit_read_target(&f, err);

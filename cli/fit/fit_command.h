@@ -205,6 +205,10 @@ sdm_status cli_fit_compare(cli_fit *f, sdm_error *err);
  * f->doubt where the mirror image is better or as good. */
 sdm_status cli_fit_mirror(cli_fit *f, sdm_error *err);
 
+/* After cli_fit_open_source(): refuses --mirror no for a shape without a mirror image. SDM_E_ARG.
+ */
+sdm_status cli_fit_check_mirror(cli_fit *f, sdm_error *err);
+
 /* True where the shape has a mirror image and neither the command line nor a model fixes the side;
  * sets f->mirror. */
 bool cli_fit_side_is_open(cli_fit *f);

@@ -66,6 +66,17 @@ sdm_status cli_fit_swap_side(cli_fit *f, sdm_error *err)
     return SDM_OK;
 }
 
+sdm_status cli_fit_check_mirror(cli_fit *f, sdm_error *err)
+{
+    if (strcmp(f->args->fit.mirror, "no") != 0) return SDM_OK;
+    const sdm_shape *shape = find_shape(f);
+    if (!shape || shape->mirror) return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG,
+                    "fit: --mirror no does nothing: the shape '%s' has no option for its mirror "
+                    "image",
+                    f->shape_name);
+}
+
 bool cli_fit_side_is_open(cli_fit *f)
 {
     const sdm_shape *shape = find_shape(f);

@@ -442,6 +442,14 @@ static void tell_params(teller *t)
                          params[k].name, params[k].min, params[k].max);
             tell(t, SDM_E_QUALITY, &other);
         }
+        if (sdm_survey_is_radian(&params[k])) {
+            sdm_text_add(&other,
+                         "the parameter '%s' has the unit %s, but ranges from %g to %g: are these "
+                         "rad? Then its unit is \"rad\"",
+                         params[k].name, unit, params[k].min, params[k].max);
+            tell(t, SDM_E_QUALITY, &other);
+            continue;
+        }
         if (t->s->brief || !strcmp(unit, "mm") || !strcmp(unit, "rad") || !strcmp(unit, "sd") ||
             !*unit)
             continue;

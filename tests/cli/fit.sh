@@ -276,6 +276,7 @@ expect 1 'nowhere.nii' sdmgen fit $fit nowhere.nii -o no.stl
 expect 2 'usage: sdmgen fit MODEL IMAGE' sdmgen fit
 expect 2 'a MODEL and an IMAGE are needed' sdmgen fit ct.nii.gz -o no.stl
 expect 2 'either MODEL or --shape' sdmgen fit $fit model.sdm ct.nii.gz -o no.stl
+expect 2 "--mirror no does nothing: the shape 'ellipsoid' has no option for its mirror image$" sdmgen fit $fit ct.nii.gz --mirror no
 expect 2 "image 'ct.dcm': its name must end in" sdmgen fit $fit ct.dcm -o no.stl
 expect 2 "output 'no.txt': its name must end in" sdmgen fit $fit ct.nii.gz -o no.txt
 expect 2 "'no.abc': its name must end in .* or .pdf; or in .json, for the result$" sdmgen fit $fit ct.nii.gz -o no.abc

@@ -206,4 +206,16 @@ sed -E 's/"mm"/"rad"/; s/\.min = [0-9.]+/.min = 120/; s/\.max = [0-9.]+/.max = 1
 cc -shared -fPIC -I"$source_folder/framework/include" degrees.c -o degrees.so -lm || bad 'the plug-in degrees.so was not built'
 expect 4 'mend' sdmgen shapes check --plugin ./degrees.so --samples 4
 has "^warning +the parameter 'radius' ranges from 120 to 140 rad: are these degrees"
+# the other way round: radians that are called degrees; a few degrees are no mistake
+for most in 3.1416 5; do
+    sed -E "s/\"mm\"/\"deg\"/; s/\.min = [0-9.]+/.min = 0.5/; s/\.max = [0-9.]+/.max = $most/; s/\.def = [0-9.]+/.def = 1/" \
+        "$source_folder/examples/plugin/octahedron.c" >radians.c
+    cc -shared -fPIC -I"$source_folder/framework/include" radians.c -o radians.so -lm || bad 'the plug-in radians.so was not built'
+    sdmgen shapes check --plugin ./radians.so --samples 4 >out 2>err
+    if [ $most = 5 ]; then
+        has "^note +the unit 'deg' of the parameter 'radius' is none that sdmgen knows"
+    else
+        has "^warning +the parameter 'radius' has the unit deg, but ranges from 0.5 to 3.1416: are these rad\? Then its unit is \"rad\"$"
+    fi
+done
 finish

@@ -131,6 +131,22 @@ bool sdm_survey_is_odd_angle(const sdm_param *p)
     return !strcmp(p->unit, "rad") && !(p->max <= ANGLE_MAX && p->min >= -ANGLE_MAX);
 }
 
+/* Is the value, not 0, a multiple of pi / 12 to three digits, but no number of halves? */
+static bool is_part_of_turn(double value)
+{
+    static const double PART = 0.26179938779914944, NEAR = 6e-4;
+    const double turn = PART * nearbyint(value / PART), half = 0.5 * nearbyint(2 * value);
+    return fabs(turn) > 0.1 && fabs(value - turn) < NEAR * fabs(turn) && fabs(value - half) > 1e-3;
+}
+
+bool sdm_survey_is_radian(const sdm_param *p)
+{
+    static const double TURN = 6.29;
+    if (strcmp(p->unit, "deg") != 0 && strcmp(p->unit, "degrees") != 0) return false;
+    return p->min >= -TURN && p->max <= TURN &&
+           (is_part_of_turn(p->min) || is_part_of_turn(p->max));
+}
+
 sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, sdm_error *err)
 {
     sdm_survey_scale *c = &s->scale;
@@ -138,7 +154,8 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
     sdm_status status = SDM_ALLOC(&s->speed, s->n_params, "speeds of parameters", err);
     for (size_t k = 0; k < s->n_params && !status; k++) {
         s->speed[k] = NAN;
-        c->odd_angle = c->odd_angle || sdm_survey_is_odd_angle(&f->shape->params[k]);
+        const sdm_param *p = &f->shape->params[k];
+        c->odd_angle = c->odd_angle || sdm_survey_is_odd_angle(p) || sdm_survey_is_radian(p);
     }
     if (status || s->failed.shapes == s->n - s->untested) return status;
     for (int a = 0; a < 3; a++) c->size = fmax(c->size, s->high[a] - s->low[a]);

@@ -64,7 +64,7 @@ typedef struct sdm_survey_scale {
     double speed;
     size_t param;
     bool odd_speed; /* it is below SDM_SURVEY_SPEED_MIN or above SDM_SURVEY_SPEED_MAX */
-    bool odd_angle; /* of a parameter with the unit rad, see sdm_survey_is_odd_angle() */
+    bool odd_angle; /* of a parameter: sdm_survey_is_odd_angle() or sdm_survey_is_radian() */
     /* the unit that would explain both, and its length in mm; NULL: none would */
     const char *unit;
     double unit_mm;
@@ -72,6 +72,11 @@ typedef struct sdm_survey_scale {
 
 /* Does a parameter in rad reach beyond 30, almost five turns? It is likely to be in degrees. */
 bool sdm_survey_is_odd_angle(const sdm_param *p);
+
+/* True for a parameter with the unit deg or degrees whose range looks like one in rad: within a
+ * turn, and ending at a multiple of 15 degrees in rad, such as 1.57, that is no number of halves.
+ */
+bool sdm_survey_is_radian(const sdm_param *p);
 
 /* Zero-initialise; sdm_shape_survey_dispose() frees. */
 typedef struct sdm_shape_survey {

@@ -165,7 +165,7 @@ static sdm_status show_result(cli_fit *f, const char *json, sdm_error *err)
 {
     const bool files = f->args->outputs.n || f->args->fit.label_out,
                write = !f->doubt.status || f->args->force;
-    char text[400];
+    char text[640];
     sdm_status s = SDM_OK, measured = SDM_OK;
     if (f->found) {
         print_notices(f);

@@ -53,8 +53,8 @@ static bool name_prior(const cli_fit *f, char *text, size_t size)
     if (!*list) return false;
     snprintf(text, size,
              "; --prior-sd %g holds %s near the middle of the range, whatever the data show: a "
-             "wider one (default 1) lets them decide",
-             f->opts.prior_sd, list);
+             "wider one (default 1) lets them decide%s",
+             f->opts.prior_sd, list, f->suspicion ? f->suspicion : "");
     return true;
 }
 
@@ -63,17 +63,18 @@ const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
     const cli_fit_args *a = &f->args->fit;
     const sdm_fit_result *r = &f->result;
     const bool network = f->model && f->shape && !a->exact && !a->polish;
+    const char *suspicion = f->suspicion ? f->suspicion : "";
     *text = '\0';
     if (f->exchanged) return text;
     if (f->found && !r->converged && a->max_iterations &&
         r->n_iterations >= (size_t)a->max_iterations)
-        snprintf(text, size, "; --max-iterations %lld ended it too early to judge the fit",
-                 (long long)a->max_iterations);
+        snprintf(text, size, "; --max-iterations %lld ended it too early to judge the fit%s",
+                 (long long)a->max_iterations, suspicion);
     else if (f->found && !f->opts.keep_params && f->opts.prior_sd > 0 && f->opts.prior_sd < 1 &&
              name_prior(f, text, size))
         return text;
-    else if (f->suspicion)
-        snprintf(text, size, "%s", f->suspicion);
+    else if (*suspicion)
+        snprintf(text, size, "%s", suspicion);
     else if (f->found && !r->converged && network)
         snprintf(text, size, "; if the network is the limit, --exact fits with exact maps");
     else if (f->found && began_at_points(f) &&

@@ -331,7 +331,7 @@ static void tell_hits(teller *t)
     for (int a = 0; a < 3; a++)
         sdm_text_add(&text, "%s%.10g", a ? ", " : "",
                      g->origin[a] + 0.5 * (double)(g->n[a] - 1) * g->spacing[a]);
-    sdm_text_add(&text, "] in place of grid.origin they lie between the planes");
+    sdm_text_add(&text, "] (and without grid.origin) they lie between the planes");
     tell(t, SDM_OK, &text);
 }
 

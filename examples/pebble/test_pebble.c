@@ -12,7 +12,8 @@ static void draw_parameters(const sdm_param *params, size_t n, double *p)
     for (size_t i = 0; i < n; i++) {
         const int place = rand() % 3;
         const double share = place < 2 ? place : rand() / (RAND_MAX + 1.0);
-        p[i] = params[i].min + share * (params[i].max - params[i].min);
+        // at 0 and 1 exactly the ends of the range
+        p[i] = (1 - share) * params[i].min + share * params[i].max;
     }
 }
 

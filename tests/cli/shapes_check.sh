@@ -64,7 +64,7 @@ YAML
 expect 0 - sdmgen shapes check good.yaml --plugin "$plugin" --samples 16
 has '^fine: the shape can be trained$'
 # The sides of the handle, which stay, lie on planes of voxel centres.
-planes='flat faces lie exactly on planes of voxel centres along y and z: .* may be off by [0-9.]+ % of the volume; with grid.centre: \[0, [-0-9.]+, [-0-9.]+\] in place of grid.origin'
+planes='flat faces lie exactly on planes of voxel centres along y and z: .* may be off by [0-9.]+ % of the volume; with grid.centre: \[0, [-0-9.]+, [-0-9.]+\] \(and without grid.origin\) they lie'
 has "^note +$planes"
 centre=$(grep -oE 'grid.centre: \[[^]]*\]' out)
 expect 0 - sdmgen shapes check good.yaml "${centre/: /=}" --plugin "$plugin" --samples 16

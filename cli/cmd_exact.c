@@ -183,7 +183,7 @@ static sdm_status run_points(job *j, sdm_error *err)
     sdm_status s = cli_read_points(j->args->points, &x, NULL, &n, err);
     if (!s) {
         sdm_box shape = SDM_BOX_EMPTY;
-        for (size_t v = 0; v < j->mesh.n_vert; v++) sdm_box_add(&shape, j->mesh.vert + 3 * v);
+        sdm_box_add_points(&shape, j->mesh.vert, j->mesh.n_vert);
         cli_warn_points_unit(j->args->points, x, n, &shape, "the shape");
     }
     if (!s) s = cli_points_allocate(&j->points, n, err);

@@ -547,17 +547,11 @@ static sdm_status compute_points(job *j, point_answers *a, sdm_result *result, s
                                    a->slopes, result, err);
 }
 
-/* The model's grid is hardly larger than its shapes. */
+/* Warns of points in another unit. The box of the model's grid stands for that of its shapes, which
+ * are hardly smaller. */
 static void warn_unit(const job *j, const point_answers *a)
 {
-    const sdm_grid *g = &j->info->grid;
-    sdm_box box = SDM_BOX_EMPTY;
-    for (int corner = 0; corner < 8; corner++) {
-        double index[3], world[3];
-        for (int i = 0; i < 3; i++) index[i] = corner >> i & 1 ? (double)(g->n[i] - 1) : 0;
-        sdm_grid_world(g, index, world);
-        sdm_box_add(&box, world);
-    }
+    const sdm_box box = sdm_box_of_grid(&j->info->grid);
     cli_warn_points_unit(j->args->points, a->x, a->n, &box, "the model's grid");
 }
 

@@ -19,7 +19,7 @@ static sdm_status add_shape(const cli_fit *f, const double *p, sdm_box *b, sdm_e
 {
     sdm_mesh mesh = {0};
     const sdm_status s = sdm_instance_mesh(f->shape, p, &mesh, err);
-    for (size_t i = 0; i < mesh.n_vert && !s; i++) sdm_box_add(b, mesh.vert + 3 * i);
+    if (!s) sdm_box_add_points(b, mesh.vert, mesh.n_vert);
     sdm_mesh_dispose(&mesh);
     return s;
 }

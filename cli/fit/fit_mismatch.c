@@ -16,7 +16,7 @@
 static double surface_middle(const cli_fit *f, double middle[3])
 {
     sdm_box b = SDM_BOX_EMPTY;
-    for (size_t v = 0; v < f->surface.n_vert; v++) sdm_box_add(&b, f->surface.vert + 3 * v);
+    sdm_box_add_points(&b, f->surface.vert, f->surface.n_vert);
     for (int a = 0; a < 3; a++) middle[a] = (b.min[a] + b.max[a]) / 2;
     return sqrt(v3_dist2(b.min, b.max));
 }

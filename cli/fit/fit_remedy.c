@@ -23,7 +23,8 @@ static bool found(const cli_fit *f, sdm_fit_check_kind kind, sdm_fit_grade grade
     return false;
 }
 
-/* Did the fit begin at the middle of the points, because the command line gives no other place? */
+/* Did the fit start at the middle of the points? It does unless an option gives another place:
+ * --translation, --start-centre or --start-points. */
 static bool began_at_points(const cli_fit *f)
 {
     return f->points && isnan(f->args->pose.translation[0]) &&

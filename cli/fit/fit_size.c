@@ -60,7 +60,7 @@ static sdm_status shape_size(const cli_fit *f, const double *p, double *size, sd
     if (f->shape) {
         sdm_mesh mesh = {0};
         const sdm_status s = sdm_instance_mesh(f->shape, p, &mesh, err);
-        for (size_t v = 0; v < mesh.n_vert && !s; v++) sdm_box_add(&b, mesh.vert + 3 * v);
+        if (!s) sdm_box_add_points(&b, mesh.vert, mesh.n_vert);
         sdm_mesh_dispose(&mesh);
         *size = box_size(&b);
         return s;
@@ -157,7 +157,7 @@ static sdm_status check_surface(const cli_fit *f, const shape_sizes *shape, sdm_
 {
     sdm_box b = SDM_BOX_EMPTY;
     sdm_status s = SDM_OK;
-    for (size_t i = 0; i < f->target.n_points && f->points; i++) sdm_box_add(&b, f->points + 3 * i);
+    if (f->points) sdm_box_add_points(&b, f->points, f->target.n_points);
     if (f->mask) add_voxels(&f->target.grid, f->mask, 1, 0.5f, &b);
     const double target = box_size(&b), ratio = shape->start / target;
     double middle = target;

@@ -25,7 +25,7 @@ void cli_warn_points_unit(const char *path, const double *x, size_t n, const sdm
                           const char *name)
 {
     sdm_box points = SDM_BOX_EMPTY;
-    for (size_t i = 0; i < n; i++) sdm_box_add(&points, x + 3 * i);
+    sdm_box_add_points(&points, x, n);
     const char *unit = would_fit(&points, shape, 1e3)    ? "m"
                        : would_fit(&points, shape, 1e-3) ? "um"
                                                          : NULL;

@@ -1,4 +1,4 @@
-/* Asks for the unit of points that are in m or um beside a shape in mm. */
+/* Warns of points whose coordinates seem to be in m or um: lengths are mm. */
 #pragma once
 
 #include <stddef.h>

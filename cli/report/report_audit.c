@@ -161,14 +161,20 @@ void cli_warn_audit(const sdm_audit *a)
         cli_notice("%zu duplicate triangle%s", a->duplicate, a->duplicate == 1 ? "" : "s");
 }
 
+/* Appends "vertices 8 .. 15, box 0 0 0 .. 1 1 2 mm". */
+static void add_place(const sdm_part *p, sdm_text *text)
+{
+    sdm_text_add(text, "vertices %zu .. %zu, box %.4g %.4g %.4g .. %.4g %.4g %.4g mm",
+                 p->first_vert, p->last_vert, p->min[0], p->min[1], p->min[2], p->max[0], p->max[1],
+                 p->max[2]);
+}
+
 void cli_name_part(const sdm_part_audit *a, size_t index, sdm_text *text)
 {
     const sdm_part *p = &a->part[index];
-    sdm_text_add(text,
-                 "part %zu of %zu (%zu triangles, vertices %zu .. %zu, box %.4g %.4g %.4g .. %.4g "
-                 "%.4g %.4g mm) ",
-                 index + 1, a->n, p->n_tri, p->first_vert, p->last_vert, p->min[0], p->min[1],
-                 p->min[2], p->max[0], p->max[1], p->max[2]);
+    sdm_text_add(text, "part %zu of %zu (%zu triangles, ", index + 1, a->n, p->n_tri);
+    add_place(p, text);
+    sdm_text_add(text, ") ");
 }
 
 /* The smallest solid part whose box holds that of part `index`; a->n: there is none. */
@@ -244,17 +250,16 @@ static size_t add_parts(const sdm_part_audit *a, part_test *counts, bool brief, 
     const size_t n = count_parts(a, counts);
     size_t told = 0;
     for (size_t i = 0; i < a->n && told < NAMED; i++) {
-        const sdm_part *p = &a->part[i];
         if (!counts(a, i)) continue;
         if (n == 1 && !brief) {
             cli_name_part(a, i, text);
             return n;
         }
         sdm_text_add(text, "%s%zu", told++ ? ", " : n > 1 ? "parts " : "part ", i + 1);
-        if (!brief)
-            sdm_text_add(text, " (vertices %zu .. %zu, box %.4g %.4g %.4g .. %.4g %.4g %.4g mm)",
-                         p->first_vert, p->last_vert, p->min[0], p->min[1], p->min[2], p->max[0],
-                         p->max[1], p->max[2]);
+        if (brief) continue;
+        sdm_text_add(text, " (");
+        add_place(&a->part[i], text);
+        sdm_text_add(text, ")");
     }
     if (n > told) sdm_text_add(text, " and %zu more", n - told);
     sdm_text_add(text, " of %zu ", a->n);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "report_audit.h"
+#include "sdm/internal/box.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/train.h"
 #include "terminal.h"
@@ -226,18 +227,6 @@ static void tell_jumps(teller *t)
     }
 }
 
-/* The world box of the voxel centres. */
-static void grid_box(const sdm_grid *g, double low[3], double high[3])
-{
-    for (int a = 0; a < 3; a++) {
-        low[a] = high[a] = g->origin[a];
-        for (int i = 0; i < 3; i++) {
-            const double edge = g->dir[3 * a + i] * g->spacing[i] * (double)(g->n[i] - 1);
-            *(edge < 0 ? &low[a] : &high[a]) += edge;
-        }
-    }
-}
-
 /* Appends the keys of a grid that holds the shapes, with voxels that show their thinnest part. */
 static void add_proposal(const cli_survey *s, sdm_text *text)
 {
@@ -258,17 +247,16 @@ static void tell_cut(teller *t)
 {
     const sdm_shape_survey *f = &t->s->found;
     sdm_text text = {0};
-    double low[3], high[3];
     bool beyond = false;
     if (!t->s->grid) return;
     for (int a = 0; a < 3; a++) beyond = beyond || f->beyond[a][0] > 0 || f->beyond[a][1] > 0;
     if (!beyond) return;
-    grid_box(t->s->grid, low, high);
+    const sdm_box grid = sdm_box_of_grid(t->s->grid);
     sdm_text_add(&text,
                  "over the parameters the shape reaches from (%.4g, %.4g, %.4g) to (%.4g, %.4g, "
                  "%.4g) mm; the grid covers (%.4g, %.4g, %.4g) to (%.4g, %.4g, %.4g) mm and cuts ",
-                 f->low[0], f->low[1], f->low[2], f->high[0], f->high[1], f->high[2], low[0],
-                 low[1], low[2], high[0], high[1], high[2]);
+                 f->low[0], f->low[1], f->low[2], f->high[0], f->high[1], f->high[2], grid.min[0],
+                 grid.min[1], grid.min[2], grid.max[0], grid.max[1], grid.max[2]);
     if (f->cut.shapes)
         sdm_text_add(&text, f->cut.shapes < f->n_samples ? "%.2g %% of the shapes" : "all shapes",
                      fmin(99, 100.0 * (double)f->cut.shapes / (double)f->n_samples));

@@ -308,7 +308,8 @@ static const char *suggest(const sdm_reader *r, const sdm_section *section, cons
     return NULL;
 }
 
-/* Notes that a key of the section, or the key of a section that is probably meant, is unknown. */
+/* Notes in r->unknown that the section has an unknown key. If the user probably meant the name of a
+ * section (gird for grid), that section has one, too: its keys are not missing. */
 static void note_unknown(sdm_reader *r, const sdm_section *section, const char *meant)
 {
     for (size_t s = 0; s < r->n_sections; s++)

@@ -157,8 +157,9 @@ bool sdm_is_name(const char *text)
     return !text[n] && n <= SDM_NAME_LENGTH_MAX;
 }
 
-/* A word of this length or longer may be the beginning of a name; one that is longer by two, also
- * without its last letter. */
+/* Words that resemble no name are completed: a word of at least this many characters stands for the
+ * first name that begins with it; with two more, for the first name that begins with all but its
+ * last character (`space` for `spacing`). */
 enum { SHORTEST_BEGINNING = 3 };
 
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n)

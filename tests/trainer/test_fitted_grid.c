@@ -257,7 +257,8 @@ static void test_faces_on_planes(void **state)
     g = h.moved;
     if (sdm_grid_family_hits(plate, range, 8, 1, &g, &h, &e)) fail_msg("%s", e.text);
     assert_true(h.share == 0 && g.origin[0] != -10 && g.origin[1] == -9.7);
-    // of a single plate the upper face counts, too; a grid with other axes; a slice has no planes
+    // one plate alone: its upper face counts as well. Then a grid that is turned, and a grid of one
+    // voxel along an axis, whose voxels nobody counts
     if (sdm_instance_mesh(plate, p, &m, &e)) fail_msg("%s", e.text);
     const double turned[9] = {0, 0, 1, 0, 1, 0, 1, 0, 0};
     g = (sdm_grid){.n = {9, 21, 21}, .spacing = {0.5, 1, 1}, .origin = {-10, -9.7, -2}};

@@ -17,7 +17,9 @@
 
 #define CHUNK ((size_t)1 << 22) // points that are sorted together; bounds the memory
 #define BLOCKS 8                // blocks of points that a thread takes at a time
-#define WIDE 5 // points for each triangle from which on vectors of two registers take less time
+// With at least so many points for each triangle, two registers of points that are searched
+// together take less time than one.
+#define WIDE 5
 
 /* Is x a usable point? False for NaN and for coordinates whose squares could overflow. */
 static bool is_point(const double x[3])

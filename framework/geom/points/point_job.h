@@ -32,7 +32,8 @@ typedef struct sdm_point_candidate {
 
 /* Scratch memory of one thread. */
 typedef struct sdm_point_scratch {
-    /* the points of the block, mm, [register][coordinate][lane]; all of them are finite */
+    /* coordinates of the points of the block, mm: x, y and z of the eight points of each SIMD
+       register, [register][coordinate][point]; all of them are finite */
     _Alignas(64) double x[SDM_POINT_REGISTERS][3][8];
     /* result: number of the nearest feature of each point and its squared distance, mm^2. Of
        several features with the same squared distance, bit for bit, the highest number */

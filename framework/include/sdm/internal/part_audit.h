@@ -85,10 +85,10 @@ void sdm_triangle_add(const sdm_mesh *m, size_t t, const double apex[3], double 
  */
 void sdm_mesh_sums(const sdm_mesh *m, double *volume, double *area);
 
-/* The smallest distance, mm, of the surface of part `index`, which meets no other, from that of the
- * other parts; negative: the part lies inside them. NaN:
- * it is the only part, numbers of its vertices lie among those of another part, or the engine
- * refuses the other parts. [any thread] */
+/* The smallest distance, mm, between the surface of part `index`, which must touch no other part,
+ * and the surfaces of the other parts; negative: part `index` lies inside one of them. NaN: it is
+ * the only part, numbers of its vertices lie among those of another part, or the engine refuses the
+ * other parts. [any thread] */
 double sdm_part_gap(const sdm_mesh *m, const sdm_part_audit *a, size_t index);
 
 /* Index of the part with the smallest thickness; a->n: none is known. */

@@ -77,7 +77,7 @@ sdm_status sdm_grid_avoid_faces(const sdm_instance *shape, const double (*range)
 /* Flat faces that lie on planes of voxel centres: these voxels have the distance 0, so that
  * rounding alone decides whether they are inside. */
 typedef struct sdm_face_hits {
-    bool axis[3]; /* there are such faces perpendicular to this axis of the grid */
+    bool axis[3]; /* axis[a]: flat faces perpendicular to axis a of the grid lie on such planes */
     /* part of the volume in the half voxels behind these faces: by so much counts of voxels may be
      * off; 0: there are none */
     double share;

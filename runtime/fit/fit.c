@@ -306,7 +306,6 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
         }
         newton->max_iterations = most - used;
         newton->eps = fmax(eps, first * (round ? fmin(change, 1) : 1));
-        if (newton->averaged) sdm_fit_averaging_widths(p, newton->half_width);
         if (newton->averaged || round > 0) sdm_fit_appearance_mark_absent(p);
         s = sdm_fit_newton(p, newton, end, err);
         // from the second round on the tissues are estimated well enough for a tissue field
@@ -343,7 +342,10 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
     newton->max_iterations = max_iterations;
     newton->eps = eps;
     newton->max_flat = 0;
-    return maximise_settled(p, newton, end, err);
+    sdm_fit_averaging_begin(p);
+    s = maximise_settled(p, newton, end, err);
+    sdm_fit_averaging_end(p);
+    return s ? s : sdm_fit_evaluate(p, err);
 }
 
 static int ascending(const void *a, const void *b)

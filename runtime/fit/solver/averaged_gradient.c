@@ -1,5 +1,5 @@
-/* Averaged gradient: difference quotients of the log-likelihood over a fixed motion of the surface.
- */
+/* Averaged gradient: widths of the intervals, and for points difference quotients of the
+ * log-likelihood over a fixed motion of the surface. */
 #include "averaged_gradient.h"
 
 #include <math.h>
@@ -61,15 +61,24 @@ static double motion_wanted(const fit_problem *p)
     return fit_maps_direct(&p->maps) ? fmin(step, MOTION_OF_POINTS * p->state.point_sd) : step;
 }
 
-void sdm_fit_averaging_widths(const fit_problem *p, double *half_width)
+void sdm_fit_averaging_begin(fit_problem *p)
 {
     const double wanted = motion_wanted(p);
     for (size_t k = 0; k < p->n_params; k++) {
         const double typical = fit_maps_direct(&p->maps) ? motion_at_points(&p->samples, k)
                                                          : motion_on_map(&p->maps, k),
                      range = p->high[k] - p->low[k];
-        half_width[k] = fmin(typical > 0 ? wanted / typical : range, WIDTH_MAX * range);
+        p->half_width[k] = fmin(typical > 0 ? wanted / typical : range, WIDTH_MAX * range);
     }
+    if (fit_maps_direct(&p->maps)) return;
+    p->averaged = true;
+    p->maps_params[0] = NAN;
+}
+
+void sdm_fit_averaging_end(fit_problem *p)
+{
+    if (p->averaged) p->maps_params[0] = NAN;
+    p->averaged = false;
 }
 
 // the same difference quotients by rotation and translation. The surface of the state is at hand
@@ -93,15 +102,15 @@ static void average_pose_gradient(fit_problem *p)
     }
 }
 
-sdm_status sdm_fit_average_gradient(fit_problem *p, const double *half_width, sdm_error *err)
+sdm_status sdm_fit_average_gradient(fit_problem *p, sdm_error *err)
 {
     double params[FIT_PARAMS_MAX];
-    // on a map the interpolation makes the likelihood smooth in the pose
-    if (fit_maps_direct(&p->maps) && !p->opts->keep_pose) average_pose_gradient(p);
+    if (!fit_maps_direct(&p->maps)) return SDM_OK;
+    if (!p->opts->keep_pose) average_pose_gradient(p);
     for (size_t k = 0; k < p->n_params; k++) params[k] = p->state.params[k];
     for (size_t k = 0; k < p->n_params; k++) {
-        const double here = params[k], low = fmax(here - half_width[k], p->low[k]),
-                     high = fmin(here + half_width[k], p->high[k]);
+        const double here = params[k], low = fmax(here - p->half_width[k], p->low[k]),
+                     high = fmin(here + p->half_width[k], p->high[k]);
         double before, after;
         params[k] = low;
         sdm_status s = sdm_fit_log_likelihood(p, params, &before, err);

@@ -283,7 +283,7 @@ static sdm_status averaged_step(fit_problem *p, const fit_newton_opts *opts, fit
                                 double *step, double *plain, double *work, double *size,
                                 bool *taken, sdm_error *err)
 {
-    sdm_status s = sdm_fit_average_gradient(p, opts->half_width, err);
+    sdm_status s = sdm_fit_average_gradient(p, err);
     if (s) return s;
     *taken = step_find(p, opts, 0, true, step, work) || step_find(p, opts, 0, false, step, work);
     if (!*taken) return SDM_OK;

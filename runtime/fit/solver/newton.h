@@ -19,10 +19,8 @@ typedef struct fit_newton_opts {
     /* > 0: this number of flat steps (negligible predicted gain) in a row also ends the iterations;
      * 0: they do not */
     int max_flat;
-    /* use the averaged gradient, see averaged_gradient.h */
+    /* derivatives are averaged, see sdm_fit_averaging_begin() */
     bool averaged;
-    /* [n_params] averaged: half width of the interval of each parameter */
-    double half_width[FIT_PARAMS_MAX];
 } fit_newton_opts;
 
 /* How the iterations ended. */

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "averaged_maps.h"
 #include "fit/data/map_area.h"
 #include "prior.h"
 
@@ -42,7 +43,8 @@ sdm_status sdm_fit_evaluate(fit_problem *p, sdm_error *err)
     for (size_t k = 0; k < p->n_params; k++) same = same && p->maps_params[k] == state->params[k];
     if (!same) {
         p->maps_blur = p->maps_params[0] = NAN;
-        s = sdm_fit_maps_make(&p->maps, state->params, true, err);
+        s = p->averaged ? sdm_fit_averaged_maps(p, err)
+                        : sdm_fit_maps_make(&p->maps, state->params, true, err);
         if (!s) memcpy(p->maps_params, state->params, p->n_params * sizeof *state->params);
     } else if (p->maps.cancelled && p->maps.cancelled(p->maps.user)) {
         s = sdm_fail(err, SDM_E_CANCELLED, "fit stopped on request");

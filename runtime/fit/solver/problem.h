@@ -74,6 +74,10 @@ typedef struct fit_problem {
 
     /* maps of the shape and their derivatives */
     fit_maps maps;
+    /* true: derivatives of `maps` are averaged over +-half_width[n_params], see
+     * averaged_gradient.h. Direct maps have other averages */
+    bool averaged;
+    double half_width[FIT_PARAMS_MAX];
     /* parameters [n_params] and blur (mm) of `maps`; maps_params[0] = NaN: `maps` is out of date */
     double maps_params[FIT_PARAMS_MAX], maps_blur;
     /* the samples: every `stride`-th voxel along each axis of the image, stride >= 1 */

@@ -564,7 +564,7 @@ const cli_option cli_options[] = {
      "standard deviation of the prior of the translation from the start (default 0: no prior)"},
     {"eps", 0, CLI_REAL, "F", NULL, 1e-12, 1, ON(CLI_FIT), AT(fit.eps),
      "the fit ends when no unknown changes by more than this fraction of its range (default 1e-4; "
-     "exact maps 3e-6)"},
+     "exact maps 3e-6; or a hundredth of its standard deviation, if that is reached before)"},
     {"max-iterations", 0, CLI_INT, "N", NULL, 1, 100000, ON(CLI_FIT), AT(fit.max_iterations),
      "largest number of iterations of a phase (default 60). A fit with exact maps has a second "
      "phase, which averages derivatives; a fit to points is made twice"},

@@ -132,7 +132,7 @@ sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err)
     set_real(a->prior_sd, &o->prior_sd);
     set_real(a->prior_rotation, &o->prior_rotation_sd);
     set_real(a->prior_translation, &o->prior_translation_sd);
-    if (!isnan(a->eps)) o->eps = o->polish_eps = a->eps;
+    if (!isnan(a->eps)) o->eps = o->polish_eps = a->eps, o->eps_sd = 0;
     if (a->max_iterations) o->max_iterations = (size_t)a->max_iterations;
     if (a->polish) o->max_polish_iterations = o->max_iterations;
     o->n_threads = (int)f->args->threads;

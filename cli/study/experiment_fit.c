@@ -124,6 +124,7 @@ static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *s
     // fit
     opts.prior_sd = e->fit.prior_sd;
     opts.polish_eps = e->fit.eps;
+    opts.eps_sd = 0;
     opts.start_params = start;
     if (!wrong) opts.appearance.inside[0].mean = opts.appearance.outside[0].mean + p->contrast;
     opts.start_pose = p->start_pose;

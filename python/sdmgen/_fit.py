@@ -514,6 +514,8 @@ def fit(
     ):
         if given is not None:
             setattr(opts, member, number(given, name))
+    if eps is not None:
+        opts.eps_sd = 0
     if max_iterations is not None:
         opts.max_iterations = whole(max_iterations, "max_iterations", 1)
     if polish:

@@ -87,6 +87,7 @@ sdm_fit_opts sdm_fit_defaults(void)
         .max_polish_iterations = 0,
         .eps = 1e-4,
         .polish_eps = 3e-6,
+        .eps_sd = 0.01,
         .max_restarts = 2,
     };
 }
@@ -295,8 +296,9 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
         if (!s && changed) s = sdm_fit_tissue_field_update(p, err);
         if (!s) sdm_fit_open_motions_find(p);
         if (!s && round < weighings) s = priors_reweight(p, &change, err);
-        // flat steps cannot resolve small changes of region and weights
-        const bool last = end->flat ? change < WEIGHT_ROUGH : !changed && !(change > 0);
+        // small and flat steps do not resolve small changes of region and weights
+        const bool last =
+            end->small || end->flat ? change < WEIGHT_ROUGH : !changed && !(change > 0);
         if (s || (round > 0 && newton->eps <= eps && last)) return s;
         // set the number of iterations left, and a coarse eps until region and weights settle
         const size_t used = p->n_iterations - before;
@@ -332,6 +334,7 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
     p->stride = 1;
     memset(p->absent, 0, sizeof p->absent);
     newton->eps = average ? o->eps : eps;
+    newton->eps_sd = o->eps_sd;
     newton->max_flat = !average ? 0 : exact ? 1 : FLAT_MAX;
     sdm_status s = maximise_settled(p, newton, end, err);
     // where kinks keep plain steps from converging, averaged ones may
@@ -431,7 +434,11 @@ static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         s = maximise_with_maps(p, &newton, &end, err);
     }
     out->converged = !s && end.converged;
-    if (out->converged || end.step > newton.eps)
+    if (out->converged && end.small)
+        snprintf(out->reason, sizeof out->reason,
+                 "%s: the last step moves no unknown by more than %g of its standard deviation",
+                 what, newton.eps_sd);
+    else if (out->converged || end.step > newton.eps)
         snprintf(out->reason, sizeof out->reason, "%s%s: last step %.2g, %sbelow %g", what,
                  out->converged ? "" : " stopped", end.step, out->converged ? "" : "not ",
                  newton.eps);

@@ -121,6 +121,7 @@ static sdm_status check_numbers(const sdm_fit_opts *o, sdm_error *err)
                         {"blur", o->blur, false},
                         {"point_sd", o->point_sd, false},
                         {"point_dof", o->point_dof, false},
+                        {"eps_sd", o->eps_sd, true},
                         {"prior_sd", o->prior_sd, true},
                         {"prior_rotation_sd", o->prior_rotation_sd, true},
                         {"prior_translation_sd", o->prior_translation_sd, true},

@@ -129,6 +129,13 @@ static double expected_gain(const fit_problem *p, const double *step)
     return sum;
 }
 
+// An upper bound of the change of any unknown by an undamped step, in its standard deviations: by
+// Cauchy and Schwarz the gradient times the step, for correlated samples.
+static double deviations_of(const fit_problem *p, const double *step)
+{
+    return sqrt(fmax(expected_gain(p, step), 0) / p->noise_factor);
+}
+
 // swaps the information of state and trial
 static void information_swap(fit_problem *p)
 {
@@ -136,6 +143,15 @@ static void information_swap(fit_problem *p)
     p->information = p->trial;
     p->trial = kept;
 }
+
+/* A step that was tried. */
+typedef struct fit_try {
+    /* false: there is none, or the objective dropped */
+    bool taken;
+    /* size of the undamped step, an estimate of the distance to the maximum, as step_size(); the
+     * same in standard deviations: no unknown moves by more of its own */
+    double size, deviations;
+} fit_try;
 
 /* Damping of the steps. */
 typedef struct fit_damping {
@@ -261,33 +277,34 @@ static void acceleration_advance(fit_problem *p, const fit_newton_opts *opts, fi
     if (!opts->keep_appearance) sdm_fit_appearance_unpack(p, r->to + p->information.n_unknowns);
 }
 
-/* One accelerated step. *size: size of the plain step, an estimate of the distance to the maximum.
- * *taken = false: there is no plain step, or the objective dropped. */
+/* One accelerated step. *out describes the plain step. */
 static sdm_status accelerated_step(fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
                                    fit_damping *d, double *step, double *plain, double *work,
-                                   double *size, bool *taken, sdm_error *err)
+                                   fit_try *out, sdm_error *err)
 {
-    *taken = false;
     if (!step_find(p, opts, 0, true, step, work)) return SDM_OK;
-    *size = step_size(p, step);
+    out->size = step_size(p, step);
+    out->deviations = deviations_of(p, step);
     memcpy(plain, step, p->information.n_unknowns * sizeof *plain);
     step_accelerate(p, opts, r, step);
-    const sdm_status s = step_try(p, step, d, taken, err);
-    if (!s && *taken) acceleration_advance(p, opts, r, step);
+    const sdm_status s = step_try(p, step, d, &out->taken, err);
+    if (!s && out->taken) acceleration_advance(p, opts, r, step);
     return s;
 }
 
 /* One accelerated step with the averaged gradient. The objective is not tested: the step may cross
  * the kink that is the maximum. */
 static sdm_status averaged_step(fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
-                                double *step, double *plain, double *work, double *size,
-                                bool *taken, sdm_error *err)
+                                double *step, double *plain, double *work, fit_try *out,
+                                sdm_error *err)
 {
     sdm_status s = sdm_fit_average_gradient(p, err);
     if (s) return s;
-    *taken = step_find(p, opts, 0, true, step, work) || step_find(p, opts, 0, false, step, work);
-    if (!*taken) return SDM_OK;
-    *size = step_size(p, step);
+    out->taken =
+        step_find(p, opts, 0, true, step, work) || step_find(p, opts, 0, false, step, work);
+    if (!out->taken) return SDM_OK;
+    out->size = step_size(p, step);
+    out->deviations = deviations_of(p, step);
     memcpy(plain, step, p->information.n_unknowns * sizeof *plain);
     step_accelerate(p, opts, r, step);
     const fit_state from = p->state;
@@ -374,24 +391,23 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
         if (!opts->keep_appearance) s = sdm_fit_appearance_update(p, err);
         if (s) break;
         // unknowns: an accelerated step near the maximum, a damped one otherwise
-        bool taken = false, undamped = true;
-        double size = INFINITY;
+        bool undamped = true;
+        fit_try t = {.size = INFINITY, .deviations = INFINITY};
         if (opts->averaged)
-            s = averaged_step(p, opts, &acceleration, step, plain, work, &size, &taken, err);
+            s = averaged_step(p, opts, &acceleration, step, plain, work, &t, err);
         else if (out->step <= ACCELERATED_BELOW)
-            s = accelerated_step(p, opts, &acceleration, &damping, step, plain, work, &size, &taken,
-                                 err);
-        if (!s && !taken && !opts->averaged) {
+            s = accelerated_step(p, opts, &acceleration, &damping, step, plain, work, &t, err);
+        if (!s && !t.taken && !opts->averaged) {
             acceleration.anderson.count = 0;
-            s = damped_step(p, opts, &damping, step, work, &taken, err);
+            s = damped_step(p, opts, &damping, step, work, &t.taken, err);
             // with much damping the size of a step does not tell the distance to the maximum
-            if (taken && (damping.factor <= DAMPING_SMALL || !isfinite(size)))
-                size = step_size(p, step);
+            if (t.taken && (damping.factor <= DAMPING_SMALL || !isfinite(t.size)))
+                t.size = step_size(p, step);
             undamped = damping.factor <= DAMPING_SMALL;
             memcpy(plain, step, n * sizeof *plain);
         }
         if (s) break;
-        if (!taken) {
+        if (!t.taken) {
             // no step gains: this is the maximum up to rounding, or the derivatives do not match
             // the objective
             out->converged = out->step <= 1e3 * opts->eps;
@@ -400,14 +416,16 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
         // converged?
         iteration_remember(p, step, undamped ? plain : NULL);
         const double taken_size = step_size(p, step);
-        const bool steep = opts->averaged && size <= STEEP_MAX * opts->eps &&
+        const bool steep = opts->averaged && t.size <= STEEP_MAX * opts->eps &&
                            fmax(taken_size, taken_before) <= opts->eps;
         taken_before = taken_size;
-        out->step = steep ? taken_size : size;
+        out->step = steep ? taken_size : t.size;
         out->converged =
-            steep || (size <= opts->eps && (opts->averaged || damping.factor <= DAMPING_SMALL));
-        out->flat = !out->converged && opts->max_flat > 0 && damping.flat >= opts->max_flat;
-        out->converged = out->converged || out->flat;
+            steep || (t.size <= opts->eps && (opts->averaged || damping.factor <= DAMPING_SMALL));
+        out->small = !out->converged && opts->eps_sd > 0 && t.deviations <= opts->eps_sd;
+        out->flat =
+            !out->converged && !out->small && opts->max_flat > 0 && damping.flat >= opts->max_flat;
+        out->converged = out->converged || out->small || out->flat;
         s = iteration_record(p, opts, out->step, err);
     }
     sdm_free(work);

@@ -16,6 +16,9 @@ typedef struct fit_newton_opts {
     size_t max_iterations;
     /* converged when the largest step is at most eps, in the units of sdm_fit_opts.eps */
     double eps;
+    /* converged, too, when an undamped step would move no unknown by more than this share of its
+     * standard deviation; 0: never */
+    double eps_sd;
     /* > 0: this number of flat steps (negligible predicted gain) in a row also ends the iterations;
      * 0: they do not */
     int max_flat;
@@ -26,8 +29,8 @@ typedef struct fit_newton_opts {
 /* How the iterations ended. */
 typedef struct fit_newton_end {
     bool converged;
-    /* converged by max_flat, not by the size of the steps */
-    bool flat;
+    /* converged by eps_sd, or by max_flat, not by the size of the steps */
+    bool small, flat;
     /* size of the last step, in the units of sdm_fit_opts.eps */
     double step;
 } fit_newton_end;

@@ -226,6 +226,9 @@ typedef struct sdm_fit_opts {
        and in the polish. If the parameters are kept, it replaces eps for all steps with exact
        maps */
     double polish_eps;
+    /* >= 0: the steps also end when an undamped one would move no unknown by more than this share
+       of its standard deviation, with any eps and polish_eps; 0: they do not */
+    double eps_sd;
     /* number of threads, >= 0; 0: the OpenMP default. The result has the same bits for every
        value */
     int n_threads;

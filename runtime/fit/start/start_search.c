@@ -6,6 +6,7 @@
 
 #include <math.h>
 
+#include "coarse_maps.h"
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
 #include "sdm/internal/mat3.h"
@@ -174,7 +175,10 @@ sdm_status sdm_fit_start_continue(fit_problem *p, const fit_state *given, bool s
 {
     const fit_newton_opts wide = search_steps(p, KEPT_STEPS), narrow = search_steps(p, SHARP_STEPS);
     fit_newton_end end;
-    sdm_status s = sdm_fit_newton(p, &wide, &end, err);
+    fit_maps fine;
+    sdm_status s = sdm_fit_coarse_maps_begin(p, &fine, err);
+    if (!s) s = sdm_fit_newton(p, &wide, &end, err);
+    sdm_fit_coarse_maps_end(p, &fine);
     p->state.blur = given->blur;
     p->state.l_ref = given->l_ref;
     p->state.point_sd = given->point_sd;
@@ -201,6 +205,8 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
     const fit_newton_opts newton = search_steps(p, TURN_STEPS);
     fit_newton_end end;
     found_turns found = {.n = n == 1, .state = {start}};
+    fit_maps fine;
+    s = sdm_fit_coarse_maps_begin(p, &fine, err);
     for (size_t i = 0; i < n && !s && n > 1; i++) {
         search_at(p, 1, i, n);
         turn_start(p, i, &start, &p->state);
@@ -209,6 +215,7 @@ sdm_status sdm_fit_start_search(fit_problem *p, size_t *turn, sdm_error *err)
         if (!s) turns_insert(&found, i, sdm_fit_objective(p), &p->state);
         if (found.n) p->search_best = found.state[0].params;
     }
+    sdm_fit_coarse_maps_end(p, &fine);
     // with a wide point spread a wrong turn may look best: so several turns continue, in the end
     // with the given point spread
     if (n > 1 && !s) {

@@ -1,6 +1,7 @@
 /* Parts of the fit: derivatives against differences, bounded steps, averaged gradient, Anderson
  * acceleration.
- * Tests: anderson.c averaged_gradient.c map_fields.c newton.c objective.c solve.c */
+ * Tests: anderson.c averaged_gradient.c averaged_maps.c map_fields.c newton.c objective.c solve.c
+ */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -239,6 +239,11 @@ BYTES_BLOCK(1, 1)
 BYTES_BLOCK(2, 4)
 BYTES_BLOCK(2, 2)
 BYTES_BLOCK(2, 1)
+// WebAssembly computes one map at a time, which has two rows: code for more would enlarge pages.
+#ifdef __wasm__
+#define BYTES_ROWS 2
+#else
+#define BYTES_ROWS 6
 BYTES_BLOCK(3, 4)
 BYTES_BLOCK(3, 2)
 BYTES_BLOCK(3, 1)
@@ -248,8 +253,9 @@ BYTES_BLOCK(5, 2)
 BYTES_BLOCK(5, 1)
 BYTES_BLOCK(6, 2)
 BYTES_BLOCK(6, 1)
+#endif
 
-// computes all outputs of up to 6 rows
+// computes all outputs of up to BYTES_ROWS rows
 static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, const int8_t *w,
                        const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to)
 {
@@ -266,6 +272,7 @@ static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, 
         BYTES_STEP(2, 2)
         BYTES_STEP(2, 1)
         break;
+#if BYTES_ROWS > 2
     case 3:
         BYTES_STEP(3, 4)
         BYTES_STEP(3, 2)
@@ -283,6 +290,7 @@ static void bytes_rows(size_t rows, size_t outputs, size_t wide, size_t narrow, 
         BYTES_STEP(6, 2)
         BYTES_STEP(6, 1)
         break;
+#endif
     }
 }
 
@@ -296,23 +304,31 @@ static inline sdm_panel_out out_from(const sdm_panel_out *to, size_t i, size_t o
     return at;
 }
 
+// computes all outputs of `batch` rows, BYTES_ROWS at a time
+static void bytes_batch(size_t batch, size_t outputs, size_t wide, size_t narrow, const int8_t *w,
+                        const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to)
+{
+    for (size_t i = 0; i < batch; i += BYTES_ROWS) {
+        const sdm_panel_out at = out_from(to, i, 0);
+        bytes_rows(batch - i < BYTES_ROWS ? batch - i : BYTES_ROWS, outputs, wide, narrow, w,
+                   x + i * ldx, ldx, scale + i, &at);
+    }
+}
+
 // As in panel_f32(), a few panels are multiplied with all rows before the next panels.
 static void panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, const int8_t *w,
                      const int16_t *x, size_t ldx, const float *scale, const sdm_panel_out *to)
 {
     const size_t wide = (n_wide + 1) / 2, narrow = (k + 1) / 2 - wide,
                  panel = wide * WIDE + narrow * NARROW;
-    if (batch <= 6) {
-        bytes_rows(batch, outputs, wide, narrow, w, x, ldx, scale, to);
-        return;
+    // few rows read the panels once
+    const size_t few = batch <= BYTES_ROWS, two = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL,
+                 step = few ? outputs : two;
+    for (size_t o = 0; o < outputs; o += step, w += step / SDM_PANEL * panel) {
+        const sdm_panel_out at = out_from(to, 0, o);
+        bytes_batch(batch, outputs - o < step ? outputs - o : step, wide, narrow, w, x, ldx, scale,
+                    &at);
     }
-    const size_t step = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL;
-    for (size_t o = 0; o < outputs; o += step, w += step / SDM_PANEL * panel)
-        for (size_t i = 0; i < batch; i += 6) {
-            const sdm_panel_out at = out_from(to, i, o);
-            bytes_rows(batch - i < 6 ? batch - i : 6, outputs - o < step ? outputs - o : step, wide,
-                       narrow, w, x + i * ldx, ldx, scale + i, &at);
-        }
 }
 
 static void panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *b, const int8_t *w,
@@ -324,8 +340,8 @@ static void panel_i8_blocks(size_t batch, size_t n, const sdm_panel_block *b, co
         const size_t wide = (b->n_wide + 1) / 2, narrow = (b->k + 1) / 2 - wide;
         at.y = to->y + b->y;
         if (at.mean) at.mean = to->mean + b->mean;
-        bytes_rows(batch, (b->outputs + SDM_PANEL - 1) / SDM_PANEL * SDM_PANEL, wide, narrow,
-                   w + b->weights, x + b->x, ldx, scale + b->scale, &at);
+        bytes_batch(batch, (b->outputs + SDM_PANEL - 1) / SDM_PANEL * SDM_PANEL, wide, narrow,
+                    w + b->weights, x + b->x, ldx, scale + b->scale, &at);
     }
 }
 

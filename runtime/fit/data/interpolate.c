@@ -69,21 +69,24 @@ static void taps_find(const fit_field *f, const double x[3], taps *t)
     t->distance = sqrt(beyond2);
 }
 
-// sum[4] += w * first field of the four voxels of a row
-static inline void add_row(const fit_field *f, const taps *t, const double *row, double w,
-                           double sum[4])
+// vectors of doubles; the compiler splits them where registers are shorter
+typedef double four __attribute__((vector_size(32)));
+typedef double two __attribute__((vector_size(16)));
+
+// *v: the first field of the four voxels of a row
+static inline void first_field(const fit_field *f, const taps *t, const double *row, four *v)
 {
-    double v[4];
-    if (f->n_fields == 1 && t->at[0][3] - t->at[0][0] == 3)
-        memcpy(v, row + t->at[0][0], sizeof v);
+    const size_t n = f->n_fields;
+    if (n == 1 && t->at[0][3] - t->at[0][0] == 3)
+        memcpy(v, row + t->at[0][0], sizeof *v);
     else
-        for (int i = 0; i < 4; i++) v[i] = row[t->at[0][i] * f->n_fields];
-    for (int i = 0; i < 4; i++) sum[i] += w * v[i];
+        *v = (four){row[t->at[0][0] * n], row[t->at[0][1] * n], row[t->at[0][2] * n],
+                    row[t->at[0][3] * n]};
 }
 
-static inline double dot(const double a[4], const double b[4])
+static inline double dot(const double a[4], const four *b)
 {
-    return (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]);
+    return (a[0] * (*b)[0] + a[1] * (*b)[1]) + (a[2] * (*b)[2] + a[3] * (*b)[3]);
 }
 
 static inline const double *row_at(const fit_field *f, const taps *t, int k, int j)
@@ -95,23 +98,54 @@ double sdm_fit_interpolate(const fit_field *f, const double x[3])
 {
     taps t;
     taps_find(f, x, &t);
-    double sum[4] = {0};
+    four sum = {0};
     for (int k = 0; k < 4; k++)
-        for (int j = 0; j < 4; j++)
-            add_row(f, &t, row_at(f, &t, k, j), t.weight[2][k] * t.weight[1][j], sum);
-    return f->distance ? dot(t.weight[0], sum) + t.distance : dot(t.weight[0], sum);
+        for (int j = 0; j < 4; j++) {
+            four v;
+            first_field(f, &t, row_at(f, &t, k, j), &v);
+            sum += t.weight[2][k] * t.weight[1][j] * v;
+        }
+    return f->distance ? dot(t.weight[0], &sum) + t.distance : dot(t.weight[0], &sum);
 }
 
-// rest[n_fields - 1] += w * the other fields, interpolated along a row of four voxels
-static inline void add_rest(const fit_field *f, const taps *t, const double *row, double w,
-                            double *rest)
+// out[q] = field q for from <= q < n_fields
+static inline void fields_sum(const fit_field *f, const taps *t, size_t from, double *out)
 {
-    const size_t n = f->n_fields;
-    const double *a = row + t->at[0][0] * n, *b = row + t->at[0][1] * n, *c = row + t->at[0][2] * n,
-                 *d = row + t->at[0][3] * n;
-    const double wa = w * t->weight[0][0], wb = w * t->weight[0][1], wc = w * t->weight[0][2],
-                 wd = w * t->weight[0][3];
-    for (size_t q = 1; q < n; q++) rest[q - 1] += (wa * a[q] + wb * b[q]) + (wc * c[q] + wd * d[q]);
+    // the 16 rows, the offsets of their voxels, and the weights of these
+    const size_t n = f->n_fields,
+                 at[4] = {t->at[0][0] * n, t->at[0][1] * n, t->at[0][2] * n, t->at[0][3] * n};
+    const double *row[16];
+    double weight[16][4];
+    for (int r = 0; r < 16; r++) {
+        row[r] = row_at(f, t, r / 4, r % 4);
+        const double w = t->weight[2][r / 4] * t->weight[1][r % 4];
+        for (int i = 0; i < 4; i++) weight[r][i] = w * t->weight[0][i];
+    }
+// adds up as many fields, from q on, as the type holds
+#define ADD_FIELDS(type)                                                                           \
+    for (; q + sizeof(type) / sizeof(double) <= n; q += sizeof(type) / sizeof(double)) {           \
+        type sum = (type){0};                                                                      \
+        for (int r = 0; r < 16; r++) {                                                             \
+            type v[4];                                                                             \
+            for (int i = 0; i < 4; i++) memcpy(&v[i], row[r] + at[i] + q, sizeof v[i]);            \
+            sum += (weight[r][0] * v[0] + weight[r][1] * v[1]) +                                   \
+                   (weight[r][2] * v[2] + weight[r][3] * v[3]);                                    \
+        }                                                                                          \
+        memcpy(out + q, &sum, sizeof sum);                                                         \
+    }
+    size_t q = from;
+    ADD_FIELDS(four)
+    ADD_FIELDS(two)
+    ADD_FIELDS(double)
+#undef ADD_FIELDS
+}
+
+void sdm_fit_interpolate_fields(const fit_field *f, const double x[3], double *out)
+{
+    taps t;
+    taps_find(f, x, &t);
+    fields_sum(f, &t, 0, out);
+    if (f->distance) out[0] += t.distance;
 }
 
 double sdm_fit_interpolate_all(const fit_field *f, const double x[3], double gradient[3],
@@ -119,18 +153,23 @@ double sdm_fit_interpolate_all(const fit_field *f, const double x[3], double gra
 {
     taps t;
     taps_find(f, x, &t);
-    double sum[4] = {0}, by_y[4] = {0}, by_z[4] = {0}, others[FIT_FIELDS_MAX] = {0};
+    four sum = {0}, by_y = {0}, by_z = {0};
     for (int k = 0; k < 4; k++)
         for (int j = 0; j < 4; j++) {
-            const double *row = row_at(f, &t, k, j), w = t.weight[2][k] * t.weight[1][j];
-            add_row(f, &t, row, w, sum); // same operations as in sdm_fit_interpolate(): same bits
-            add_row(f, &t, row, t.weight[2][k] * t.slope[1][j], by_y);
-            add_row(f, &t, row, t.slope[2][k] * t.weight[1][j], by_z);
-            add_rest(f, &t, row, w, others);
+            four v;
+            first_field(f, &t, row_at(f, &t, k, j), &v);
+            // the same operations as in sdm_fit_interpolate(): the same bits
+            sum += t.weight[2][k] * t.weight[1][j] * v;
+            by_y += t.weight[2][k] * t.slope[1][j] * v;
+            by_z += t.slope[2][k] * t.weight[1][j] * v;
         }
-    for (size_t q = 1; q < f->n_fields; q++) rest[q - 1] = others[q - 1];
+    if (f->n_fields > 1) {
+        double fields[FIT_FIELDS_MAX];
+        fields_sum(f, &t, 1, fields);
+        memcpy(rest, fields + 1, (f->n_fields - 1) * sizeof *rest);
+    }
     // gradient along the axes of the grid, then rotated into the coordinates of grid->origin
-    double along[3] = {dot(t.slope[0], sum), dot(t.weight[0], by_y), dot(t.weight[0], by_z)};
+    double along[3] = {dot(t.slope[0], &sum), dot(t.weight[0], &by_y), dot(t.weight[0], &by_z)};
     for (int a = 0; a < 3; a++) {
         along[a] /= f->grid->spacing[a];
         if (f->distance && t.distance > 0) along[a] += t.beyond[a] / t.distance;
@@ -139,5 +178,5 @@ double sdm_fit_interpolate_all(const fit_field *f, const double x[3], double gra
         gradient[a] = 0;
         for (int b = 0; b < 3; b++) gradient[a] += f->grid->dir[3 * a + b] * along[b];
     }
-    return f->distance ? dot(t.weight[0], sum) + t.distance : dot(t.weight[0], sum);
+    return f->distance ? dot(t.weight[0], &sum) + t.distance : dot(t.weight[0], &sum);
 }

@@ -27,3 +27,7 @@ double sdm_fit_interpolate(const fit_field *f, const double x[3]);
  * the grid, per mm) and the values of the other fields, rest[n_fields - 1]. [any thread] */
 double sdm_fit_interpolate_all(const fit_field *f, const double x[3], double gradient[3],
                                double *rest);
+
+/* The values of all fields at x, out[n_fields], the first within rounding of sdm_fit_interpolate().
+ * [any thread] */
+void sdm_fit_interpolate_fields(const fit_field *f, const double x[3], double *out);

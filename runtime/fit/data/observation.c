@@ -131,14 +131,23 @@ static pair_likelihood pair_evaluate(const fit_observation *obs, const fit_pair 
     return s;
 }
 
-// replaces the logarithms log_p[n] by probabilities that sum to 1; returns log(sum of exp(log_p))
-// of the given values
+// replaces the logarithms log_p[n] by probabilities that sum to 1. The sum of exp(log_p) of the
+// given values is *sum * exp(returned value)
+static double probabilities(double *log_p, size_t n, double *sum)
+{
+    double most = -INFINITY, all = 0;
+    for (size_t i = 0; i < n; i++) most = log_p[i] > most ? log_p[i] : most;
+    for (size_t i = 0; i < n; i++) all += log_p[i] = log_p[i] == most ? 1 : exp(log_p[i] - most);
+    for (size_t i = 0; i < n; i++) log_p[i] /= all;
+    *sum = all;
+    return most;
+}
+
+// the same, and returns log(sum of exp(log_p)) of the given values
 static double normalise(double *log_p, size_t n)
 {
-    double most = log_p[0], sum = 0;
-    for (size_t i = 1; i < n; i++) most = fmax(most, log_p[i]);
-    for (size_t i = 0; i < n; i++) sum += log_p[i] = log_p[i] == most ? 1 : exp(log_p[i] - most);
-    for (size_t i = 0; i < n; i++) log_p[i] /= sum;
+    double sum;
+    const double most = probabilities(log_p, n, &sum);
     return most + log(sum);
 }
 
@@ -317,10 +326,10 @@ bool sdm_fit_in_band(const fit_observation *obs, double field)
 void sdm_fit_outside_shares(const fit_observation *obs, double value, const float *log_weight,
                             double field, double *part)
 {
-    double p[SDM_FIT_LAWS * SDM_FIT_LAWS];
+    double p[SDM_FIT_LAWS * SDM_FIT_LAWS], sum;
     for (size_t i = 0; i < obs->n_pairs; i++)
         p[i] = pair_evaluate(obs, &obs->pair[i], value, log_weight, field).log_p;
-    (void)normalise(p, obs->n_pairs);
+    (void)probabilities(p, obs->n_pairs, &sum);
     const double outside = 1 - (field > 0 ? fmin(field, 1) : 0);
     memset(part, 0, (obs->n_tissues - obs->n_in) * sizeof *part);
     for (size_t i = 0; i < obs->n_pairs; i++) part[obs->pair[i].out - obs->n_in] += p[i] * outside;
@@ -354,11 +363,11 @@ void sdm_fit_moments_add(const fit_observation *obs, double value, const float *
         return;
     }
     // partial volume: probability of each pair given the value
-    double p[SDM_FIT_LAWS * SDM_FIT_LAWS];
+    double p[SDM_FIT_LAWS * SDM_FIT_LAWS], sum;
     pair_likelihood s[SDM_FIT_LAWS * SDM_FIT_LAWS];
     for (size_t i = 0; i < obs->n_pairs; i++)
         s[i] = pair_evaluate(obs, &obs->pair[i], value, log_weight, field), p[i] = s[i].log_p;
-    (void)normalise(p, obs->n_pairs);
+    (void)probabilities(p, obs->n_pairs, &sum);
     // both tissues of each pair
     const double a = field > 0 ? fmin(field, 1) : 0;
     for (size_t i = 0; i < obs->n_pairs; i++) {

@@ -38,6 +38,8 @@ typedef struct cells {
     /* [cells][n_tissues] shares in each cell, scratch of the same size, [samples][n_tissues] shares
      * of each sample */
     double *packed, *spare, *share;
+    /* [samples] cell of each sample */
+    uint32_t *cell;
 } cells;
 
 // grid of cubic cells around all samples, with a margin for the window
@@ -62,13 +64,13 @@ static sdm_grid cells_grid(const fit_samples *s, double sd)
 }
 
 // the cell whose centre is nearest to x
-static size_t cell_index(const sdm_grid *g, const double x[3])
+static uint32_t cell_index(const sdm_grid *g, const double x[3])
 {
     double index[3];
     sdm_grid_index(g, x, index);
     size_t at = 0;
     for (int a = 2; a >= 0; a--) at = at * (size_t)g->n[a] + (size_t)floor(index[a] + 0.5);
-    return at;
+    return (uint32_t)at; // CELLS_MAX^3 cells at most
 }
 
 static void cells_dispose(cells *c)
@@ -76,6 +78,7 @@ static void cells_dispose(cells *c)
     sdm_free(c->packed);
     sdm_free(c->spare);
     sdm_free(c->share);
+    sdm_free(c->cell);
 }
 
 static sdm_status cells_create(const fit_problem *p, cells *c, sdm_error *err)
@@ -89,8 +92,17 @@ static sdm_status cells_create(const fit_problem *p, cells *c, sdm_error *err)
     sdm_status s = SDM_ALLOC(&c->packed, n, "tissue field", err);
     if (!s) s = SDM_ALLOC(&c->spare, n, "tissue field", err);
     if (!s) s = SDM_ALLOC(&c->share, p->samples.n * c->n_tissues, "tissue field", err);
-    if (s) cells_dispose(c);
-    return s;
+    if (!s) s = SDM_ALLOC(&c->cell, p->samples.n, "tissue field", err);
+    if (s) {
+        cells_dispose(c);
+        return s;
+    }
+    const int n_threads = sdm_threads(p->opts->n_threads);
+    (void)n_threads; // unused without OpenMP
+#pragma omp parallel for schedule(static) num_threads(n_threads)
+    for (size_t i = 0; i < p->samples.n; i++)
+        c->cell[i] = cell_index(&c->grid, p->samples.world + 3 * i);
+    return SDM_OK;
 }
 
 // one step of expectation-maximisation
@@ -107,7 +119,7 @@ static void em_step(fit_problem *p, cells *c)
     // add up the shares in the cells, and smooth them
     memset(c->packed, 0, size * sizeof *c->packed);
     for (size_t i = 0; i < s->n; i++) {
-        double *to = c->packed + cell_index(&c->grid, s->world + 3 * i) * n;
+        double *to = c->packed + c->cell[i] * n;
         for (size_t k = 0; k < n; k++) to[k] += c->share[i * n + k];
     }
     sdm_fit_blur(&c->grid, n, c->sd * c->sd, true, n_threads, &c->packed, &c->spare);
@@ -115,8 +127,8 @@ static void em_step(fit_problem *p, cells *c)
     const fit_field f = {.grid = &c->grid, .packed = c->packed, .n_fields = n};
 #pragma omp parallel for schedule(static) num_threads(n_threads)
     for (size_t i = 0; i < s->n; i++) {
-        double found[SDM_FIT_LAWS], ignored[3], sum = c->prior_count;
-        found[0] = sdm_fit_interpolate_all(&f, s->world + 3 * i, ignored, found + 1);
+        double found[SDM_FIT_LAWS], sum = c->prior_count;
+        sdm_fit_interpolate_fields(&f, s->world + 3 * i, found);
         for (size_t k = 0; k < n; k++) sum += found[k];
         for (size_t k = 0; k < n; k++) {
             const double global = p->observation.tissue[p->observation.n_in + k].weight;

@@ -21,22 +21,44 @@
 #define BIAS_VOXELS 800
 // terms of the Neumann series
 #define NEUMANN_TERMS 4
+// lags that are computed together: three rows of lags
+enum { LAG_GROUP = 3 * FIT_LAGS };
 
-// weighted mean of e_n e_(n+lag) and e_n e_(n-lag) over a subsample
-static double correlation_at(const fit_neighbours *v, const uint32_t *list, size_t n,
-                             const int lag[3])
+/* Lags that are computed together, consecutive numbers: their neighbours are close in memory. */
+typedef struct lag_group {
+    size_t n;
+    int lag[LAG_GROUP][3], number[LAG_GROUP];
+    /* weighted sum of e_n e_(n+lag) and e_n e_(n-lag) over a subsample, and sum of the weights */
+    double sum[LAG_GROUP], weight[LAG_GROUP];
+} lag_group;
+
+// the lags of length k among LAG_GROUP numbers from `first` on, up to zero
+static void group_choose(int first, int k, lag_group *g)
 {
-    double sum = 0, weight = 0;
-    for (size_t k = 0; k < n; k++) {
-        for (int sign = -1; sign <= 1; sign += 2) {
-            const size_t i = list[k], j = sdm_fit_neighbour(v, i, lag, sign);
-            if (j == SIZE_MAX) continue;
-            const double w = (double)v->weight[i] * (double)v->weight[j];
-            sum += w * (double)v->residual[i] * (double)v->residual[j];
-            weight += w;
-        }
+    g->n = 0;
+    for (int number = first; number < first + LAG_GROUP && number <= FIT_LAG_ZERO; number++) {
+        sdm_fit_lag_vector(number, g->lag[g->n]);
+        g->number[g->n] = number;
+        g->n += sdm_fit_lag_length(g->lag[g->n]) == k;
     }
-    return weight > 0 ? sum / weight : 0;
+}
+
+// c[number]: weighted mean of e_n e_(n+lag) and e_n e_(n-lag) over the voxels list[n]
+static void group_means(const fit_neighbours *v, const uint32_t *list, size_t n, lag_group *g,
+                        double *c)
+{
+    for (size_t l = 0; l < g->n; l++) g->sum[l] = g->weight[l] = 0;
+    for (size_t k = 0; k < n; k++)
+        for (size_t l = 0; l < g->n; l++)
+            for (int sign = -1; sign <= 1; sign += 2) {
+                const size_t i = list[k], j = sdm_fit_neighbour(v, i, g->lag[l], sign);
+                if (j == SIZE_MAX) continue;
+                const double w = (double)v->weight[i] * (double)v->weight[j];
+                g->sum[l] += w * (double)v->residual[i] * (double)v->residual[j];
+                g->weight[l] += w;
+            }
+    for (size_t l = 0; l < g->n; l++)
+        c[g->number[l]] = g->weight[l] > 0 ? g->sum[l] / g->weight[l] : 0;
 }
 
 /* Shells of lags of the same length, outwards. The half width of the window is twice the length of
@@ -52,11 +74,11 @@ sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, 
     memset(c, 0, (FIT_LAG_ZERO + 1) * sizeof *c);
     for (int k = 0; k <= *width && !s; k++) {
         // shell k: correlations, and their sum
-#pragma omp parallel for schedule(dynamic, 64) num_threads(n_threads)
-        for (int number = 0; number <= FIT_LAG_ZERO; number++) {
-            int lag[3];
-            sdm_fit_lag_vector(number, lag);
-            if (sdm_fit_lag_length(lag) == k) c[number] = correlation_at(v, list, n, lag);
+#pragma omp parallel for schedule(dynamic) num_threads(n_threads)
+        for (int first = 0; first <= FIT_LAG_ZERO; first += LAG_GROUP) {
+            lag_group g;
+            group_choose(first, k, &g);
+            group_means(v, list, n, &g, c);
         }
         double sum = 0, lags = 0;
         for (int number = 0; number <= FIT_LAG_ZERO; number++) {

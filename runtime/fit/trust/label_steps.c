@@ -18,13 +18,30 @@ enum { MODES = 3 };
 // is the variance of a straight line between two ends anywhere within a voxel
 #define TILT_VARIANCE (1.0 / 24)
 
+// a fit puts a straight line through one step in the middle of a face, with this rise, in voxels,
+// from the step to either end, though any rise between 0 and 1 has the same labels
+#define ONE_STEP 0.75
+// variance of the unit normals of a piece from which on it counts as curved
+#define CURVED 0.1
+
+/* The surface next to a sample, where it is nearly parallel to the voxels. */
+typedef struct place {
+    /* axis of the image along which it lies, and whether the outside is above */
+    int axis;
+    bool above;
+    /* place of the surface along this axis, and index of the sample, in voxels; normal along the
+       axes of the image */
+    double along, index[3], normal[3];
+} place;
+
 /* A piece of the surface between two layers of voxels. */
 typedef struct piece {
     /* sums over the samples of the piece; the weight of a sample is its information about the
        place of the surface */
     fit_step_phase phase;
-    /* sums of weight times place above the lower layer, and times its square, in voxels */
-    double first, second;
+    /* sums of weight times normal; weight times place above the lower layer, and times its square,
+       in voxels */
+    double normal[3], first, second;
     /* extent of the samples along the other two axes, in voxels */
     double low[2], high[2];
     /* [MODES][n_unknowns] sums of the score caused by an error of 1 mm of the place, and of the
@@ -32,15 +49,12 @@ typedef struct piece {
     double *score;
 } piece;
 
-/* Where the surface next to sample i lies: *axis of the image along which it is nearly parallel to
- * the voxels, whether the outside is above, its place along this axis, and the index of the sample,
- * in voxels. false: it is parallel to no axis. */
-static bool find_place(const fit_problem *p, const fit_field *f, size_t i, int *axis, bool *above,
-                       double *place, double index[3])
+// finds the surface next to sample i; false: it is parallel to no axis
+static bool find_place(const fit_problem *p, const fit_field *f, size_t i, place *out)
 {
     const sdm_grid *image = &p->target->grid;
     const double *x = p->samples.world + 3 * i, h = 0.5 * fit_longest_edge(&p->maps.grid);
-    double normal[3], length = 0;
+    double slope[3], length = 0;
     for (int k = 0; k < 3; k++) {
         double side[2];
         for (int s = 0; s < 2; s++) {
@@ -48,58 +62,75 @@ static bool find_place(const fit_problem *p, const fit_field *f, size_t i, int *
             y[k] += s ? h : -h;
             side[s] = sdm_fit_field_at(f, &p->state, y);
         }
-        normal[k] = side[1] - side[0];
-        length += normal[k] * normal[k];
+        slope[k] = side[1] - side[0];
+        length += slope[k] * slope[k];
     }
     length = sqrt(length);
+    out->axis = -1;
     for (int a = 0; a < 3; a++) {
-        double along = 0;
-        for (int k = 0; k < 3; k++) along += normal[k] * image->dir[3 * k + a] / length;
-        if (!(fabs(along) > PARALLEL)) continue;
-        sdm_grid_index(image, x, index);
-        *axis = a, *above = along > 0;
-        *place = index[a] - sdm_fit_field_at(f, &p->state, x) * along / image->spacing[a];
-        return true;
+        out->normal[a] = 0;
+        for (int k = 0; k < 3; k++) out->normal[a] += slope[k] * image->dir[3 * k + a] / length;
+        if (fabs(out->normal[a]) > PARALLEL) out->axis = a;
     }
-    return false;
+    if (out->axis < 0) return false;
+    const double normal = out->normal[out->axis];
+    sdm_grid_index(image, x, out->index);
+    out->above = normal > 0;
+    out->along = out->index[out->axis] -
+                 sdm_fit_field_at(f, &p->state, x) * normal / image->spacing[out->axis];
+    return true;
 }
 
-static void piece_add(piece *q, size_t n, const double at[2], double weight, double place,
-                      const float *score)
+static void piece_add(piece *q, size_t n, const place *at, double weight, const float *score)
 {
+    const double above = at->along - floor(at->along),
+                 other[2] = {at->index[(at->axis + 1) % 3], at->index[(at->axis + 2) % 3]};
     for (int a = 0; a < 2; a++) {
-        q->low[a] = q->phase.all > 0 ? fmin(q->low[a], at[a]) : at[a];
-        q->high[a] = q->phase.all > 0 ? fmax(q->high[a], at[a]) : at[a];
+        q->low[a] = q->phase.all > 0 ? fmin(q->low[a], other[a]) : other[a];
+        q->high[a] = q->phase.all > 0 ? fmax(q->high[a], other[a]) : other[a];
     }
-    fit_step_phase_add(&q->phase, weight, place);
-    const double above = place - floor(place);
+    fit_step_phase_add(&q->phase, weight, at->along);
+    for (int a = 0; a < 3; a++) q->normal[a] += weight * at->normal[a];
     q->first += weight * above;
     q->second += weight * above * above;
     for (size_t k = 0; k < n; k++) {
         q->score[k] += (double)score[k];
-        for (size_t a = 0; a < 2; a++) q->score[(1 + a) * n + k] += (double)score[k] * at[a];
+        for (size_t a = 0; a < 2; a++) q->score[(1 + a) * n + k] += (double)score[k] * other[a];
     }
+}
+
+// sd[MODES] of a piece in voxels, as a whole and at its ends
+static void piece_deviations(const piece *q, double sd[MODES])
+{
+    const double all = q->phase.all, mean = q->first / all,
+                 even = (q->second / all - mean * mean) / (FIT_STEP_SD * FIT_STEP_SD),
+                 hidden = fmin(fmax((1 - even) / (1 - ONE_STEP * ONE_STEP), 0), 1);
+    double normal2 = 0;
+    for (int a = 0; a < 3; a++) normal2 += q->normal[a] * q->normal[a] / (all * all);
+    const double flat = fmin(fmax(1 - (1 - normal2) / CURVED, 0), 1),
+                 whole = hypot(q->phase.turn[0], q->phase.turn[1]) / all;
+    sd[0] = FIT_STEP_SD * (flat * fmax(hidden, whole) + (1 - flat) * whole);
+    sd[1] = sd[2] = sqrt(TILT_VARIANCE) * flat * hidden;
 }
 
 // adds the covariance caused by a piece with voxels of this edge, mm
 static void piece_covariance(piece *q, size_t n, double edge, double *out)
 {
     if (!(q->phase.all > 0)) return;
-    const double mean = q->first / q->phase.all, variance = q->second / q->phase.all - mean * mean,
-                 whole = hypot(q->phase.turn[0], q->phase.turn[1]) / q->phase.all,
-                 hidden = sqrt(fmax(1 - variance / (FIT_STEP_SD * FIT_STEP_SD), 0));
+    double sd[MODES];
+    piece_deviations(q, sd);
     for (size_t mode = 0; mode < MODES; mode++) {
-        double *score = q->score + mode * n, sd = FIT_STEP_SD * whole * edge;
-        // a tilt is 0 in the middle of the piece and 1 at its end
+        double *score = q->score + mode * n;
+        const double variance = edge * edge * sd[mode] * sd[mode];
+        // a tilt is 0 in the middle of the piece and 1 at its ends
         if (mode > 0) {
             const double middle = 0.5 * (q->high[mode - 1] + q->low[mode - 1]),
                          half = 0.5 * (q->high[mode - 1] - q->low[mode - 1]);
             if (!(half > 0)) continue;
             for (size_t k = 0; k < n; k++) score[k] = (score[k] - middle * q->score[k]) / half;
-            sd = sqrt(TILT_VARIANCE) * hidden * edge;
         }
         for (size_t j = 0; j < n; j++)
-            for (size_t k = 0; k < n; k++) out[j * n + k] += sd * sd * score[j] * score[k];
+            for (size_t k = 0; k < n; k++) out[j * n + k] += variance * score[j] * score[k];
     }
 }
 
@@ -121,18 +152,15 @@ sdm_status sdm_fit_label_steps(const fit_problem *p, const fit_neighbours *v, do
     if (!s) s = SDM_ALLOC(&score, all * MODES * n, "covariance of the score", err);
     for (size_t i = 0; i < all && !s; i++) list[i].score = score + i * MODES * n;
     for (size_t i = 0; i < p->samples.n && !s; i++) {
-        int axis;
-        bool above;
-        double place, index[3];
+        place at;
         if (!sdm_fit_in_inner_band(p, i)) continue;
-        const size_t at = count++;
-        if (!find_place(p, &field, i, &axis, &above, &place, index)) continue;
-        const double layer = floor(place) - (double)v->first[axis] + MARGIN;
-        if (!(layer >= 0 && layer < (double)layers[axis])) continue;
-        piece *q = &list[first[axis] + (above ? layers[axis] : 0) + (size_t)layer];
-        const double other[2] = {index[(axis + 1) % 3], index[(axis + 2) % 3]};
-        piece_add(q, n, other, (double)v->weight[at] * (double)v->weight[at], place,
-                  v->model_score + at * n);
+        const size_t number = count++;
+        if (!find_place(p, &field, i, &at)) continue;
+        const double layer = floor(at.along) - (double)v->first[at.axis] + MARGIN,
+                     weight = (double)v->weight[number];
+        if (!(layer >= 0 && layer < (double)layers[at.axis])) continue;
+        piece *q = &list[first[at.axis] + (at.above ? layers[at.axis] : 0) + (size_t)layer];
+        piece_add(q, n, &at, weight * weight, v->model_score + number * n);
     }
     for (size_t i = 0; i < all && !s; i++) {
         const int axis = i < first[1] ? 0 : i < first[2] ? 1 : 2;

@@ -9,10 +9,11 @@
 #include "neighbours.h"
 
 /* Adds to out[n_unknowns][n_unknowns] the covariance of the score caused by the steps of the labels
-   in pieces of the surface that lie between the same two layers of voxels. A piece is off as a
-   whole by a step of 1 / sqrt(12) voxel (rms), times the length of the mean of exp(2 pi i s) over
-   its samples, where s is the place of the surface in voxels. It is tilted along each of the other
-   two axes by 1 / sqrt(24) voxel at its ends (rms), times sqrt(1 - 12 variance of s): by nothing
-   where it runs from one layer to the next. v: the neighbours of p. SDM_E_NOMEM. */
+   in pieces of the surface that lie between the same two layers of voxels. s: place of the surface
+   in voxels. A curved piece is off by 1 / sqrt(12) voxel (rms) times the length of the mean of
+   exp(2 pi i s) over its samples. A flat one is off by 1 / sqrt(12) voxel as a whole, and by
+   1 / sqrt(24) voxel at its ends for a tilt along each of the other two axes, both times
+   min(1, (1 - 12 variance(s)) / (1 - 0.75^2)): by nothing where it runs from one layer to the next.
+   v: the neighbours of p. SDM_E_NOMEM. */
 sdm_status sdm_fit_label_steps(const fit_problem *p, const fit_neighbours *v, double *out,
                                sdm_error *err);

@@ -3,11 +3,12 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "args/shell_word.h"
 #include "commands.h"
 #include "inputs/config_shape.h"
 #include "inputs/ranks.h"
 #include "inputs/setup.h"
+#include "model_before.h"
+#include "next_training.h"
 #include "page/page.h"
 #include "print_plan.h"
 #include "report/files.h"
@@ -53,10 +54,10 @@ static sdm_status look_at_model(const char *model_path, const sdm_instance *shap
     return s;
 }
 
-/* The kind that network.kind: auto has trained and not kept. */
-static const char *other_kind(const sdm_train_report *r)
+/* "pod" or "template": a kind that network.kind: auto has trained. */
+static const char *kind_name(sdm_network_kind kind)
 {
-    return r->other_kind == SDM_NETWORK_POD ? "pod" : "template";
+    return kind == SDM_NETWORK_POD ? "pod" : "template";
 }
 
 /* Tells of several ranks, and what memory they needed. */
@@ -72,99 +73,23 @@ static void print_ranks(const cli_ranks_use *use)
            use->by, 1e-6 * (double)least, 1e-6 * (double)most, 1e-6 * (double)all);
 }
 
-/* Appends " word" to a command. */
-static void add_word(sdm_text *command, const char *word)
-{
-    sdm_text_add(command, " ");
-    cli_add_shell_word(command, word);
-}
-
-/* Appends an option and its value. */
-static void add_option(sdm_text *command, const char *option, const char *value)
-{
-    add_word(command, option);
-    add_word(command, value);
-}
-
-/* The same with a number, which is 0 where the option was not given. */
-static void add_number(sdm_text *command, const char *option, double value)
-{
-    char number[32];
-    snprintf(number, sizeof number, "%.15g", value);
-    if (value > 0) add_option(command, option, number);
-}
-
-/* Is the argument "key=value" or "key.member=value", so that the change of this key replaces it? */
-static bool sets_key(const char *argument, const char *key)
-{
-    const size_t n = strlen(key);
-    return !strncmp(argument, key, n) && (argument[n] == '=' || argument[n] == '.');
-}
-
-/* Appends the files and keys of the command line but those that `v` replaces, and its changes. */
-static void add_changes(sdm_text *command, const cli_args *args, const sdm_verdict *v)
-{
-    // a grid.size or grid.origin of the configuration cuts the shapes, or would with other voxels
-    const bool grid = v->cut > 0 || !strncmp(v->key, "grid.", 5), budget = v->minutes > 0;
-    char change[80];
-    for (size_t i = 0; i < args->files.n; i++) {
-        const char *word = args->files.items[i];
-        if (!(grid && sets_key(word, "grid")) && !(v->key[0] && sets_key(word, v->key)) &&
-            !(budget && sets_key(word, "train.minutes")))
-            add_word(command, word);
-    }
-    if (grid) add_word(command, "grid=auto");
-    if (v->key[0]) {
-        snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
-        add_word(command, change);
-    }
-    if (budget) {
-        snprintf(change, sizeof change, "train.minutes=%.6g", v->minutes);
-        add_word(command, change);
-    }
-}
-
-/* Prints the command that follows the advice of the verdict. */
-static void print_next(const cli_args *args, const sdm_train_report *r)
-{
-    const sdm_verdict *v = &r->verdict;
-    const char *slash = strrchr(r->model_path, '/');
-    char folder[sizeof r->model_path + 8];
-    sdm_text command = {0};
-    // the maps of another grid are not in --dataset
-    const bool other_maps = args->dataset && (v->cut > 0 || !strncmp(v->key, "grid.", 5));
-    if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || !slash || other_maps) return;
-    snprintf(folder, sizeof folder, "%.*s-2", (int)(slash - r->model_path), r->model_path);
-    add_changes(&command, args, v);
-    for (size_t i = 0; i < args->plugins.n; i++)
-        add_option(&command, "--plugin", args->plugins.items[i]);
-    if (args->isolate) add_word(&command, "--isolate");
-    add_number(&command, "--isolate-seconds", args->isolate_seconds);
-    add_number(&command, "--isolate-memory", args->isolate_memory);
-    add_number(&command, "--ranks", (double)args->ranks);
-    if (args->dataset) add_option(&command, "--dataset", args->dataset);
-    add_option(&command, "--out", folder);
-    if (!command.failed)
-        printf("  %-11s sdmgen train%s\n", v->grade == SDM_GRADE_GOOD ? "better" : "next",
-               command.data);
-    sdm_text_dispose(&command);
-}
-
 /* Tells of the kind that network.kind: auto has trained and not kept, and what it was better at. */
 static void print_other(const sdm_train_report *r)
 {
-    printf(
-        "  auto        trained %s, too: RMSE %.5f mm, within a voxel of the surface %.5f mm; not "
-        "kept",
-        other_kind(r), r->other.rmse_mm, r->other_voxel_mm);
+    printf("  auto        trained %s, too: RMSE %.5f mm, within a voxel of the surface %.5f mm, "
+           "%.3g ms a "
+           "map; not kept",
+           kind_name(r->other_kind), r->other.rmse_mm, r->other_voxel_mm, r->other_ms);
     if (r->other_voxel_mm < r->verdict.rmse_voxel_mm)
         printf(": better at the surface, but worse elsewhere (network.kind=%s keeps it)",
-               other_kind(r));
+               kind_name(r->other_kind));
     printf("\n");
 }
 
+/* before: the error of the model that the run has replaced, mm; NaN: there is none to compare. */
 static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
-                                const cli_timing *times, const cli_ranks_use *use, sdm_error *err)
+                                const cli_timing *times, const cli_ranks_use *use, double before,
+                                sdm_error *err)
 {
     const sdm_accuracy *a = &r->accuracy;
     // print as JSON
@@ -188,12 +113,14 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         sdm_json_close(&j, ']');
         if (r->compared) {
             sdm_json_open(&j, "other", '{');
-            sdm_json_text(&j, "kind", other_kind(r));
+            sdm_json_text(&j, "kind", kind_name(r->other_kind));
             sdm_json_real(&j, "rmse_mm", r->other.rmse_mm);
             sdm_json_real(&j, "rmse_near_mm", r->other.rmse_near_mm);
             sdm_json_real(&j, "rmse_voxel_mm", r->other_voxel_mm);
+            sdm_json_real(&j, "ms_network", r->other_ms);
             sdm_json_close(&j, '}');
         }
+        if (isfinite(before)) sdm_json_real(&j, "before_rmse_mm", before);
         sdm_json_open(&j, "verdict", '{');
         sdm_verdict_json(&j, &r->verdict);
         sdm_json_real(&j, "saved_seconds", r->verdict.saved_seconds);
@@ -219,7 +146,8 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     if (use->n > 1) print_ranks(use);
     if (r->compared) print_other(r);
     cli_print_verdict(&r->verdict);
-    print_next(args, r);
+    if (isfinite(before)) cli_print_before(before, a->rmse_mm);
+    cli_print_next(args, r, r->chosen ? kind_name(r->kind) : NULL, times->ms_network);
     if (cli_warnings() > 0)
         printf("  warnings    %zu, at the beginning of the output%s\n", cli_warnings(),
                r->verdict.cut > 0 || r->verdict.inside_out > 0 || r->verdict.triangles_by[0] ||
@@ -240,6 +168,7 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     hooks.store = store;
     sdm_train_report report = {0};
     hooks.comm = comm;
+    sdm_model *before = first && args->force ? cli_model_before(folder) : NULL;
     if (first && !args->resume) cli_notice_survey(config, shape);
     if (first) cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
@@ -249,7 +178,9 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     s = cli_ranks_end(comm, s, err);
     cli_timing times;
     if (!s) s = look_at_model(report.model_path, shape, folder, &times, err);
-    if (!s) s = print_summary(args, &report, &times, &use, err);
+    const double old_mm = s ? NAN : cli_before_rmse(before, report.model_path);
+    sdm_model_free(before);
+    if (!s) s = print_summary(args, &report, &times, &use, old_mm, err);
     sdm_free(use.memory);
     return s || !args->report
                ? s

@@ -124,6 +124,7 @@ static sdm_status keep_better(run *r, trainer *t, sdm_train_report *report, sdm_
     report->compared = true;
     report->other = both[!best].accuracy;
     report->other_voxel_mm = both[!best].verdict.rmse_voxel_mm;
+    report->other_ms = both[!best].map_ms;
     report->other_kind = r->turns.kind[!best];
     const sdm_status s =
         trainer_turns_record(&r->metrics, r->turns.kind[best], NULL, NULL, figures, 2, err);

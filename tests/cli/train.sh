@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen train: the run folder and its protection, interrupt and resume. The tests of models use the run made here.
-# Tests: cmd_train.c report_verdict.c train_progress.c
+# Tests: cmd_train.c map_time.c model_before.c next_training.c report_verdict.c train_progress.c
 . "$(dirname "$0")/common.sh"
 coarse_grids=yes
 tiny=$source_folder/tests/cli/tiny.yaml
@@ -106,6 +106,28 @@ expect 2 'data.static \(0 maps\), data.start \(0\) and data.holdout \(500\) on .
 sdmgen train link.yaml network.kind=pod data.start=700 data.memory_gb=0.012 --out full >out 2>err || bad "full: $(cat err)"
 grep -q '^sdmgen: data.memory_gb is 0.012: of 700 random maps (data.start) on 8.78e+03 voxels the training starts with 659, ' err ||
     bad "the memory for maps: $(cat err)"
+
+# auto: the command names the kind that was kept and the cost of its maps; that of the other kind is in its line and in the JSON.
+expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 data.holdout=12 --out both --quiet
+has '^  auto        trained (pod|template), too: RMSE .*, [0-9.e-]+ ms a map; not kept'
+has '^  (next|better) +sdmgen train link.yaml .*network.kind=(pod|template) --out both-2$'
+has '^              \((pod|template) again, [0-9.e-]+ ms a map on this grid; network.kind=auto would choose anew\)$'
+rm -r both
+expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 --out both --quiet --json
+has '"other": \{"kind": "(pod|template)", .*"ms_network": [0-9]'
+# A model that --force replaces is compared if its shape, ranges and grid are the same. With the kind given, the command names none.
+grep -q before_rmse_mm out && bad 'a model before the first one'
+before=$(json rmse_mm)
+expect 0 - sdmgen train link.yaml network.kind=pod data.start=300 data.memory_gb=6 network.rank=1 --out both --force --quiet
+has "^  before      RMSE $(printf %.5f "$before") -> [0-9.]+ mm \(worse\)$"
+has '^  (next|better) '
+grep -q ' again, ' out && bad "the kind was given: $(cat out)"
+expect 0 - sdmgen train link.yaml network.kind=pod data.start=300 data.memory_gb=6 network.rank=1 --out both --force --quiet
+has '^  before      RMSE ([0-9.]+) -> \1 mm \(equal\)$'
+for other in grid.spacing=0.35 'shape.ranges.q1=[-0.4,0.4]' shape.options.edge=0.6; do
+    expect 0 - sdmgen train link.yaml network.kind=pod data.start=300 data.memory_gb=6 network.rank=1 "$other" --out both --force --quiet
+    grep -q '^  before ' out && bad "compared with another shape or grid: $(cat out)"
+done
 
 # Keys that a template without a correction does not need: told, by kind.
 sdmgen train link.yaml network.kind=template --out vain >out 2>err || bad "vain: $(cat err)"

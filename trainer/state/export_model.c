@@ -11,6 +11,7 @@
 #include "history.h"
 #include "judge.h"
 #include "kind.h"
+#include "map_time.h"
 #include "progress.h"
 #include "sdm/internal/container.h"
 #include "sdm/internal/file.h"
@@ -374,6 +375,8 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
         trainer_derivatives_unknown(&more.derivatives);
         trainer_message(t, "volumes and derivatives were not measured: %s", why.text);
     }
+    double map_ms = NAN;
+    if (!s && t->turns->n > 1) s = trainer_map_time(&t->data, model, &map_ms, err);
     sdm_model_free(model);
     if (!s) {
         t->heldout_mse = t->accuracy.mse_mm2;
@@ -384,6 +387,9 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
         report->accuracy = t->accuracy;
         report->steps = t->step;
         report->samples = d->info.train_samples;
+        report->kind = t->config->network.kind;
+        report->chosen = t->turns->chosen;
+        report->map_ms = map_ms;
     }
     description_free(d);
     return s;

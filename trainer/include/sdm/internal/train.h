@@ -73,12 +73,15 @@ typedef struct sdm_train_report {
     int64_t steps, samples;
     double seconds;
     sdm_verdict verdict;
-    /* network.kind: auto has trained another kind, too, which was worse; its accuracy, and its root
-       mean square error of the voxels within a voxel of the surface. */
+    sdm_network_kind kind; /* of the model */
+    bool chosen;           /* by network.kind: auto */
+    double map_ms; /* processor time of one map; NaN: not measured, as only one kind was trained */
+    /* network.kind: auto has trained another kind, too, which was worse; its accuracy, its root
+       mean square error of the voxels within a voxel of the surface, and its map_ms. */
     bool compared;
     sdm_network_kind other_kind;
     sdm_accuracy other;
-    double other_voxel_mm;
+    double other_voxel_mm, other_ms;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled

@@ -1,0 +1,98 @@
+/* Prints the command that follows the advice of a finished training. */
+#include "next_training.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "args/shell_word.h"
+#include "sdm/internal/text.h"
+
+/* Appends " word" to a command. */
+static void add_word(sdm_text *command, const char *word)
+{
+    sdm_text_add(command, " ");
+    cli_add_shell_word(command, word);
+}
+
+/* Appends an option and its value. */
+static void add_option(sdm_text *command, const char *option, const char *value)
+{
+    add_word(command, option);
+    add_word(command, value);
+}
+
+/* The same with a number, which is 0 where the option was not given. */
+static void add_number(sdm_text *command, const char *option, double value)
+{
+    char number[32];
+    snprintf(number, sizeof number, "%.15g", value);
+    if (value > 0) add_option(command, option, number);
+}
+
+/* Is the argument "key=value" or "key.member=value", so that the change of this key replaces it? */
+static bool sets_key(const char *argument, const char *key)
+{
+    const size_t n = strlen(key);
+    return !strncmp(argument, key, n) && (argument[n] == '=' || argument[n] == '.');
+}
+
+/* Appends the files and keys of the command line but those that `v` and the kind replace, and the
+ * changes. */
+static void add_changes(sdm_text *command, const cli_args *args, const sdm_verdict *v,
+                        const char *kind)
+{
+    // a grid.size or grid.origin of the configuration cuts the shapes, or would with other voxels
+    const bool grid = v->cut > 0 || !strncmp(v->key, "grid.", 5), budget = v->minutes > 0;
+    char change[80];
+    for (size_t i = 0; i < args->files.n; i++) {
+        const char *word = args->files.items[i];
+        if (!(grid && sets_key(word, "grid")) && !(v->key[0] && sets_key(word, v->key)) &&
+            !(budget && sets_key(word, "train.minutes")) &&
+            !(kind && sets_key(word, "network.kind")))
+            add_word(command, word);
+    }
+    if (grid) add_word(command, "grid=auto");
+    if (v->key[0]) {
+        snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
+        add_word(command, change);
+    }
+    if (budget) {
+        snprintf(change, sizeof change, "train.minutes=%.6g", v->minutes);
+        add_word(command, change);
+    }
+    if (!kind) return;
+    snprintf(change, sizeof change, "network.kind=%s", kind);
+    add_word(command, change);
+}
+
+void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
+                    double ms_map)
+{
+    const sdm_verdict *v = &r->verdict;
+    const char *slash = strrchr(r->model_path, '/');
+    char folder[sizeof r->model_path + 8];
+    sdm_text command = {0};
+    // the maps of another grid are not in --dataset
+    const bool other_maps = args->dataset && (v->cut > 0 || !strncmp(v->key, "grid.", 5));
+    if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || !slash || other_maps) return;
+    snprintf(folder, sizeof folder, "%.*s-2", (int)(slash - r->model_path), r->model_path);
+    add_changes(&command, args, v, kind);
+    for (size_t i = 0; i < args->plugins.n; i++)
+        add_option(&command, "--plugin", args->plugins.items[i]);
+    if (args->isolate) add_word(&command, "--isolate");
+    add_number(&command, "--isolate-seconds", args->isolate_seconds);
+    add_number(&command, "--isolate-memory", args->isolate_memory);
+    add_number(&command, "--ranks", (double)args->ranks);
+    if (args->dataset) add_option(&command, "--dataset", args->dataset);
+    add_option(&command, "--out", folder);
+    if (!command.failed)
+        printf("  %-11s sdmgen train%s\n", v->grade == SDM_GRADE_GOOD ? "better" : "next",
+               command.data);
+    if (!command.failed && kind && isfinite(ms_map))
+        printf(
+            "              (%s again, %.3g ms a map on this grid; network.kind=auto would choose "
+            "anew)\n",
+            kind, ms_map);
+    sdm_text_dispose(&command);
+}

@@ -1,0 +1,11 @@
+/* Prints the command that follows the advice of a finished training. */
+#pragma once
+
+#include "args/options.h"
+#include "sdm/internal/train.h"
+
+/* Prints the line `next` (of a good model `better`), or nothing where the verdict advises nothing.
+   kind: that of the model, if network.kind was auto; the command states it, so that it trains the
+   same kind again, and a second line tells what a map costs with it, ms_map; else NULL. */
+void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
+                    double ms_map);

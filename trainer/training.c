@@ -78,14 +78,16 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
     t->data.known = NULL;
     trainer_dataset_dispose(&t->tried);
     if (s) return s;
-    if (t->data.n_start < start)
+    const dataset *d = &t->data;
+    if (d->n_start < start)
         trainer_message(t,
-                        "half of the budget is over after %zu of %zu random maps%s: training "
-                        "starts with these (lower %s or raise train.minutes)",
-                        t->data.n_start, start,
-                        t->data.n_static > t->data.n_start ? " and all maps of the static grid"
-                                                           : "",
-                        t->data.n_static > t->data.n_start ? "data.static" : "data.start");
+                        "half of the budget is over after %zu held-out maps, %zu of the static "
+                        "grid and %zu of %zu random ones: training starts with these (lower %s or "
+                        "raise train.minutes)",
+                        d->n_holdout, d->n_static, d->n_start, start,
+                        d->n_static > d->n_start    ? "data.static"
+                        : d->n_holdout > d->n_start ? "data.holdout"
+                                                    : "data.start");
     return trainer_check_grid(t, err);
 }
 

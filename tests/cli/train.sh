@@ -52,6 +52,8 @@ sdmgen train "$tiny" --out hurried train.steps=0 train.minutes=0.0001 data.start
 # A run of less than a second more is not told; "trained" counts the writing of files as well.
 grep -q '^sdmgen: the run took [0-9]* s longer than train.minutes: ' err || awk '$1 == "trained" { short = $2 < 2 } END { exit !short }' out ||
     bad "no word about the time: $(cat err)"
+grep -Eq '^sdmgen: half of the budget is over after 8 held-out maps, 16 of the static grid and 1[2-9][0-9] of 400 random ones: .*lower data.start or' err ||
+    bad "no word about all maps: $(cat err)"
 has '^  error from  bases +[0-9.]+ mm +[0-9]+ %  '
 has '^  (good|usable|poor) \(from 8 shapes only\) +(for|not) '
 has '^  verdict     .*(raise|lower|set) '

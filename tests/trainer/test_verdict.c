@@ -138,6 +138,44 @@ static void length_of_the_training(void **state)
     assert_non_null(strstr(v.sentence, "train.minutes from 1.5 to 3 for a larger network"));
 }
 
+// Where most of the maps in the time of the budget are those of the static grid, a smaller grid
+// comes before a longer training; to is the largest grid of at most a tenth of the maps.
+static void static_grid_took_the_time(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *counts;
+        double n_params, fixed, maps, steps;
+        sdm_cause limit;
+        const char *change;
+    } cases[] = {
+        {"data.static=4", 5, 1024, 1400, 1500, SDM_CAUSE_MAPS, "lower data.static from 4 to 2"},
+        {"data.static=4", 5, 1024, 1400, 0, SDM_CAUSE_MAPS,
+         "(99 % of the mean square error): lower"},
+        {"data.static=4", 5, 1024, 1400, 60, SDM_CAUSE_NETWORK, "lower data.static from 4 to 2"},
+        {"data.static=[5, 4, 4]", 3, 80, 150, 60, SDM_CAUSE_NETWORK, "data.static from 5 to 2"},
+        {"data.static=2", 8, 256, 400, 1500, SDM_CAUSE_MAPS, "lower data.static from 2 to 0"},
+        {"data.static=4", 5, 1024, 2100, 1500, SDM_CAUSE_MAPS, "raise train.minutes from 2 to 4"},
+        {"data.static=4", 5, 1024, 1400, 1500, SDM_CAUSE_NETWORK, "raise network.width"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const char *overrides[] = {cases[i].counts, "train.steps=0", "train.minutes=2"};
+        const sdm_config c = config_of(overrides, 3);
+        sdm_verdict v = figures();
+        v.part_mm2[SDM_CAUSE_NETWORK] = 1e-6;
+        v.part_mm2[cases[i].limit] = 1e-4;
+        const verdict_input in = {.config = &c,
+                                  .maps = cases[i].maps,
+                                  .fixed = cases[i].fixed,
+                                  .n_params = cases[i].n_params,
+                                  .cut = true,
+                                  .steps = cases[i].steps,
+                                  .budget = 2};
+        trainer_verdict_decide(&in, &v);
+        if (!strstr(v.sentence, cases[i].change)) fail_msg("case %zu: %s", i, v.sentence);
+        assert_int_equal(strstr(v.sentence, "The static grid took most") == v.sentence, i < 5);
+    }
+}
+
 // The other kind is a choice, not a remedy. An error of less than a voxel, or near the
 // surface, is not told with the grade.
 static void error_far_from_the_surface(void **state)
@@ -639,6 +677,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(largest_part_limits),
         cmocka_unit_test(length_of_the_training),
+        cmocka_unit_test(static_grid_took_the_time),
         cmocka_unit_test(error_far_from_the_surface),
         cmocka_unit_test(grid_limits),
         cmocka_unit_test(grades),

@@ -26,6 +26,9 @@ static const double RATE_HIGH = 0.03, RATE_USUAL = 3e-3;
    eight times as many voxels, take away most of the error of the surface. */
 static const double GRID_SHARE = 2, GRID_ERROR = 0.05;
 
+/* true: most maps for which the time was enough are those of the static grid. */
+static bool grid_took_time(const verdict_input *in) { return in->cut && 2 * in->fixed > in->maps; }
+
 /* Sets the key to change and its values. */
 static void advise(sdm_verdict *v, const char *key, double from, double to)
 {
@@ -56,6 +59,19 @@ static bool has_bases(const sdm_config *c)
     return c->network.kind == SDM_NETWORK_POD || c->network.kind == SDM_NETWORK_TEMPLATE;
 }
 
+/* The largest smaller static grid with at most a tenth of the maps of the run; 0: none. */
+static const char *advise_static(const verdict_input *in, sdm_verdict *v)
+{
+    const sdm_config *c = in->config;
+    int64_t most = c->data.static_counts[0];
+    for (size_t i = 1; i < c->data.n_static_counts; i++)
+        if (c->data.static_counts[i] > most) most = c->data.static_counts[i];
+    int64_t fewer = most - 1;
+    while (fewer > 1 && pow((double)fewer, in->n_params) > 0.1 * in->maps) fewer--;
+    advise(v, "data.static", (double)most, fewer > 1 ? (double)fewer : 0);
+    return "The static grid took most of the time for maps, which limits it";
+}
+
 /* The network leaves much of training maps: it was trained too shortly or is too small. */
 static const char *advise_network(const verdict_input *in, sdm_verdict *v)
 {
@@ -68,11 +84,13 @@ static const char *advise_network(const verdict_input *in, sdm_verdict *v)
         advise(v, "train.learning_rate", c->train.learning_rate, RATE_USUAL);
         return "The learning rate is too high";
     }
-    if (in->steps < FEW_STEPS) {
+    const bool few = in->steps<FEW_STEPS, falls = v->fall> STILL_FALLING && !in->ended_early;
+    if ((few || falls) && grid_took_time(in)) return advise_static(in, v);
+    if (few) {
         advise_budget(in, v);
         return "The training was too short";
     }
-    if (v->fall > STILL_FALLING && !in->ended_early) {
+    if (falls) {
         advise_budget(in, v);
         return "The training was too short, its error was still falling";
     }
@@ -92,6 +110,7 @@ static const char *advise_network(const verdict_input *in, sdm_verdict *v)
 static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
 {
     const sdm_config *c = in->config;
+    if (grid_took_time(in)) return advise_static(in, v);
     if (in->cut) {
         advise_budget(in, v);
         return "The number of maps limits it, which the time for them limits";
@@ -167,7 +186,8 @@ static bool find_limit(const verdict_input *in, const sdm_verdict *v, sdm_cause 
         return true;
     }
     // a run that ended before its first step says nothing about the grid
-    if (in->config->network.depth && in->steps < 1 && part[SDM_CAUSE_NETWORK] > 0) {
+    if (in->config->network.depth && in->steps < 1 && part[SDM_CAUSE_NETWORK] > 0 &&
+        !(*limit == SDM_CAUSE_MAPS && grid_took_time(in))) {
         *limit = SDM_CAUSE_NETWORK;
         return true;
     }
@@ -423,6 +443,8 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                full = fewer && d->n_slots < d->n_static + (size_t)t->config->data.start;
     const verdict_input in = {.config = t->config,
                               .maps = (double)(d->n_static + d->n_taken),
+                              .fixed = (double)d->n_static,
+                              .n_params = (double)d->n_params,
                               .cut = fewer && !full && trainer_by_time(t),
                               .full = full,
                               .ended_early = t->saved_seconds > 0,

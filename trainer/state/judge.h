@@ -25,7 +25,9 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
 /* The measured figures from which the verdict follows. */
 typedef struct verdict_input {
     const sdm_config *config;
-    double maps;      /* training maps made by the run */
+    double maps;  /* training maps made by the run */
+    double fixed; /* those of them on the static grid */
+    double n_params;
     bool cut;         /* the time of the budget ended before all maps of data.start were made */
     bool full;        /* data.memory_gb did not hold all of them */
     bool ended_early; /* by train.patience */

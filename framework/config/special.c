@@ -11,11 +11,14 @@
 #define SPACING_MAX 1e6
 #define PLACE_MAX 1e9
 #define STATIC_MAX 1000
-// data.static: auto: points along a parameter, and points of the grid, at most
+// data.static: auto: points along a parameter, and points of the grid, at most; more of them where
+// these would leave two along a parameter, which show its ends alone
 #define STATIC_AUTO_MOST 5
-#define STATIC_AUTO_ALL 3125
-// with a budget of time, which the maps of the grid must leave for training
+#define STATIC_AUTO_ALL 256
+#define STATIC_AUTO_ALL_OF_FEW 750
+// with a budget of time, which the maps of the grid must leave for training and for random maps
 #define STATIC_AUTO_A_MINUTE 300
+#define STATIC_AUTO_A_MINUTE_OF_FEW 150
 
 /* Reads [x, y, z] within min .. max and reports the mistakes in all three numbers. */
 static bool read_three(sdm_reader *r, const sdm_tree_node *node, const char *path, double min,
@@ -210,20 +213,27 @@ bool sdm_read_key_static(sdm_reader *r, const sdm_field *f, const sdm_tree_node 
     return true;
 }
 
+/* The largest number of points along each parameter up to `most` with at most `limit` in all. */
+static int64_t count_within(double limit, size_t n_params, int64_t most)
+{
+    for (int64_t count = most; count > 1; count--) {
+        double all = 1;
+        for (size_t k = 0; k < n_params && all <= limit; k++) all *= (double)count;
+        if (all <= limit) return count;
+    }
+    return 0;
+}
+
 int64_t sdm_config_static_count(const sdm_config *c, size_t n_params, size_t i)
 {
     if (!c->data.n_static_counts) return 0;
     const int64_t count = c->data.static_counts[c->data.n_static_counts == 1 ? 0 : i];
     if (count != SDM_STATIC_AUTO) return count;
-    const double minutes = c->train.minutes,
-                 limit = minutes > 0 ? fmin(STATIC_AUTO_ALL, STATIC_AUTO_A_MINUTE * minutes)
-                                     : STATIC_AUTO_ALL;
-    for (int64_t most = STATIC_AUTO_MOST; most > 1; most--) {
-        double all = 1;
-        for (size_t k = 0; k < n_params && all <= limit; k++) all *= (double)most;
-        if (all <= limit) return most;
-    }
-    return 0;
+    const double minutes = c->train.minutes > 0 ? c->train.minutes : INFINITY,
+                 all = fmin(STATIC_AUTO_ALL, STATIC_AUTO_A_MINUTE * minutes),
+                 of_few = fmin(STATIC_AUTO_ALL_OF_FEW, STATIC_AUTO_A_MINUTE_OF_FEW * minutes);
+    const int64_t usual = count_within(all, n_params, STATIC_AUTO_MOST);
+    return usual > 2 ? usual : count_within(fmax(all, of_few), n_params, 3);
 }
 
 void sdm_config_set_static(sdm_config *c, size_t n_params)

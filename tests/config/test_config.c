@@ -62,7 +62,7 @@ static void test_defaults(void **state)
     assert_int_equal(config.network.weights, SDM_WEIGHT_I8);
     assert_int_equal(config.data.n_static_counts, 1);
     assert_int_equal(config.data.static_counts[0], SDM_STATIC_AUTO);
-    static const int64_t by_params[] = {0, 5, 5, 5, 5, 5, 3, 3, 2, 2, 2, 2, 0, 0};
+    static const int64_t by_params[] = {0, 5, 5, 5, 4, 3, 3, 2, 2, 2, 0, 0};
     for (size_t n = 1; n < sizeof by_params / sizeof *by_params; n++)
         assert_int_equal(sdm_config_static_count(&config, n, n - 1), by_params[n]);
     assert_int_equal(sdm_config_static_count(&config, SDM_MAX_PARAMS, 0), 0);
@@ -72,6 +72,11 @@ static void test_defaults(void **state)
     static const int64_t of_a_minute[] = {0, 5, 5, 5, 4, 3, 2, 2, 2, 0};
     for (size_t n = 1; n < sizeof of_a_minute / sizeof *of_a_minute; n++)
         assert_int_equal(sdm_config_static_count(&config, n, 0), of_a_minute[n]);
+    // ... and more minutes do not make a grid of three points along each parameter finer
+    for (config.train.minutes = 4; config.train.minutes < 6; config.train.minutes++)
+        for (size_t n = 1; n < sizeof by_params / sizeof *by_params; n++)
+            assert_int_equal(sdm_config_static_count(&config, n, 0),
+                             n == 6 && config.train.minutes < 5 ? 2 : by_params[n]);
     config.train.minutes = budget;
     assert_int_equal(config.data.online, 4096);
     assert_int_equal(config.data.start, 3456);

@@ -139,7 +139,7 @@ static void length_of_the_training(void **state)
 }
 
 // Where most of the maps in the time of the budget are those of the static grid, a smaller grid
-// comes before a longer training; to is the largest grid of at most a tenth of the maps.
+// comes before a longer training; its new number is the largest with at most a third of the maps.
 static void static_grid_took_the_time(void **state)
 {
     (void)state;
@@ -149,11 +149,11 @@ static void static_grid_took_the_time(void **state)
         sdm_cause limit;
         const char *change;
     } cases[] = {
-        {"data.static=4", 5, 1024, 1400, 1500, SDM_CAUSE_MAPS, "lower data.static from 4 to 2"},
+        {"data.static=4", 5, 1024, 1400, 1500, SDM_CAUSE_MAPS, "lower data.static from 4 to 3"},
         {"data.static=4", 5, 1024, 1400, 0, SDM_CAUSE_MAPS,
          "(99 % of the mean square error): lower"},
-        {"data.static=4", 5, 1024, 1400, 60, SDM_CAUSE_NETWORK, "lower data.static from 4 to 2"},
-        {"data.static=[5, 4, 4]", 3, 80, 150, 60, SDM_CAUSE_NETWORK, "data.static from 5 to 2"},
+        {"data.static=4", 5, 1024, 1400, 60, SDM_CAUSE_NETWORK, "lower data.static from 4 to 3"},
+        {"data.static=[5, 4, 4]", 3, 80, 150, 60, SDM_CAUSE_NETWORK, "data.static from 5 to 3"},
         {"data.static=2", 8, 256, 400, 1500, SDM_CAUSE_MAPS, "lower data.static from 2 to 0"},
         {"data.static=4", 5, 1024, 2100, 1500, SDM_CAUSE_MAPS, "raise train.minutes from 2 to 4"},
         {"data.static=4", 5, 1024, 1400, 1500, SDM_CAUSE_NETWORK, "raise network.width"}};

@@ -59,7 +59,7 @@ static bool has_bases(const sdm_config *c)
     return c->network.kind == SDM_NETWORK_POD || c->network.kind == SDM_NETWORK_TEMPLATE;
 }
 
-/* The largest smaller static grid with at most a tenth of the maps of the run; 0: none. */
+/* The largest smaller static grid with at most a third of the maps of the run; 0: none. */
 static const char *advise_static(const verdict_input *in, sdm_verdict *v)
 {
     const sdm_config *c = in->config;
@@ -67,7 +67,7 @@ static const char *advise_static(const verdict_input *in, sdm_verdict *v)
     for (size_t i = 1; i < c->data.n_static_counts; i++)
         if (c->data.static_counts[i] > most) most = c->data.static_counts[i];
     int64_t fewer = most - 1;
-    while (fewer > 1 && pow((double)fewer, in->n_params) > 0.1 * in->maps) fewer--;
+    while (fewer > 1 && pow((double)fewer, in->n_params) > in->maps / 3) fewer--;
     advise(v, "data.static", (double)most, fewer > 1 ? (double)fewer : 0);
     return "The static grid took most of the time for maps, which limits it";
 }

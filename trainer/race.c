@@ -10,6 +10,7 @@
 #include "sdm/memory.h"
 #include "set_up.h"
 #include "state/export_model.h"
+#include "state/forecast.h"
 #include "state/progress.h"
 
 enum { HOLDOUT = 32, MAPS = 384, MAPS_MAX = 1024 };
@@ -28,11 +29,12 @@ static const double TEMPLATE_SHARE = 1.0 / 3;
 /* A kind of network in the race. */
 typedef struct entrant {
     sdm_network_kind kind;
-    const trainer *race; /* the run, with the whole budget */
+    trainer *race;       /* the run, with the whole budget */
     bool finished;       /* false: the shape does not allow this kind */
     bool ready;          /* it needs no training */
     bool cut;            /* the budget of time ended before all maps of the trial were made */
     turn_figures errors; /* of its trial */
+    double filling;      /* s, when its maps were begun, of the run */
     double seconds;
     char left_out[SDM_ERROR_TEXT_MAX]; /* why the shape does not allow it; "": it does */
     trainer run;                       /* its trial; run.kind is NULL without one */
@@ -91,6 +93,25 @@ static bool trial_enough(void *user)
     return trainer_start_fraction(((entrant *)user)->race) > TRAINER_TRIALS_SHARE;
 }
 
+/* Tells once that the maps which a trial makes in any case take longer than the budget. */
+static void trial_report(void *user, size_t done, size_t all)
+{
+    entrant *e = user;
+    trainer *t = e->race;
+    const dataset *d = &e->run.data;
+    const size_t random = d->n_start < FILL_LEAST_RANDOM ? d->n_start : FILL_LEAST_RANDOM;
+    double seconds;
+    (void)all;
+    if (t->overrun_told || !trainer_forecast(t, e->filling, done, d->n_holdout + random, &seconds))
+        return;
+    t->overrun_told = true;
+    trainer_message(t,
+                    "the run will take longer than train.minutes (%.4g): a trial of "
+                    "network.kind: auto makes at least %zu maps, which takes about %.0f s (raise "
+                    "train.minutes, or give network.kind)",
+                    t->config->train.minutes, d->n_holdout + random, seconds);
+}
+
 /* *out = the errors of a trial. */
 static sdm_status measure(const trainer *r, turn_figures *out, sdm_error *err)
 {
@@ -119,7 +140,8 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
                    .heldout_mse = NAN,
                    .evaluated_step = -1,
                    .metrics = &metrics};
-    const fill_hooks hooks = {.cancelled = trial_cancelled, .enough = trial_enough, .user = e};
+    const fill_hooks hooks = {
+        .report = trial_report, .cancelled = trial_cancelled, .enough = trial_enough, .user = e};
     sdm_error reason = {0};
     sdm_status s = trainer_set_up(r, &reason);
     if (s == SDM_E_UNSUPPORTED && e->kind != SDM_NETWORK_POD) {
@@ -128,6 +150,7 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
         s = SDM_OK;
     } else {
         if (s && err) *err = reason;
+        e->filling = trainer_seconds(t);
         if (!s) s = trainer_dataset_fill(&r->data, r->n_threads, &hooks, err);
         if (!s) s = trainer_check_grid(r, err);
         if (!s) s = r->kind->begin(r, err);

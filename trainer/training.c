@@ -14,15 +14,37 @@
 #include "state/checkpoint.h"
 #include "state/data_files.h"
 #include "state/export_model.h"
+#include "state/forecast.h"
 #include "state/new_samples.h"
 #include "state/progress.h"
 
 /* true: the folder holds the model of the kind that was trained before. */
 static bool is_second(const trainer *t) { return t->turns->at > 0; }
 
+/* Tells once that the maps made in any case take longer than the budget. Of two trainings the
+ * first may use time of the second. */
+static void tell_forecast(trainer *t, size_t done)
+{
+    const dataset *d = &t->data;
+    const size_t random = d->n_start < FILL_LEAST_RANDOM ? d->n_start : FILL_LEAST_RANDOM;
+    double seconds;
+    if (t->overrun_told || t->turns->n > 1 ||
+        !trainer_forecast(t, t->phase_started, done, d->n_holdout + d->n_static + random, &seconds))
+        return;
+    t->overrun_told = true;
+    trainer_message(t,
+                    "the run will take longer than train.minutes (%.4g): the %zu held-out maps, "
+                    "%zu of the static grid and %zu random ones are made in any case, which takes "
+                    "about %.0f s (raise train.minutes to %.4g, or lower data.holdout or "
+                    "data.static)",
+                    t->config->train.minutes, d->n_holdout, d->n_static, random, seconds,
+                    ceil(10 * 2 * seconds / 60) / 10);
+}
+
 static void fill_report(void *user, size_t done, size_t all)
 {
     trainer *t = user;
+    tell_forecast(t, done);
     t->pace.done = (int64_t)done;
     trainer_report(t, trainer_start_fraction(t), done == all);
 }
@@ -71,6 +93,9 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
                               .enough = resumed ? NULL : fill_enough,
                               .user = t};
     t->phase = SDM_PHASE_DATA;
+    // the time of a resumed run does not count here
+    t->overrun_told |= resumed;
+    if (!resumed) t->phase_started = trainer_seconds(t);
     trainer_pace_start(t, 1);
     tell_stored(t);
     t->data.known = t->tried.n_voxels ? &t->tried : NULL;

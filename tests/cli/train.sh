@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen train: the run folder and its protection, interrupt and resume. The tests of models use the run made here.
-# Tests: cmd_train.c map_time.c model_before.c next_training.c report_verdict.c train_progress.c
+# Tests: cmd_train.c forecast.c map_time.c model_before.c next_training.c report_verdict.c train_progress.c
 . "$(dirname "$0")/common.sh"
 coarse_grids=yes
 tiny=$source_folder/tests/cli/tiny.yaml
@@ -57,6 +57,11 @@ grep -Eq '^sdmgen: half of the budget is over after 8 held-out maps, 16 of the s
 has '^  error from  bases +[0-9.]+ mm +[0-9]+ %  '
 has '^  (good|usable|poor) \(from 8 shapes only\) +(for|not) '
 has '^  verdict     .*(raise|lower|set) '
+
+# It is told as soon as the pace of the maps is known, also in the trials of auto (below).
+sdmgen train "$tiny" --out hurried --force train.steps=0 train.minutes=0.0001 data.holdout=60 >out 2>err || bad "hurried: $(cat err)"
+grep -Eq '^sdmgen: the run will take longer than train.minutes \(0.0001\): the 60 held-out maps, 16 of the static grid and 96 random ones are made in any case, which takes about [0-9]+ s \(raise train.minutes to ' err ||
+    bad "no word about the time ahead: $(cat err)"
 
 # Pictures that cannot be written do not make the training fail.
 mkdir -p unpictured/loss.png unpictured/slices.png
@@ -117,6 +122,11 @@ has '^              \((pod|template) again, [0-9.e-]+ ms a map on this grid; net
 rm -r both
 expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 --out both --quiet --json
 has '"other": \{"kind": "(pod|template)", .*"ms_network": [0-9]'
+sdmgen train link.yaml data.start=300 data.memory_gb=6 train.steps=0 train.minutes=0.0001 --out both --force >out 2>err || bad "hurried: $(cat err)"
+grep -Eq '^sdmgen: the run will take longer than train.minutes \(0.0001\): a trial of network.kind: auto makes at least [0-9]+ maps, which takes about ' err ||
+    bad "no word about the trials ahead: $(cat err)"
+rm -r both
+expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 --out both --quiet --json
 # A model that --force replaces is compared if its shape, ranges and grid are the same. With the kind given, the command names none.
 grep -q before_rmse_mm out && bad 'a model before the first one'
 before=$(json rmse_mm)

@@ -111,7 +111,6 @@ static void note_map(filling *f, const workbench *w, size_t at, sdm_status s, co
 /* Makes the maps begin .. end - 1 on all threads of this rank. */
 static sdm_status fill_range(filling *f, size_t begin, size_t end, sdm_error *err)
 {
-    enum { MIN_RANDOM = 128 }; // random maps made even if hooks->enough() is true
     const dataset *d = f->d;
 #pragma omp parallel num_threads(f->n_threads)
     {
@@ -123,7 +122,7 @@ static sdm_status fill_range(filling *f, size_t begin, size_t end, sdm_error *er
             const size_t at = (size_t)i;
             bool skip;
 #pragma omp critical(sdm_dataset_fill)
-            skip = f->stop || (f->enough && at >= d->n_holdout + d->n_static + MIN_RANDOM);
+            skip = f->stop || (f->enough && at >= d->n_holdout + d->n_static + FILL_LEAST_RANDOM);
             if (skip) continue;
             const sdm_status s = made ? made : fill_one(f, &w, at, &mine);
 #pragma omp critical(sdm_dataset_fill)

@@ -3,6 +3,10 @@
 
 #include "dataset.h"
 
+/* Random maps that are made even if fill_hooks.enough() is true, as far as n_start asks for them.
+ */
+enum { FILL_LEAST_RANDOM = 128 };
+
 /* Callbacks of trainer_dataset_fill(); each may be NULL. */
 typedef struct fill_hooks {
     /* Called on the thread that called trainer_dataset_fill(); `done` of `all` maps are

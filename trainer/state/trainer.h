@@ -54,6 +54,7 @@ typedef struct trainer {
     struct sdm_text *metrics;  /* all lines of metrics.jsonl */
     double prepared_seconds;   /* trainer_seconds() before the first step */
     double saved_seconds;      /* by train.patience */
+    bool overrun_told;         /* that the maps will not fit into the budget of time */
     sdm_accuracy accuracy;     /* accuracy of the finished model */
     sdm_model_quality quality; /* the verdict on it, for its file */
 } trainer;

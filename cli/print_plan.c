@@ -111,7 +111,9 @@ static void print_text(const sdm_config *config, const sdm_train_work *w, const 
     if (w->fit_step > 0) printf(", %.3g steps a second on a core", 1 / w->fit_step);
     printf("\n");
     print_stages(w, p);
-    if (config->network.kind == SDM_NETWORK_AUTO)
+    if (w->only_pod)
+        printf("  auto     planned as pod: a template does not suit the shape\n");
+    else if (config->network.kind == SDM_NETWORK_AUTO)
         printf("  auto     planned as pod; where the template is kept, seconds may be enough "
                "(--plan network.kind=template)\n");
     print_budget(config, w, p);

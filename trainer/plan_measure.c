@@ -71,12 +71,11 @@ static double step_seconds(const measurement *m, sdm_phase phase)
                : 0;
 }
 
-/* The configuration of a small training on n maps. */
-static void small_config(const sdm_config *from, size_t n, sdm_config *c)
+/* The configuration of a small training on n maps, with network.kind: auto of this kind. */
+static void small_config(const sdm_config *from, sdm_network_kind kind, size_t n, sdm_config *c)
 {
     *c = *from;
-    sdm_config_choose_kind(c, from->network.kind == SDM_NETWORK_AUTO ? SDM_NETWORK_POD
-                                                                     : from->network.kind);
+    sdm_config_choose_kind(c, from->network.kind == SDM_NETWORK_AUTO ? kind : from->network.kind);
     c->data.start = (int64_t)n;
     c->data.n_static_counts = 0;
     c->data.online = 0;
@@ -197,23 +196,33 @@ static void count_steps(const sdm_config *c, sdm_train_work *w)
     w->refine_steps = share > 0 ? steps - w->steps : 0;
 }
 
-/* Work of the trials of network.kind: auto, where bases of n maps take fixed + per_map n. The maps
- * of one of the two trials are maps of the training, too. Both kinds are taken to cost what pod
- * does. */
-static void trials_work(const sdm_config *c, double fixed, double per_map, sdm_train_work *w)
+/* Work of the trials of network.kind: auto, where bases of n maps take fixed + per_map n for pod.
+ * small: of the template, on n_small maps; small_bases: the bases of pod of as many. The maps of
+ * one of the two trials are maps of the training, too. Where the template is refused, pod is not
+ * tried. */
+static void trials_work(const sdm_config *c, double fixed, double per_map, double small_bases,
+                        const measurement *small, sdm_train_work *w)
 {
+    const dataset *d = &small->t.data;
     const double n = (double)trainer_trial_maps(c, (size_t)w->n_params),
+                 holdout = (double)trainer_trial_holdout(c),
                  most = c->train.minutes > 0
                             ? TRAINER_TRIALS_SHARE * 60 * c->train.minutes * w->threads
                             : INFINITY;
     if (c->network.kind != SDM_NETWORK_AUTO) return;
-    w->trial_maps = fmin(n + (double)trainer_trial_holdout(c), most / w->map);
-    w->trials = w->trial_maps * w->map + 2 * (fixed + per_map * fmin(n, w->trial_maps));
+    w->trials = small->set_up;
+    if (w->only_pod) return;
+    const double n_small = (double)(d->n_start + d->n_holdout), map = small->maps / n_small;
+    w->trial_maps = fmin((d->only_holdout ? 0 : n) + holdout, most / map);
+    const double bases = fixed + per_map * fmin(n, most / w->map),
+                 larger = d->only_holdout ? 1 : fmax(1, bases / fmax(small_bases, 1e-9));
+    w->trials += w->trial_maps * map + small->begin * larger + bases;
 }
 
-/* Work of a whole training from those of two small ones with few and with more maps. */
-static void extrapolate(const measurement *few, measurement *more, const sdm_config *c,
-                        sdm_train_work *w)
+/* Work of a whole training from those of two small ones with few and with more maps, and of a small
+ * template for the trials of network.kind: auto. */
+static void extrapolate(const measurement *few, measurement *more, const measurement *carried,
+                        const sdm_config *c, sdm_train_work *w)
 {
     trainer *t = &more->t;
     const double n1 = (double)few->t.data.n_start, n2 = (double)t->data.n_start;
@@ -237,7 +246,7 @@ static void extrapolate(const measurement *few, measurement *more, const sdm_con
                  fixed = fmax(0, more->begin - per_map * n2);
     w->bases = fixed + per_map * maps;
     modes_times(flops_per_second, w);
-    trials_work(c, fixed, per_map, w);
+    trials_work(c, fixed, per_map, more->begin, carried, w);
 }
 
 /* Bytes of a weight in the model file. */
@@ -250,7 +259,7 @@ static double weight_bytes(const sdm_config *c)
 static sdm_status measure(const sdm_config *config, const sdm_instance *shape, sdm_config *c,
                           measurement m[2], sdm_error *err)
 {
-    small_config(config, FEWEST, c);
+    small_config(config, SDM_NETWORK_POD, FEWEST, c);
     sdm_status s = prepare(&m[0], c, shape, err);
     if (s) return s;
     if (m[0].t.data.only_holdout) { // one is enough: there are no steps
@@ -259,7 +268,7 @@ static sdm_status measure(const sdm_config *config, const sdm_instance *shape, s
         return SDM_OK;
     }
     const double n = MAP_SECONDS * FEWEST / fmax(m[0].maps, 1e-3);
-    small_config(config, (size_t)fmin(MOST, fmax(FEWEST + 8, n)), c);
+    small_config(config, SDM_NETWORK_POD, (size_t)fmin(MOST, fmax(FEWEST + 8, n)), c);
     s = prepare(&m[1], c, shape, err);
     if (s) return s;
     c->train.minutes = (trainer_seconds(&m[1].t) + STEP_SECONDS) / 60;
@@ -269,33 +278,51 @@ static sdm_status measure(const sdm_config *config, const sdm_instance *shape, s
     return s;
 }
 
+/* The preparation of a small template, on as many maps as that of pod. *refused: the shape does not
+ * allow it. */
+static sdm_status measure_template(const sdm_config *config, const sdm_instance *shape,
+                                   sdm_config *c, const measurement *pod, measurement *m,
+                                   bool *refused, sdm_error *err)
+{
+    sdm_error reason = {0};
+    small_config(config, SDM_NETWORK_TEMPLATE, pod->t.data.n_start, c);
+    const sdm_status s = prepare(m, c, shape, &reason);
+    *refused = s == SDM_E_UNSUPPORTED;
+    if (s && !*refused && err) *err = reason;
+    return *refused ? SDM_OK : s;
+}
+
 sdm_status sdm_train_measure(const sdm_config *config, const sdm_instance *shape,
                              const sdm_train_hooks *hooks, sdm_train_work *out, sdm_error *err)
 {
     const double start = sdm_clock();
-    sdm_config *c = NULL;
+    sdm_config *c = NULL, *templates = NULL;
     measurement *m = NULL;
     sdm_team *team = NULL;
     *out = (sdm_train_work){.weight_bytes = weight_bytes(config),
                             .threads = sdm_threads(config->threads)};
     sdm_status s = SDM_ALLOC(&c, 1, "configuration", err);
-    if (!s) s = SDM_ALLOC(&m, 2, "measurement", err);
+    if (!s) s = SDM_ALLOC(&templates, 1, "configuration", err);
+    if (!s) s = SDM_ALLOC(&m, 3, "measurement", err);
     if (!s) s = sdm_team_start(out->threads, &team, err);
     if (!s) {
-        m[0].hooks = m[1].hooks = hooks;
+        m[0].hooks = m[1].hooks = m[2].hooks = hooks;
         s = measure(config, shape, c, m, err);
     }
+    if (!s && config->network.kind == SDM_NETWORK_AUTO)
+        s = measure_template(config, shape, templates, &m[1], &m[2], &out->only_pod, err);
     if (!s) {
         out->kind = c->network.kind;
         s = count_maps(&m[1].t, config, out, err);
     }
     if (!s) {
-        extrapolate(&m[0], &m[1], config, out);
+        extrapolate(&m[0], &m[1], &m[2], config, out);
         count_steps(config, out);
     }
-    for (int i = 0; m && i < 2; i++) dispose(&m[i]);
+    for (int i = 0; m && i < 3; i++) dispose(&m[i]);
     sdm_team_end(team);
     sdm_free(m);
+    sdm_free(templates);
     sdm_free(c);
     out->measured_seconds = sdm_clock() - start;
     return s;

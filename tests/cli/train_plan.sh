@@ -57,6 +57,13 @@ has '^  trials   36 maps +[0-9.e-]+ s  0 B +short trainings that choose between 
 has '^  total +10 h  0 B +the sum of these lines$'
 has '^  auto     planned as pod; '
 has '^  budget   train\.minutes is 600: at most half of it is for the maps before training \([0-9.e-]+ s\), the rest for as many steps as fit$'
+# The trials are those of the kinds that are tried: where the shape allows no template, nothing but its design; a template without a
+# correction needs held-out maps alone.
+expect 0 - sdmgen train "$tiny" network.kind=auto --plan -q
+has '^  trials  +[0-9.e-]+ s  0 B +short trainings'
+has '^  auto     planned as pod: a template does not suit the shape$'
+expect 0 - sdmgen train "$source_folder/configs/linkage.yaml" network.kind=auto grid=auto grid.voxels=24 data.holdout=7 --plan -q
+has '^  trials   7 maps +[0-9.e-]+ s  0 B +short trainings'
 # A template whose parts need no correction makes no maps for the training and no steps.
 expect 0 - sdmgen train "$source_folder/configs/linkage.yaml" network.kind=template grid=auto grid.voxels=24 --plan -q
 has '^  maps     [0-9]+ maps '

@@ -27,6 +27,7 @@ const char *sdm_plan_stage_name(sdm_plan_stage stage);
    much. Numbers of values are those of floats unless stated. */
 typedef struct sdm_train_work {
     sdm_network_kind kind;    /* auto is planned as pod */
+    bool only_pod;            /* auto: the shape does not allow a template */
     double n_holdout, n_maps; /* held-out maps; all others, online ones included */
     double n_pool;            /* maps in memory at a time, but for the held-out ones */
     double n_params, n_voxels, n_map_voxels; /* n_voxels: of the maps that the network learns */
@@ -48,8 +49,8 @@ typedef struct sdm_train_work {
 } sdm_train_work;
 
 /* Measures the work of a training on this machine, which takes a few seconds: exact maps, bases of
-   few maps, steps of a small training. Nothing is written. hooks: cancelled and user are used; may
-   be NULL. The errors of a training. */
+   few maps, steps of a small training; with network.kind: auto also the design of a template.
+   Nothing is written. hooks: cancelled and user are used; may be NULL. The errors of a training. */
 sdm_status sdm_train_measure(const sdm_config *config, const sdm_instance *shape,
                              const sdm_train_hooks *hooks, sdm_train_work *out, sdm_error *err);
 

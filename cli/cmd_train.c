@@ -77,8 +77,7 @@ static void print_ranks(const cli_ranks_use *use)
 static void print_other(const sdm_train_report *r)
 {
     printf("  auto        trained %s, too: RMSE %.5f mm, within a voxel of the surface %.5f mm, "
-           "%.3g ms a "
-           "map; not kept",
+           "%.3g ms a map; not kept",
            kind_name(r->other_kind), r->other.rmse_mm, r->other_voxel_mm, r->other_ms);
     if (r->other_voxel_mm < r->verdict.rmse_voxel_mm)
         printf(": better at the surface, but worse elsewhere (network.kind=%s keeps it)",

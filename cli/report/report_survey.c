@@ -158,6 +158,50 @@ static void tell_crossing(teller *t)
     sdm_part_audit_dispose(&audit);
 }
 
+/* Appends "; does mesh() give 'bend' (60 .. 270 deg) to cos() or sin()? ...", for the parameters in
+ * degrees that need a conversion. */
+static void add_degrees(const cli_survey *s, sdm_text *text)
+{
+    size_t n, told = 0;
+    const sdm_param *params = sdm_instance_params(s->shape, &n);
+    for (size_t i = 0; i < n; i++)
+        if (sdm_survey_is_degree(&params[i]))
+            sdm_text_add(text, "%s'%s' (%g .. %g %s)", told++ ? ", " : "; does mesh() give ",
+                         params[i].name, params[i].min, params[i].max, params[i].unit);
+    if (told) sdm_text_add(text, " to cos() or sin()? These want rad (times 0.017453)");
+}
+
+/* A part that winds around its inside more than once, such as a ring whose angle is too large. */
+static void tell_wound(teller *t)
+{
+    const sdm_survey_count *c = &t->s->found.wound;
+    sdm_mesh mesh = {0};
+    sdm_part_audit audit = {0};
+    size_t most = 0;
+    // in a warning of a training the turns of a spiral are wanted
+    if (!c->shapes || (t->s->brief && !sdm_survey_winds_wrongly(&t->s->found))) return;
+    if (make(t->s, c->worst, &mesh, NULL) &&
+        !sdm_part_audit_make(&mesh, !t->s->brief, &audit, NULL)) {
+        sdm_text text = {0};
+        for (size_t i = 1; i < audit.n; i++)
+            if (sdm_survey_part_winding(&audit, i) > sdm_survey_part_winding(&audit, most))
+                most = i;
+        cli_name_part(&audit, most, &text);
+        sdm_text_add(&text,
+                     "winds around its inside more than once: it encloses %.3g mm^3, %.3g times "
+                     "the volume that it fills, and %zu pairs of its triangles meet (at ",
+                     fabs(audit.part[most].volume), c->amount, audit.part[most].crossed);
+        add_params(t->s, c->worst, SIZE_MAX, &text);
+        sdm_text_add(&text, "; parts wind more than once ");
+        add_share(t->s, c, &text);
+        sdm_text_add(&text, ")");
+        add_degrees(t->s, &text);
+        tell(t, sdm_survey_winds_wrongly(&t->s->found) ? SDM_E_QUALITY : SDM_OK, &text);
+    }
+    sdm_part_audit_dispose(&audit);
+    sdm_mesh_dispose(&mesh);
+}
+
 /* Inner walls that pass through each other, and where they begin to. */
 static void tell_folded(teller *t)
 {
@@ -445,6 +489,8 @@ static void tell_params(teller *t)
                      "the unit '%s' of the parameter '%s' is none that sdmgen knows: mm, rad, sd "
                      "(standard deviations) or none at all",
                      unit, params[k].name);
+        if (sdm_survey_is_degree(&params[k]))
+            sdm_text_add(&other, "; mesh() must convert it before it calls cos() or sin()");
         tell(t, SDM_OK, &other);
     }
 }
@@ -470,6 +516,26 @@ static void tell_callbacks(teller *t)
                      f->unlike);
         tell(t, SDM_E_QUALITY, &text);
     }
+}
+
+/* Appends "; 12 of them within part 1 of 2 (...) alone" about the part of shape `c->worst` that
+ * meets itself most. */
+static void add_crossed(const teller *t, const sdm_survey_count *c, sdm_text *text)
+{
+    sdm_part_audit audit;
+    size_t most = 0;
+    if (audit_worst(t, c, &audit) && audit.n) {
+        for (size_t i = 1; i < audit.n; i++)
+            if (audit.part[i].crossed > audit.part[most].crossed) most = i;
+        if (audit.part[most].crossed) {
+            // pairs that share a vertex are no overlaps
+            sdm_text_add(text, "; %.0f of them within ",
+                         fmin((double)audit.part[most].crossed, c->amount));
+            cli_name_part(&audit, most, text);
+            sdm_text_add(text, "alone");
+        }
+    }
+    sdm_part_audit_dispose(&audit);
 }
 
 /* Parts that meet no other part, the smallest of one shape, and how far it lies from the others. */
@@ -507,6 +573,7 @@ static void tell_notes(teller *t)
         sdm_text_add(&text, "%s", notes[i].after);
         const bool twins = notes[i].count == &f->duplicate && sdm_survey_has_twins(f);
         if (twins) sdm_text_add(&text, "; do two parts lie in the same place?");
+        if (notes[i].count == &f->overlaps) add_crossed(t, notes[i].count, &text);
         // the first shape with overlaps is not the default shape
         if (notes[i].count == &f->overlaps && f->overlaps_begin)
             sdm_text_add(&text,
@@ -536,6 +603,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_inside_out(&t);
     tell_crossing(&t);
     tell_turned(&t);
+    tell_wound(&t);
     tell_folded(&t);
     tell_flat(&t);
     tell_sizes(&t);

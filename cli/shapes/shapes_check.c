@@ -177,7 +177,7 @@ static sdm_status print_json(const check *c, sdm_error *err)
         {"turned", &f->turned},       {"folded", &f->folded},     {"resized", &f->resized},
         {"rewired", &f->rewired},     {"overlaps", &f->overlaps}, {"degenerate", &f->degenerate},
         {"duplicate", &f->duplicate}, {"cut", &f->cut},           {"thin", &f->thin},
-        {"apart", &f->apart},         {"flat", &f->flat}};
+        {"apart", &f->apart},         {"flat", &f->flat},         {"wound", &f->wound}};
     sdm_json j = {0};
     sdm_json_open(&j, NULL, '{');
     sdm_json_text(&j, "shape", sdm_instance_shape(c->survey.shape)->name);

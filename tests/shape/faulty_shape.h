@@ -19,7 +19,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
-     "edge|centimetres|small|wall|step|apart|within|twins|changed",
+     "edge|centimetres|small|wall|step|apart|within|twins|changed|wound",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -34,6 +34,24 @@ static inline void faulty_box(sdm_mesh_out *out, size_t box, const double low[3]
     for (size_t i = 0; i < 36; i++) {
         const size_t corner = inside_out && i % 3 ? i - i % 3 + 3 - i % 3 : i;
         out->tri[36 * box + i] = (uint32_t)(8 * box) + TRI[corner];
+    }
+}
+
+/* A prism whose outline, of 9 points, goes round three times: 20 vertices, 36 triangles. */
+static inline void faulty_wound(const double *p, sdm_mesh_out *out)
+{
+    enum { SIDES = 9 };
+    for (int i = 0; i < SIDES; i++)
+        for (int end = 0; end < 2; end++) {
+            double *v = out->vert + 3 * (2 * i + end);
+            const double angle = 2.0943951023931953 * i, r = p[0] * (1 + 0.05 * i);
+            v[0] = r * cos(angle), v[1] = r * sin(angle), v[2] = end ? p[1] : -p[1];
+        }
+    for (int i = 0; i < 6; i++) out->vert[6 * SIDES + i] = i % 3 < 2 ? 0 : i < 3 ? -p[1] : p[1];
+    for (uint32_t i = 0; i < SIDES; i++) {
+        const uint32_t a = 2 * i, b = 2 * ((i + 1) % SIDES), low = 2 * SIDES;
+        const uint32_t tri[12] = {a, b, b + 1, a, b + 1, a + 1, low, b, a, low + 1, a + 1, b + 1};
+        memcpy(out->tri + 12 * i, tri, sizeof tri);
     }
 }
 
@@ -79,6 +97,11 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "trained") && !access("trained/model.sdm", F_OK))
         return (host->fail)(host, "a model is there");
     if (is_large) faulty_process(fault);
+    if (!strcmp(fault, "wound")) {
+        const int none = host->reserve(host, out, 20, 36);
+        if (!none) faulty_wound(p, out);
+        return none;
+    }
     const size_t boxes = !strcmp(fault, "sizes") && is_large ? 3 : 2;
     const size_t less = !strcmp(fault, "open");
     const int failed = host->reserve(host, out, 8 * boxes, 12 * boxes - less);

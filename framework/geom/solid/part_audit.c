@@ -182,7 +182,7 @@ static void count_edges_and_contacts(job *j)
         if (a == NO_PART || b == NO_PART) continue;
         if (a != b)
             j->out->part[a].met++;
-        else
+        else if (contacts->list[i].tri < contacts->list[i].other) // the list has each pair twice
             j->out->part[a].crossed++;
     }
 }

@@ -34,6 +34,7 @@ typedef struct finding {
     uint64_t crc_vert, crc_tri;
     size_t open, inside_out, turned, apart, flat, overlaps, crossed, degenerate, duplicate;
     double volume, area, min[3], max[3];
+    double winding;      /* the largest of sdm_survey_part_winding() */
     double turned_over;  /* the largest of sdm_part.folded */
     double thick;        /* of the thinnest part, mm; NaN: not known */
     double beyond[3][2]; /* mm */
@@ -82,6 +83,20 @@ bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i)
     return p->state == SDM_PART_FLAT || p->thick < SDM_SURVEY_FLAT * size;
 }
 
+double sdm_survey_part_winding(const sdm_part_audit *a, size_t i)
+{
+    const sdm_part *p = &a->part[i];
+    double most = a->union_volume;
+    // fmin() ignores NaN
+    most = fmin(most, (p->max[0] - p->min[0]) * (p->max[1] - p->min[1]) * (p->max[2] - p->min[2]));
+    return p->state == SDM_PART_SOLID && most > 0 ? fabs(p->volume) / most : 0;
+}
+
+bool sdm_survey_winds_wrongly(const sdm_shape_survey *s)
+{
+    return s->wound.amount > SDM_SURVEY_WOUND_MAX || (s->wound.shapes && s->scale.degrees);
+}
+
 /* Makes the mesh at p and looks at it. Returns only errors that end the survey. */
 static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts, const double *p,
                           sdm_mesh *m, finding *out, sdm_error *err)
@@ -100,6 +115,7 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
         out->apart += audit.n > 1 && audit.part[i].state == SDM_PART_SOLID && !audit.part[i].met;
         out->crossed += audit.part[i].crossed;
         out->flat += sdm_survey_part_is_flat(&audit, i);
+        out->winding = fmax(out->winding, sdm_survey_part_winding(&audit, i));
         out->turned_over = fmax(out->turned_over, audit.part[i].folded);
     }
     out->thick = sdm_part_audit_thickness(&audit);
@@ -261,6 +277,7 @@ static void sum_up(survey *v)
         count(&s->open, i, (double)f->open);
         count(&s->inside_out, i, (double)f->inside_out);
         if (f->turned_over > SDM_PART_FOLDED_MIN) count(&s->crossing, i, f->turned_over);
+        if (f->winding > SDM_SURVEY_WOUND) count(&s->wound, i, f->winding);
         count(&s->turned, i, (double)f->turned);
         count(&s->apart, i, (double)f->apart);
         count(&s->flat, i, (double)f->flat);
@@ -522,9 +539,10 @@ bool sdm_survey_has_twins(const sdm_shape_survey *s)
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
 {
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
-    bool bad = s->inside_out.shapes || s->crossing.shapes || s->folded.shapes || s->turned.shapes ||
-               s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->thin.shapes ||
-               s->flat.shapes || s->narrow || s->unlike || s->surplus > SDM_SURVEY_SURPLUS_MAX ||
+    bool bad = s->inside_out.shapes || s->crossing.shapes || sdm_survey_winds_wrongly(s) ||
+               s->folded.shapes || s->turned.shapes || s->resized.shapes || s->rewired.shapes ||
+               s->cut.shapes || s->thin.shapes || s->flat.shapes || s->narrow || s->unlike ||
+               s->surplus > SDM_SURVEY_SURPLUS_MAX ||
                s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
                s->scale.odd_speed || s->scale.odd_angle;
     for (size_t k = 0; k < s->n_params && s->jump; k++)

@@ -139,11 +139,23 @@ static bool is_part_of_turn(double value)
     return fabs(turn) > 0.1 && fabs(value - turn) < NEAR * fabs(turn) && fabs(value - half) > 1e-3;
 }
 
-bool sdm_survey_is_radian(const sdm_param *p)
+/* Is the unit deg or degrees? */
+static bool is_degrees(const sdm_param *p)
+{
+    return !strcmp(p->unit, "deg") || !strcmp(p->unit, "degrees");
+}
+
+static bool is_within_turn(const sdm_param *p)
 {
     static const double TURN = 6.29;
-    if (strcmp(p->unit, "deg") != 0 && strcmp(p->unit, "degrees") != 0) return false;
-    return p->min >= -TURN && p->max <= TURN &&
+    return p->min >= -TURN && p->max <= TURN;
+}
+
+bool sdm_survey_is_degree(const sdm_param *p) { return is_degrees(p) && !is_within_turn(p); }
+
+bool sdm_survey_is_radian(const sdm_param *p)
+{
+    return is_degrees(p) && is_within_turn(p) &&
            (is_part_of_turn(p->min) || is_part_of_turn(p->max));
 }
 
@@ -156,6 +168,7 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
         s->speed[k] = NAN;
         const sdm_param *p = &f->shape->params[k];
         c->odd_angle = c->odd_angle || sdm_survey_is_odd_angle(p) || sdm_survey_is_radian(p);
+        c->degrees = c->degrees || sdm_survey_is_degree(p);
     }
     if (status || s->failed.shapes == s->n - s->untested) return status;
     for (int a = 0; a < 3; a++) c->size = fmax(c->size, s->high[a] - s->low[a]);

@@ -65,6 +65,7 @@ typedef struct sdm_survey_scale {
     size_t param;
     bool odd_speed; /* it is below SDM_SURVEY_SPEED_MIN or above SDM_SURVEY_SPEED_MAX */
     bool odd_angle; /* of a parameter: sdm_survey_is_odd_angle() or sdm_survey_is_radian() */
+    bool degrees;   /* of a parameter: sdm_survey_is_degree() */
     /* the unit that would explain both, and its length in mm; NULL: none would */
     const char *unit;
     double unit_mm;
@@ -77,6 +78,10 @@ bool sdm_survey_is_odd_angle(const sdm_param *p);
  * turn, and ending at a multiple of 15 degrees in rad, such as 1.57, that is no number of halves.
  */
 bool sdm_survey_is_radian(const sdm_param *p);
+
+/* Does a parameter with the unit deg or degrees reach beyond a turn in rad? cos() and sin() give
+ * what was not meant if mesh() does not convert it. */
+bool sdm_survey_is_degree(const sdm_param *p);
 
 /* Zero-initialise; sdm_shape_survey_dispose() frees. */
 typedef struct sdm_shape_survey {
@@ -97,6 +102,9 @@ typedef struct sdm_shape_survey {
     /* parts that pass through themselves (sdm_part.folded); amount: the share that faces the wrong
      * way */
     sdm_survey_count crossing;
+    /* solid parts that wind around their inside more than once; amount: sdm_survey_part_winding()
+     */
+    sdm_survey_count wound;
     sdm_survey_count overlaps;              /* pairs of triangles that meet: the union counts */
     bool overlaps_begin;                    /* some shapes overlap themselves, but not shape 0 */
     sdm_survey_count degenerate, duplicate; /* triangles */
@@ -167,12 +175,25 @@ bool sdm_survey_has_twins(const sdm_shape_survey *s);
 /* Does part i of an audited mesh count for sdm_shape_survey.flat? */
 bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i);
 
+/* How often part i of an audited mesh winds around its inside, at least and on average: its volume
+ * by the divergence theorem, divided by that of its box or, where it is known and smaller, by that
+ * of the union. 0: the part is not solid. It counts above SDM_SURVEY_WOUND; the turns of a spiral
+ * may overlap, but above SDM_SURVEY_WOUND_MAX, or if a parameter is sdm_survey_is_degree(), it is a
+ * mistake. */
+double sdm_survey_part_winding(const sdm_part_audit *a, size_t i);
+#define SDM_SURVEY_WOUND 1.1
+#define SDM_SURVEY_WOUND_MAX 2.0
+
+/* Is the part that winds most a mistake? */
+bool sdm_survey_winds_wrongly(const sdm_shape_survey *s);
+
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
  * are usable, but a training or derivatives would suffer: parts that are inside out (also those
  * that the engine turns), parts without thickness, walls that pass through each other or outlines
- * that cross themselves, sizes, triangles or vertices that jump, a grid that cuts, is too coarse
- * for a part or far too large, wrong velocities, results that differ from call to call, or an odd
- * size or speed (another unit than mm, or a parameter that does nothing). Else SDM_OK. */
+ * that cross themselves or wind more than once, sizes, triangles or vertices that jump, a grid that
+ * cuts, is too coarse for a part or far too large, wrong velocities, results that differ from call
+ * to call, or an odd size or speed (another unit than mm, or a parameter that does nothing). Else
+ * SDM_OK. */
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 
 /* A smaller share of the area may turn over: slivers at a tip, rings of a tube that bends sharply

@@ -47,7 +47,10 @@ sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error
     }
     const char *skipped;
     for (size_t i = 0; (skipped = sdm_registry_skipped(*out, i)); i++)
-        cli_notice("skipped a file in SDMGEN_PLUGIN_PATH: %s", skipped);
+        if (!strncmp(skipped, "plug-in folder ", 15))
+            cli_warn("SDMGEN_PLUGIN_PATH: %s", skipped);
+        else
+            cli_notice("skipped a file in SDMGEN_PLUGIN_PATH: %s", skipped);
     return s;
 }
 

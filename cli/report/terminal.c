@@ -170,6 +170,7 @@ static void print_line(const char *kind, const char *begin, const char *fmt, va_
     char start[SDM_ERROR_TEXT_MAX], room[ROOM_BYTES];
     bool cut;
     char *text = format_text(start, &cut, fmt, args);
+    cli_name_options(text);
     if (form == CLI_FORM_JSON) {
         print_json_message(kind, text);
     } else {

@@ -169,13 +169,21 @@ static sdm_status file_load_or_skip(sdm_registry *r, const char *folder, const c
     return s ? sdm_fail(err, s, "%s", why.text) : SDM_OK;
 }
 
+/* Keeps the reason why a folder cannot be read: the other folders count all the same. */
+static sdm_status folder_skip(sdm_registry *r, const char *folder, int error, sdm_error *err)
+{
+    char why[PATH_MAX + 200];
+    snprintf(why, sizeof why, "plug-in folder %s: %s", folder, strerror(error));
+    return sdm_registry_skip(r, why, err);
+}
+
 /* Loads in alphabetical order, so that of two files with a shape of the same name the same one is
  * skipped on all systems. */
 static sdm_status folder_load(sdm_registry *r, const char *folder, sdm_error *err)
 {
     struct dirent **list = NULL;
     const int n = scandir(folder, &list, is_shared_object, alphasort);
-    if (n < 0) return sdm_fail(err, SDM_E_IO, "plug-in folder %s: %s", folder, strerror(errno));
+    if (n < 0) return folder_skip(r, folder, errno, err);
     sdm_status s = SDM_OK;
     for (int i = 0; i < n; i++) {
         if (!s) s = file_load_or_skip(r, folder, list[i]->d_name, err);

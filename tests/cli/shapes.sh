@@ -78,7 +78,7 @@ expect 2 "unknown shape 'broken'; plug-in .*/path/broken\.so cannot be loaded: "
 expect 2 "unknown shape 'cube'; sdmgen shapes lists" sdmgen shapes cube --quiet
 printf '        ' >>path/copy.so # another file; --plugin comes before the path
 SDMGEN_PLUGIN_PATH=$good expect 0 "octahedron\.so: shape 'octahedron' is there already \(.*/copy\.so\)" sdmgen shapes octahedron --plugin path/copy.so
-SDMGEN_PLUGIN_PATH=$PWD/none expect 1 'plug-in folder .*/none: No such file' sdmgen shapes
+SDMGEN_PLUGIN_PATH=$PWD/none:$good expect 0 '^sdmgen: warning: SDMGEN_PLUGIN_PATH: plug-in folder .*/none: No such file' sdmgen shapes octahedron
 # one folder too high
 SDMGEN_PLUGIN_PATH=$(dirname "$good") expect 2 "unknown shape 'octahedron'; SDMGEN_PLUGIN_PATH=.* holds no plug-in: name the folder in which the \.so file lies" sdmgen shapes octahedron
 unset SDMGEN_PLUGIN_PATH

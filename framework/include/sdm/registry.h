@@ -34,11 +34,11 @@ SDM_API sdm_status sdm_registry_load(sdm_registry *r, const char *file, sdm_erro
 
 /* Loads every *.so in the folders of a colon-separated path (the value of SDMGEN_PLUGIN_PATH); NULL
  * does nothing. A file that cannot be loaded (SDM_E_IO or SDM_E_PLUGIN of sdm_registry_load()) is
- * skipped. SDM_E_IO: a folder cannot be read; SDM_E_UNSUPPORTED as above. */
+ * skipped, and so is a folder that cannot be read. SDM_E_UNSUPPORTED as above. */
 SDM_API sdm_status sdm_registry_load_path(sdm_registry *r, const char *path, sdm_error *err);
 
-/* Message number `index` about the files that sdm_registry_load_path() has skipped; NULL: there are
- * fewer. Valid as long as the registry. */
+/* Message number `index` about the files and folders that sdm_registry_load_path() has skipped;
+ * NULL: there are fewer. Valid as long as the registry. */
 SDM_API const char *sdm_registry_skipped(const sdm_registry *r, size_t index);
 
 SDM_API size_t sdm_registry_count(const sdm_registry *r);

@@ -582,17 +582,39 @@ static void tell_notes(teller *t)
     }
 }
 
+/* Appends ", 3 of 4 THINGS" if some were left out. */
+static void add_untested(size_t untested, size_t n, const char *things, sdm_text *text)
+{
+    if (untested)
+        sdm_text_add(text, "%s%zu of %zu %s", text->data ? ", " : "", untested, n, things);
+}
+
+void cli_survey_untested(const cli_survey *s, sdm_text *text)
+{
+    const sdm_shape_survey *f = &s->found;
+    add_untested(f->untested, f->n, "shapes", text);
+    add_untested(f->fold_untested, f->fold_tested + f->fold_untested,
+                 "ways on which walls may pass through each other", text);
+    add_untested(f->lines_untested, f->lines, "lines along a parameter, for jumps", text);
+    if (f->box_untested)
+        sdm_text_add(text, "%sthe search for the largest shape", text->data ? ", " : "");
+    if (s->grid && f->untested) sdm_text_add(text, ", flat faces on planes of voxel centres");
+}
+
 /* What was left out for want of time. */
 static void tell_untested(teller *t)
 {
-    const sdm_shape_survey *f = &t->s->found;
-    sdm_text text = {0};
-    if (!f->untested && !f->lines_untested) return;
-    sdm_text_add(&text,
-                 "not tested for want of time: %zu of %zu shapes, %zu of %zu lines along a "
-                 "parameter; --samples N tests N random shapes, however long it takes",
-                 f->untested, f->n, f->lines_untested, f->lines);
-    tell(t, SDM_OK, &text);
+    sdm_text left = {0}, text = {0};
+    cli_survey_untested(t->s, &left);
+    if (left.data) {
+        sdm_text_add(&text,
+                     "not tested for want of time: %s; --samples N tests N random shapes, however "
+                     "long it takes",
+                     left.data);
+        tell(t, SDM_OK, &text);
+    }
+    t->failed = t->failed || left.failed;
+    sdm_text_dispose(&left);
 }
 
 sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user, sdm_error *err)

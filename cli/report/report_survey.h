@@ -23,6 +23,9 @@ typedef void cli_tell(void *user, sdm_status weight, const char *line);
 /* Calls tell() for every finding, the gravest first. SDM_E_NOMEM. */
 sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell, void *user, sdm_error *err);
 
+/* Appends what was left out for want of time, "3 of 145 shapes, ..."; nothing if all was tested. */
+void cli_survey_untested(const cli_survey *s, sdm_text *text);
+
 /* Appends "flat faces lie exactly on planes of voxel centres along x and z, ..." to `text`. */
 void cli_describe_hits(const sdm_face_hits *h, sdm_text *text);
 

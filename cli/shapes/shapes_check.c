@@ -276,10 +276,16 @@ static sdm_status give_verdict(const check *c, sdm_error *err)
     if (verdict == SDM_E_QUALITY)
         return sdm_fail(err, verdict,
                         "%s: maps or trainings would suffer: mend what is marked 'warning'", name);
-    if (!c->args->json)
-        printf("fine: the shape can be trained%s\n",
-               c->survey.grid ? "" : "; give a configuration to compare it with a grid");
-    return SDM_OK;
+    if (c->args->json) return SDM_OK;
+    sdm_text left = {0};
+    cli_survey_untested(&c->survey, &left);
+    const bool failed = left.failed;
+    if (!failed)
+        printf("%s: the shape can be trained%s%s%s\n", left.data ? "fine as far as tested" : "fine",
+               c->survey.grid ? "" : "; give a configuration to compare it with a grid",
+               left.data ? "; not tested for want of time: " : "", left.data ? left.data : "");
+    sdm_text_dispose(&left);
+    return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the verdict") : SDM_OK;
 }
 
 sdm_status cli_shapes_check(const cli_args *args, sdm_error *err)

@@ -254,6 +254,7 @@ static void time_is_short(void **state)
     // the first shape is always tested
     assert_int_equal(s.untested, s.n - 1);
     assert_true(s.lines > 0 && s.lines_untested == s.lines);
+    assert_true(s.fold_tested == 0 && s.fold_untested == s.n - 1 && s.box_untested);
     assert_true(s.failed.shapes == 0 && s.overlaps.shapes == 1);
     assert_int_equal(sdm_shape_survey_verdict(&s), SDM_OK);
     assert_true(calls >= s.n + s.lines);

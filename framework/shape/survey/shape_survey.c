@@ -195,6 +195,7 @@ typedef struct survey {
     finding *found; /* [n] */
     followed *line; /* [n_lines] */
     size_t n_lines;
+    bool *fold_late;   /* [1 + n_corners + FOLD_SAMPLES]: left out for want of time */
     survey_fold *fold; /* [1 + n_corners + FOLD_SAMPLES], by shape */
     bool *unlike;      /* [REPEATS] */
     double size;       /* diagonal of the box, mm */
@@ -309,7 +310,8 @@ static sdm_status find_fold(void *user, size_t i, sdm_mesh *mesh, sdm_error *err
 {
     (void)mesh;
     survey *v = user;
-    if (!i || v->found[i].status || is_late(v, 0.75)) return SDM_OK;
+    v->fold_late[i] = i && (v->found[i].untested || is_late(v, 0.75));
+    if (!i || v->found[i].status || v->fold_late[i]) return SDM_OK;
     return sdm_survey_find_fold(&v->family, params_of(v, 0), params_of(v, i), v->size, &v->fold[i],
                                 err);
 }
@@ -320,15 +322,17 @@ static sdm_status find_folds(survey *v, int n_threads, sdm_error *err)
     sdm_shape_survey *s = v->out;
     const size_t all = 1 + s->n_corners + FOLD_SAMPLES, n = s->n < all ? s->n : all;
     sdm_status status = SDM_ALLOC(&v->fold, n, "folds", err);
+    if (!status) status = SDM_ALLOC(&v->fold_late, n, "folds", err);
     if (!status) status = run(v->opts, n_threads, "folds", n, find_fold, v, err);
-    s->fold_tested = n - 1;
     for (size_t i = 0; i < n && !status; i++) {
+        s->fold_untested += v->fold_late[i];
         const survey_fold *fold = &v->fold[i];
         const bool crossed = !v->found[0].crossed && v->found[i].crossed;
         if (!(fold->share > (crossed ? SDM_SURVEY_FOLD_CROSSED : SDM_SURVEY_FOLD_MIN))) continue;
         if (fold->share > s->folded.amount) s->folded_at = fold->at;
         count(&s->folded, i, fold->share);
     }
+    s->fold_tested = n - 1 - s->fold_untested;
     return status;
 }
 
@@ -494,7 +498,8 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
         if (!s) s = follow_lines(&v, n_threads, err);
         if (!s) s = compare_velocities(&v, err);
         if (!s) s = repeat(&v, n_threads, err);
-        if (!s && !is_late(&v, 1)) s = widen_box(&v, err);
+        out->box_untested = is_late(&v, 1);
+        if (!s && !out->box_untested) s = widen_box(&v, err);
     }
     if (!s && opts->grid)
         out->surplus = sdm_grid_surplus(opts->grid, out->low, out->high, out->surplus_along);
@@ -504,6 +509,7 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
     if (!s) s = sdm_survey_measure_scale(&v.family, out, err);
     sdm_free(v.found);
     sdm_free(v.fold);
+    sdm_free(v.fold_late);
     sdm_free(v.line);
     sdm_free(v.unlike);
     if (s) sdm_shape_survey_dispose(out);

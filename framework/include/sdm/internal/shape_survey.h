@@ -144,6 +144,8 @@ typedef struct sdm_shape_survey {
      * meets itself and none of shape 0 does, above SDM_SURVEY_FOLD_CROSSED */
     sdm_survey_count folded;
     size_t fold_tested;    /* number of shapes that were compared with shape 0 */
+    size_t fold_untested;  /* shapes left out there for want of time */
+    bool box_untested;     /* the search that widens the box was left out for want of time */
     double folded_at;      /* where on the way to the worst of them: 0 at shape 0, 1 at the worst */
     sdm_survey_jump *jump; /* [n_params] the worst break along each parameter */
     bool has_velocity;     /* the shape has a callback of this name */

@@ -18,19 +18,11 @@
 #include "sdm/model.h"
 #include "ssm/report_ssm.h"
 
-/* The uses for which the model is not good, in one line after the figures that tell why. */
-static void print_unfit(const sdm_model *model)
+/* The uses for which the model is not good, as the training said them. */
+static void print_unfit(const sdm_model_quality *q)
 {
-    static const char *const uses[] = {[SDM_USE_VOLUME] = "volumes",
-                                       [SDM_USE_DERIVATIVE] = "derivatives of maps",
-                                       [SDM_USE_VOLUME_DERIVATIVE] = "derivatives of volumes"};
-    bool first = true;
-    for (int use = SDM_USE_VOLUME; use <= SDM_USE_VOLUME_DERIVATIVE; use++) {
-        if (sdm_model_check_use(model, (sdm_model_use)use, NULL) != SDM_E_QUALITY) continue;
-        cli_print("%s%s", first ? "not for      " : ", ", uses[use]);
-        first = false;
-    }
-    if (!first) cli_print("\n");
+    for (const char *at = q->unfit; *at; at += strcspn(at, "\n") + 1)
+        cli_print("%-12s %.*s\n", at == q->unfit ? "not for" : "", (int)strcspn(at, "\n"), at);
 }
 
 static void print_model(const char *path, const sdm_model *model)
@@ -65,7 +57,7 @@ static void print_model(const char *path, const sdm_model *model)
         "%.5f mm\n",
         a->q50_mm, a->q90_mm, a->q99_mm);
     cli_print_quality(m);
-    print_unfit(model);
+    print_unfit(&m->quality);
     cli_print("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
               (long long)m->train_samples, (unsigned long long)m->seed, m->version);
     if (m->fine_width) cli_print("fine level   %zu units a layer (docs/grids.md)\n", m->fine_width);
@@ -85,6 +77,7 @@ static void json_quality(sdm_json *j, const sdm_model_quality *q)
     sdm_json_real(j, "volume_error", q->volume_error);
     sdm_json_real(j, "derivative_error", q->derivative_error);
     sdm_json_real(j, "volume_derivative_error", q->volume_derivative_error);
+    sdm_json_text(j, "unfit", q->unfit);
     sdm_json_close(j, '}');
 }
 

@@ -36,13 +36,6 @@ static void print_far(const sdm_verdict *v)
            v->largest_at_mm < 0 ? "inside" : "outside");
 }
 
-/* Begins a line: with the label "not for" if it is the first of the list, else with spaces. */
-static void not_for(bool *first)
-{
-    printf("  %-11s ", *first ? "not for" : "");
-    *first = false;
-}
-
 /* text[16] = an error in per cent: a whole number from 10 on. Returns text. */
 static const char *percent(double share, char text[16])
 {
@@ -50,52 +43,14 @@ static const char *percent(double share, char text[16])
     return text;
 }
 
-/* text[80] = "; grid.spacing 0.78 WHAT", where the line `verdict` names no spacing, or that it
- * does: the whole report names one. Returns text. */
-static const char *advised_spacing(const sdm_verdict *v, const char *what, char text[80])
-{
-    if (!strcmp(v->key, "grid.spacing"))
-        snprintf(text, 80, "; the grid.spacing of the line 'verdict' %s", what);
-    else
-        snprintf(text, 80, "; grid.spacing %.2g %s", sdm_verdict_spacing(v), what);
-    return text;
-}
-
 /* The purposes for which a model of this grade is not good, a line each. */
 static void print_unfit(const sdm_verdict *v)
 {
+    char lines[SDM_MODEL_UNFIT];
     bool first = true;
-    char text[16], advice[80];
-    if (v->inside_out > 0)
-        not_for(&first), printf("the parts that are inside out, which are missing\n");
-    // the line of the grade tells of more, unless parts are inside out
-    if (v->cut > 0 && (v->cut <= SDM_CUT_POOR || v->inside_out > 0))
-        not_for(&first),
-            printf("the %.2g %% of the shapes that the grid cuts\n", fmin(99, 100 * v->cut));
-    if (sdm_verdict_errs_far(v))
-        not_for(&first),
-            printf("distances far from the surface: wrong by up to %.2g mm\n", v->largest_mm);
-    if (v->volume_error > SDM_VOLUME_BAD)
-        not_for(&first), printf("volumes: off by %s %%\n", percent(v->volume_error, text));
-    if (sdm_verdict_lacks_part(v))
-        not_for(&first),
-            printf("its thinnest part and volumes of surfaces (.stl): it is %.2g mm thick, too "
-                   "thin for voxels of %.3g mm, and will be missing or broken%s\n",
-                   v->thickness_mm, v->coarse_mm, advised_spacing(v, "shows it", advice));
-    else if (sdm_verdict_cuts_edges(v))
-        not_for(&first),
-            printf("volumes of surfaces (.stl): voxels of %.3g mm cut the edges of its parts, the "
-                   "thinnest of which is %.2g mm thick%s\n",
-                   v->coarse_mm, v->thickness_mm, advised_spacing(v, "keeps more of them", advice));
-    if (v->derivatives_bad[0])
-        not_for(&first), printf("derivatives of maps by %s\n", v->derivatives_bad);
-    if (v->volume_derivatives_bad[0])
-        not_for(&first), printf("derivatives of the volume by %s\n", v->volume_derivatives_bad);
-    if (v->triangles_by[0])
-        not_for(&first),
-            printf("derivatives of exact maps (exact --jacobian, fit --exact or --polish) where "
-                   "the triangles change with %s: vertices do not correspond there\n",
-                   v->triangles_by);
+    sdm_verdict_unfit(v, lines);
+    for (const char *at = lines; *at; at += strcspn(at, "\n") + 1, first = false)
+        printf("  %-11s %.*s\n", first ? "not for" : "", (int)strcspn(at, "\n"), at);
 }
 
 /* Errors of volumes and derivatives. */

@@ -264,8 +264,9 @@ static void quality_is_kept(void **state)
     assert_true(!*q->grade && isnan(q->cut) && isnan(q->between_mm));
     assert_int_equal(sdm_model_check_use(m, SDM_USE_SURFACE, NULL), SDM_E_UNSUPPORTED);
     sdm_model_free(m);
-    t.info.quality = (sdm_model_quality){"poor", 0.25, NAN, 0.5,         12.5,       30,
-                                         0.01,   NAN,  0.5, {1, 2, NAN}, {3, 4, NAN}};
+    t.info.quality = (sdm_model_quality){
+        "poor", 0.25, NAN, 0.5,         12.5,        30,
+        0.01,   NAN,  0.5, {1, 2, NAN}, {3, 4, NAN}, "volumes: off by 3 %\nits tips\n"};
     m = toy_open(&t);
     q = &sdm_model_get_info(m)->quality;
     assert_string_equal(q->grade, "poor");
@@ -275,6 +276,7 @@ static void quality_is_kept(void **state)
     assert_true(q->volume_derivative_error == 0.5);
     assert_true(q->probe_volume_mm3[1] == 2 && q->probe_area_mm2[1] == 4);
     assert_true(isnan(q->probe_volume_mm3[2]) && isnan(q->probe_area_mm2[2]));
+    assert_string_equal(q->unfit, "volumes: off by 3 %\nits tips\n");
     assert_true(sdm_model_get_info(m)->file_bytes > without);
     // uses: a poor grade, a good volume, derivatives not measured, bad derivatives of volumes
     sdm_error err;
@@ -290,11 +292,11 @@ static void quality_is_kept(void **state)
     assert_int_equal(sdm_model_check_use(NULL, SDM_USE_VOLUME, &err), SDM_E_ARG);
     sdm_model_free(m);
     // an unknown grade and an impossible share are damage
-    const sdm_model_quality wrong[] = {{"fine", 0, 0, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}},
-                                       {"good", 1.5, 0, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}},
-                                       {"good", 0, -1, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}},
-                                       {"good", 0, 0, -1, NAN, NAN, NAN, NAN, NAN, {0}, {0}},
-                                       {"good", 0, 0, 1, NAN, NAN, -0.1, NAN, NAN, {0}, {0}}};
+    const sdm_model_quality wrong[] = {{"fine", 0, 0, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}, ""},
+                                       {"good", 1.5, 0, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}, ""},
+                                       {"good", 0, -1, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}, ""},
+                                       {"good", 0, 0, -1, NAN, NAN, NAN, NAN, NAN, {0}, {0}, ""},
+                                       {"good", 0, 0, 1, NAN, NAN, -0.1, NAN, NAN, {0}, {0}, ""}};
     for (size_t i = 0; i < 5; i++) {
         uint8_t *bytes;
         size_t size;

@@ -1,5 +1,6 @@
 /* The verdict on a training: the decision from given figures, the measured parts, and that
- * following the advice makes the error smaller. Tests: judge.c verdict.c pod_parts.c tree_pass.c
+ * following the advice makes the error smaller. Tests: judge.c verdict.c verdict_unfit.c
+ * pod_parts.c tree_pass.c
  * surface_check.c derivative_check.c history.c progress.c */
 #include <math.h>
 #include <setjmp.h>
@@ -320,6 +321,19 @@ static void uses_and_spacing(void **state)
     assert_true(fabs(sdm_verdict_spacing(&v) - 0.75) < 1e-9);
     v.thin = 0.05;
     assert_non_null(strstr(sdm_grade_text(&v, text), "measurements"));
+    // the lines of the uses
+    char lines[SDM_MODEL_UNFIT];
+    sdm_verdict_unfit(&v, lines);
+    assert_string_equal(lines, "");
+    v.volume_error = 0.123, v.thickness_mm = 1;
+    strcpy(v.derivatives_bad, "r: off by 32 %");
+    sdm_verdict_unfit(&v, lines);
+    assert_string_equal(lines, "volumes: off by 12 %\n"
+                               "its thinnest part and volumes of surfaces (.stl): it is 1 mm "
+                               "thick, too thin for voxels of 0.8 mm, and will be missing or "
+                               "broken; grid.spacing 0.5 shows it\n"
+                               "derivatives of maps by r: off by 32 %\n");
+    v.volume_error = NAN;
     v.grade = SDM_GRADE_USABLE, v.thickness_mm = 1;
     assert_string_equal(sdm_grade_text(&v, text), "for pictures, segmentations and first fits");
     assert_true(fabs(sdm_verdict_spacing(&v) - 0.5) < 1e-9);

@@ -340,6 +340,7 @@ static sdm_status set_quality(const sdm_verdict *v, const trainer *t, const sdm_
                              .derivative_error = v->derivative_error,
                              .volume_derivative_error = v->volume_derivative_error};
     snprintf(q->grade, sizeof q->grade, "%s", sdm_grade_name(v->grade));
+    sdm_verdict_unfit(v, q->unfit);
     for (size_t i = 0; i < info->n_params; i++) p[i] = info->params[i].def;
     sdm_status s = sdm_shape_sums(t->data.shape, p, &q->mesh_volume_mm3, &q->mesh_area_mm2, err);
     for (size_t k = 0; k < SDM_MODEL_PROBES && !s; k++) {

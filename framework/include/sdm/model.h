@@ -33,6 +33,8 @@ typedef struct sdm_accuracy {
 } sdm_accuracy;
 
 #define SDM_MODEL_PROBES 3
+/* Size of the text sdm_model_quality.unfit. */
+#define SDM_MODEL_UNFIT 1600
 
 /* The verdict of the training on the model. Earlier versions stored none: grade "", numbers NaN. */
 typedef struct sdm_model_quality {
@@ -56,6 +58,9 @@ typedef struct sdm_model_quality {
     double volume_error, derivative_error, volume_derivative_error;
     /* as mesh_volume_mm3 and mesh_area_mm2, at three other parameter vectors; NaN: not known */
     double probe_volume_mm3[SDM_MODEL_PROBES], probe_area_mm2[SDM_MODEL_PROBES];
+    /* what the training found the model not good for, in words, with the parameters: lines that end
+       with '\n'; "": nothing, or not known */
+    char unfit[SDM_MODEL_UNFIT];
 } sdm_model_quality;
 
 /* Relative errors from which on a model is not for volumes, and not for derivatives. */

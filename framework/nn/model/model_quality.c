@@ -1,6 +1,7 @@
 /* The section of a model file that holds the verdict of its training. Programs that do not know it
    ignore it. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "model_kind.h"
@@ -25,13 +26,28 @@ void sdm_quality_describe(const sdm_model_quality *q, sdm_text *t)
         sdm_text_add_real(t, "probe_volume_mm3", q->probe_volume_mm3[i]);
         sdm_text_add_real(t, "probe_area_mm2", q->probe_area_mm2[i]);
     }
+    for (const char *at = q->unfit; *at; at += strcspn(at, "\n") + 1)
+        sdm_text_add(t, "unfit=%.*s\n", (int)strcspn(at, "\n"), at);
+}
+
+/* Reads the lines of the uses for which the model is not good. */
+static void read_unfit(sdm_lines *r, char text[SDM_MODEL_UNFIT])
+{
+    for (size_t n = 0; sdm_lines_next_is(r, "unfit"); text[n++] = '\n') {
+        const char *line = sdm_lines_value(r, "unfit");
+        r->failed = r->failed || n + strlen(line) + 2 > SDM_MODEL_UNFIT;
+        for (const char *c = line; *c && !r->failed; c++) // it goes to terminals
+            r->failed = (unsigned char)*c < ' ' || *c == 127;
+        if (r->failed) return;
+        n += (size_t)snprintf(text + n, SDM_MODEL_UNFIT - n, "%s", line);
+    }
 }
 
 sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sdm_error *err)
 {
     static const char *const grades[] = {"good", "usable", "poor"};
     *q = (sdm_model_quality){
-        "", NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, {NAN, NAN, NAN}, {NAN, NAN, NAN}};
+        "", NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, {NAN, NAN, NAN}, {NAN, NAN, NAN}, ""};
     if (!section) return SDM_OK;
     sdm_lines r = {.at = section->data};
     r.end = r.at + section->size;
@@ -52,6 +68,7 @@ sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sd
         q->probe_volume_mm3[i] = sdm_lines_real(&r, "probe_volume_mm3");
         q->probe_area_mm2[i] = sdm_lines_real(&r, "probe_area_mm2");
     }
+    read_unfit(&r, q->unfit);
     bool known = false;
     for (size_t i = 0; i < sizeof grades / sizeof *grades; i++)
         known = known || !strcmp(q->grade, grades[i]);

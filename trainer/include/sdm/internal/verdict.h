@@ -123,6 +123,10 @@ const char *sdm_grade_few(int64_t heldout, char *text);
 enum { SDM_GRADE_TEXT = 120 };
 const char *sdm_grade_text(const sdm_verdict *v, char *text);
 
+/* text = the uses for which the model is not good, a line each, with a '\n' at the end of each; "":
+   none. [any thread] */
+void sdm_verdict_unfit(const sdm_verdict *v, char text[SDM_MODEL_UNFIT]);
+
 /* Volumes of surfaces on the grid are too small: at least a tenth of the surface has edges or is
    thinner than two voxels, and the thinnest part is thinner than four voxels. [any thread] */
 bool sdm_verdict_cuts_edges(const sdm_verdict *v);

@@ -1,0 +1,68 @@
+/* The uses for which a trained model is not good, in words. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "sdm/internal/verdict.h"
+
+/* The lines so far. */
+typedef struct unfit_lines {
+    char *text;
+    size_t size;
+} unfit_lines;
+
+static void add(unfit_lines *l, const char *format, ...) SDM_PRINTF(2, 3);
+
+/* Adds one line; one for which there is no room is left out. */
+static void add(unfit_lines *l, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    const int n = vsnprintf(l->text + l->size, SDM_MODEL_UNFIT - l->size, format, arguments);
+    va_end(arguments);
+    if (n > 0 && l->size + (size_t)n + 2 <= SDM_MODEL_UNFIT) {
+        l->size += (size_t)n;
+        l->text[l->size++] = '\n';
+    }
+    l->text[l->size] = '\0';
+}
+
+/* Parts that the maps lack, or cut. */
+static void add_parts(const sdm_verdict *v, unfit_lines *l)
+{
+    if (v->inside_out > 0) add(l, "the parts that are inside out, which are missing");
+    // the line of the grade tells of more, unless parts are inside out
+    if (v->cut > 0 && (v->cut <= SDM_CUT_POOR || v->inside_out > 0))
+        add(l, "the %.2g %% of the shapes that the grid cuts", fmin(99, 100 * v->cut));
+    if (sdm_verdict_errs_far(v))
+        add(l, "distances far from the surface: wrong by up to %.2g mm", v->largest_mm);
+    if (v->volume_error > SDM_VOLUME_BAD)
+        add(l, v->volume_error >= 0.1 ? "volumes: off by %.0f %%" : "volumes: off by %.2g %%",
+            100 * v->volume_error);
+    if (sdm_verdict_lacks_part(v))
+        add(l,
+            "its thinnest part and volumes of surfaces (.stl): it is %.2g mm thick, too thin for "
+            "voxels of %.3g mm, and will be missing or broken; grid.spacing %.2g shows it",
+            v->thickness_mm, v->coarse_mm, sdm_verdict_spacing(v));
+    else if (sdm_verdict_cuts_edges(v))
+        add(l,
+            "volumes of surfaces (.stl): voxels of %.3g mm cut the edges of its parts, the "
+            "thinnest of which is %.2g mm thick; grid.spacing %.2g keeps more of them",
+            v->coarse_mm, v->thickness_mm, sdm_verdict_spacing(v));
+}
+
+void sdm_verdict_unfit(const sdm_verdict *v, char text[SDM_MODEL_UNFIT])
+{
+    unfit_lines l = {.text = text};
+    *text = '\0';
+    add_parts(v, &l);
+    if (v->derivatives_bad[0]) add(&l, "derivatives of maps by %s", v->derivatives_bad);
+    if (v->volume_derivatives_bad[0])
+        add(&l, "derivatives of the volume by %s", v->volume_derivatives_bad);
+    if (v->triangles_by[0])
+        add(&l,
+            "derivatives of exact maps (exact --jacobian, fit --exact or --polish) where the "
+            "triangles change with %s: vertices do not correspond there",
+            v->triangles_by);
+}

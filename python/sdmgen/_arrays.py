@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import Any, Mapping, Optional, Sequence, TypeVar, Union
 
 import numpy as np
@@ -112,6 +113,16 @@ def copied(pointer: Optional[int], shape: Sequence[int], dtype: Any) -> NDArray[
     return result
 
 
+#: keywords of the calls that take parameters as keywords, too
+KEYWORDS = ("grid", "size", "spacing", "origin", "direction", "policy", "outside", "check", "max_error", "error_of", "threads")
+
+
+def _nearest(name: str, names: Sequence[str]) -> str:
+    """A question about a misspelt parameter or keyword, or nothing."""
+    near = [word for word in get_close_matches(name, [*names, *KEYWORDS], 1) if word != name]
+    return f"did you mean '{near[0]}'? " if near else ""
+
+
 def named_values(
     names: Sequence[str],
     defaults: Float64,
@@ -126,7 +137,7 @@ def named_values(
         result = float64(values, (len(names),), "parameters").copy()
     for name, value in more.items():
         if name not in names:
-            raise argument_error(f"unknown parameter '{name}'; the parameters are {', '.join(names)}")
+            raise argument_error(f"unknown parameter '{name}'; {_nearest(name, names)}the parameters are {', '.join(names)}")
         result[names.index(name)] = float64(value, (), f"parameter {name}")
     return result
 

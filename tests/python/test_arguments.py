@@ -25,6 +25,8 @@ def test_dtypes_and_shapes(model):
     refuses("parameters: need an array of shape [n, 4], not [4]", model.batch, [1, 2, 3, 4])
     refuses("parameters: not an array", model, [[1, 2], 3, 4, 5])
     refuses("unknown parameter 'z'; the parameters are a, alpha, b, phi", model, z=3)
+    refuses("unknown parameter 'alfa'; did you mean 'alpha'? the parameters", model, alfa=3)
+    refuses("unknown parameter 'spacin'; did you mean 'spacing'? the parameters", model, spacin=1)
     refuses("parameter a: need an array of shape []", model, a=[1, 2])
     refuses("adjoint: need an array of shape [12, 14, 16]", model.vjp, np.zeros((3, 3, 3)))
     refuses("direction: need an array of shape [4]", model.jvp, [1])

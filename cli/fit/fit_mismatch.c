@@ -11,6 +11,8 @@
 
 /* Least Dice of a reference of the same shape in the same place. */
 #define DICE_LEAST 0.3
+/* A fit that describes its reference has a larger one. */
+#define DICE_LIKELY 0.7
 
 /* Middle of the box around the fitted surface; returns the diagonal of the box, mm. */
 static double surface_middle(const cli_fit *f, double middle[3])
@@ -49,6 +51,18 @@ static void warn_reference(const cli_fit *f, const double middle[3], double size
                               : "are they those of another structure (--reference-label) or case?");
 }
 
+/* A fit that passed, whose reference lies in its place and yet differs much. */
+static void remark_reference(const cli_fit *f)
+{
+    const cli_overlap *o = &f->overlap;
+    if (!f->args->fit.reference || !o->measured || f->result.verdict.grade != SDM_FIT_PASSED ||
+        !(o->dice >= DICE_LEAST && o->dice < DICE_LIKELY))
+        return;
+    cli_notice("--reference %s: Dice %.2f, although the fit has passed: the shape may lack freedom "
+               "for this case, or the reference is another structure or thinner than voxels show",
+               f->args->fit.reference, o->dice);
+}
+
 void cli_fit_warn_mismatch(const cli_fit *f)
 {
     double middle[3];
@@ -56,6 +70,7 @@ void cli_fit_warn_mismatch(const cli_fit *f)
     if (!f->surface.n_vert || f->doubt.status) return;
     const double size = surface_middle(f, middle), off = cli_fit_truth_shift(f);
     warn_reference(f, middle, size);
+    remark_reference(f);
     if (off > size)
         cli_warn("--truth %s: its pose is %.3g mm off the fitted one, more than the %.3g mm that "
                  "the shape measures across: is it in another frame (RAS, LPS) or unit than mm, or "

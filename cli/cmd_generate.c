@@ -10,6 +10,7 @@
 #include "inputs/points_unit.h"
 #include "inputs/setup.h"
 #include "measure/measures.h"
+#include "report/files.h"
 #include "report/generate_files.h"
 #include "report/json_values.h"
 #include "report/output.h"
@@ -190,6 +191,17 @@ static sdm_status open_shape(job *j, sdm_error *err)
                   : s;
 }
 
+/* Warns of labels of a model whose volumes are off by over 2 %. */
+static void warn_label_volumes(const job *j)
+{
+    sdm_error why = {0};
+    bool labels = false;
+    for (size_t i = 0; i < j->args->outputs.n; i++)
+        labels = labels || cli_ends_with(j->args->outputs.items[i], ".seg.nrrd");
+    if (labels && sdm_model_check_use(j->model, SDM_USE_VOLUME, &why) == SDM_E_QUALITY)
+        cli_warn("%s: %s", j->args->files.items[0], why.text);
+}
+
 /* Chooses the grid. On another grid than the model's, level sets alone need no whole maps. */
 static sdm_status choose_grid(job *j, sdm_error *err)
 {
@@ -256,6 +268,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     sdm_status s = open_model(j, err);
     if (!s) s = choose_grid(j, err);
     if (!s) cli_warn_thin_model(args->files.items[0], j->info, &j->grid);
+    if (!s) warn_label_volumes(j);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);

@@ -1,6 +1,7 @@
 /* sdmgen: parses the command line, runs one command and turns its status into an exit code. */
 #include <fcntl.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -75,7 +76,7 @@ static int run_command(const cli_args *args)
     if (args->threads > 0) omp_set_num_threads((int)args->threads);
 #endif
     cli_catch_interrupts();
-    cli_guard_callbacks();
+    cli_guard_callbacks(!args->isolate && (args->plugins.n || getenv("SDMGEN_PLUGIN_PATH")));
     sdm_picture_in_child(true);
     sdm_error err = {0};
     const sdm_status s = functions[args->command - cli_commands](args, &err);

@@ -57,6 +57,24 @@ static void end_in_library(const sdm_foreign *f, bool starved)
     _exit(CLI_EXIT_FAILED);
 }
 
+static bool plugins_loaded;
+
+/* A plug-in that writes beyond its arrays damages memory, and the program crashes later: one line
+ * tells how to find it. */
+static void hint_at_plugins(void)
+{
+    static const char text[] = "sdmgen: error: the program crashed; a plug-in that has written "
+                               "beyond its arrays may be the reason: --isolate finds it\n",
+                      json[] = "{\"error\": \"the program crashed; a plug-in that has written "
+                               "beyond its arrays may be the reason: --isolate finds it\"}\n";
+    static atomic_flag told = ATOMIC_FLAG_INIT;
+    if (!plugins_loaded || atomic_flag_test_and_set(&told)) return;
+    const bool is_json = cli_get_form() == CLI_FORM_JSON;
+    const ssize_t put =
+        write(STDERR_FILENO, is_json ? json : text, is_json ? sizeof json - 1 : sizeof text - 1);
+    (void)put;
+}
+
 static const int signals[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 enum { N_SIGNALS = sizeof signals / sizeof *signals };
 static struct sigaction before[N_SIGNALS]; // what the signals did before
@@ -70,6 +88,7 @@ static void on_crash(int signal_number, siginfo_t *info, void *context)
     const sdm_foreign f = sdm_foreign_running();
     // not a signal that another process sent
     if (f.library && (info->si_code > 0 || info->si_pid == getpid())) end_in_library(&f, starved);
+    hint_at_plugins();
     // neither a plug-in nor a library: the instruction runs into the fault again, as ever; a signal
     // that was sent does not come again by itself
     for (size_t i = 0; i < N_SIGNALS; i++)
@@ -83,8 +102,9 @@ static void on_exit_call(void)
     if (c) end_program(c, "the plug-in called exit(), which it must not: it returns an error");
 }
 
-void cli_guard_callbacks(void)
+void cli_guard_callbacks(bool plugins)
 {
+    plugins_loaded = plugins;
     static char stack[1 << 17]; // of the main thread's handler, whose own stack may have overflowed
     const stack_t own = {.ss_sp = stack, .ss_size = sizeof stack};
     sigaltstack(&own, NULL);

@@ -210,6 +210,11 @@ sed -E 's/"mm"/"rad"/; s/\.min = [0-9.]+/.min = 120/; s/\.max = [0-9.]+/.max = 1
 cc -shared -fPIC -I"$source_folder/framework/include" degrees.c -o degrees.so -lm || bad 'the plug-in degrees.so was not built'
 expect 4 'mend' sdmgen shapes check --plugin ./degrees.so --samples 4
 has "^warning +the parameter 'radius' ranges from 120 to 140 rad: are these degrees"
+# a plug-in that ends the program outside of its callbacks: a line about --isolate
+{ cat "$source_folder/examples/plugin/octahedron.c" && printf '#include <stdlib.h>\n__attribute__((destructor)) static void end(void) { abort(); }\n'; } >late.c
+cc -shared -fPIC -I"$source_folder/framework/include" late.c -o late.so -lm || bad 'the plug-in late.so was not built'
+sdmgen shapes octahedron --plugin ./late.so >out 2>err
+grep -q '^sdmgen: error: the program crashed; a plug-in that has written beyond its arrays may be the reason: --isolate finds it$' err || bad "a crash elsewhere: $(cat err)"
 # the other way round: radians that are called degrees; a few degrees are no mistake
 for most in 3.1416 5 90; do
     sed -E "s/\"mm\"/\"deg\"/; s/\.min = [0-9.]+/.min = 0.5/; s/\.max = [0-9.]+/.max = $most/; s/\.def = [0-9.]+/.def = 1/" \

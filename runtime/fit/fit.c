@@ -24,6 +24,7 @@
 #include "fit/start/start_search.h"
 #include "fit/trust/convergence.h"
 #include "fit/trust/evidence.h"
+#include "fit/trust/flat_params.h"
 #include "fit/trust/kept_pose.h"
 #include "fit/trust/pose_params.h"
 #include "fit/trust/posterior.h"
@@ -518,6 +519,7 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     sdm_status s = sdm_fit_pose_params_find(p, err);
     if (!s) s = sdm_fit_posterior(p, out, err);
+    if (!s && !p->is_rival) s = sdm_fit_flat_params_spread(p, out, err);
     if (s && s != SDM_E_QUALITY) return s;
     out->inside_share = sdm_fit_inside_share(p);
     if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {

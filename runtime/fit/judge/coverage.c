@@ -7,8 +7,12 @@
 #include "coverage.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <string.h>
 
 #include "finding.h"
+#include "fit/data/source_params.h"
+#include "fit/solver/prior.h"
 #include "noise.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
@@ -42,6 +46,11 @@
 #define STRAYS_MAX_UNCOVERED 0.1
 // share of the surface without points from which on parameters at their bounds are no chance
 #define MOSTLY_UNCOVERED 0.5
+// share of the surface that a parameter moves, weighted by the square of the motion, without points
+// from which on this is why the points do not determine the parameter
+#define UNSEEN_MIN 0.5
+// standard deviation of such a parameter, over that before the fit, from which on it is named
+#define HARDLY_KNOWN 0.25
 
 typedef struct cloud {
     double (*x)[3];
@@ -122,8 +131,9 @@ static void split_points(const fit_problem *p, cloud *on, cloud *strays)
     }
 }
 
-/* Places on the fitted surface in the world, one for a voxel that it passes, at most MOST. */
-static sdm_status surface_places(const fit_problem *p, cloud *out, sdm_error *err)
+/* Places on the fitted surface in the world, one for a voxel that it passes, at most MOST;
+   voxel[MOST + 1]: the voxel of each. */
+static sdm_status surface_places(const fit_problem *p, cloud *out, size_t *voxel, sdm_error *err)
 {
     const sdm_grid *g = &p->maps.grid;
     const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]};
@@ -145,24 +155,57 @@ static sdm_status surface_places(const fit_problem *p, cloud *out, sdm_error *er
                 for (int a = 0; a < 3 && square > 0; a++)
                     index[a] -= d[v] * slope[a] / (square * g->spacing[a]);
                 sdm_grid_world(g, index, y);
+                voxel[out->n] = (size_t)v;
                 sdm_fit_to_world(&p->state, y, out->x[out->n++]);
             }
     return s;
 }
 
-/* Share of the places of the surface without points within REACH times the spacing. Strays count:
-   they may lie on the surface of another shape that touches this one. */
-static double share_uncovered(const cloud *surface, const cloud *on, const cloud *strays,
-                              double reach)
+/* bare[i]: place i of the surface has no points within REACH times the spacing. Strays count: they
+   may lie on the surface of another shape that touches this one. Returns the share of such places.
+ */
+static double find_bare(const cloud *surface, const cloud *on, const cloud *strays, double reach,
+                        bool *bare)
 {
-    size_t bare = 0, number;
+    size_t n = 0, number;
     for (size_t i = 0; i < surface->n; i++) {
         double d2[2];
         find_nearest(on, surface->x[i], SIZE_MAX, 1, &d2[0], &number);
         find_nearest(strays, surface->x[i], SIZE_MAX, 1, &d2[1], &number);
-        bare += fmin(d2[0], d2[1]) > reach * reach;
+        bare[i] = fmin(d2[0], d2[1]) > reach * reach;
+        n += bare[i];
     }
-    return surface->n ? (double)bare / (double)surface->n : 0;
+    return surface->n ? (double)n / (double)surface->n : 0;
+}
+
+/* Names the parameters that the points hardly determine and that move a surface which has no
+   points: text[size]. Returns the largest share of such a surface without points; 0: there is none.
+ */
+static double name_unseen(const fit_problem *p, const sdm_fit_result *r, size_t n_places,
+                          const size_t *voxel, const bool *bare, char *text, size_t size)
+{
+    const fit_maps *m = &p->maps;
+    const double edge = fit_longest_edge(&m->grid);
+    double most = 0;
+    *text = '\0';
+    for (size_t k = 0; k < p->n_params && m->jacobian && !p->opts->keep_params; k++) {
+        double all = 0, unseen = 0, fastest = 0, low, high;
+        const double sd = sdm_fit_prior_sd(p, k);
+        const char *name = "";
+        if (!(r->sd[k] > HARDLY_KNOWN * sd)) continue;
+        for (size_t i = 0; i < n_places; i++) {
+            const double by = (double)m->jacobian[k * m->n_voxels + voxel[i]];
+            all += by * by;
+            unseen += bare[i] ? by * by : 0;
+            fastest = fmax(fastest, fabs(by));
+        }
+        if (!(fastest * sd > edge) || !(unseen > UNSEEN_MIN * all)) continue;
+        most = fmax(most, unseen / all);
+        sdm_fit_bounds(p->source, k, &low, &high, &name);
+        const size_t used = strlen(text);
+        snprintf(text + used, size - used, "%s%.40s", used ? ", " : "", name);
+    }
+    return most;
 }
 
 /* Share of the parameters that end at a bound. */
@@ -174,19 +217,24 @@ static double share_at_bounds(const fit_problem *p)
     return p->n_params && !p->opts->keep_params ? (double)at / (double)p->n_params : 0;
 }
 
-sdm_status sdm_fit_check_coverage(const fit_problem *p, sdm_fit_verdict *v, sdm_error *err)
+sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v,
+                                  sdm_error *err)
 {
     cloud on = {0}, strays = {0}, surface = {0};
+    size_t *voxel = NULL;
+    bool *bare_at = NULL;
     double spacing = 0;
     sdm_status s = SDM_ALLOC(&on.x, MOST + 1, "points of the fit", err);
     if (!s) s = SDM_ALLOC(&strays.x, MOST + 1, "points of the fit", err);
+    if (!s) s = SDM_ALLOC(&voxel, MOST + 1, "places of the surface", err);
+    if (!s) s = SDM_ALLOC(&bare_at, MOST + 1, "places of the surface", err);
     if (!s) split_points(p, &on, &strays);
     if (!s && on.n > MANY) s = find_spacing(&on, &spacing, err);
-    if (!s && on.n > MANY) s = surface_places(p, &surface, err);
+    if (!s && on.n > MANY) s = surface_places(p, &surface, voxel, err);
     if (!s && spacing > 0) {
         const double most = fmax(p->opts->tolerance, PATCH_MAX), sd = p->state.point_sd,
                      patch = (double)count_patch(&strays, spacing) / (double)(on.n + strays.n),
-                     bare = share_uncovered(&surface, &on, &strays, REACH * spacing + 3 * sd),
+                     bare = find_bare(&surface, &on, &strays, REACH * spacing + 3 * sd, bare_at),
                      stray = (double)strays.n / (double)(on.n + strays.n);
         const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
@@ -203,18 +251,34 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, sdm_fit_verdict *v, sdm_
                           "better start, or take other things out of the data "
                           "(sdm_fit_opts.tolerance allows more)",
                           100 * patch);
-        sdm_fit_judge_add(v, SDM_FIT_CHECK_COVERED, bare <= UNCOVERED_MAX,
-                          grown || other ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, bare, UNCOVERED_MAX,
-                          "%.0f %% of the fitted surface has no points near it, and %.0f %% of the "
-                          "points lie on no surface of the shape: %s",
-                          100 * bare, 100 * stray,
-                          grown   ? "a fit that stopped at a wrong shape; give a better start, or "
-                                    "take the strays out (sdm_fit_opts.tolerance allows more)"
-                          : other ? "most of it, and half of the parameters or more end at their "
-                                    "bounds: the data show another shape, or their lengths are in "
-                                    "another unit"
-                                  : "the data show a part of the shape only, or it is too large");
+        char names[200], unseen_text[300] = "";
+        const double unseen = name_unseen(p, r, surface.n, voxel, bare_at, names, sizeof names);
+        if (unseen > 0)
+            snprintf(unseen_text, sizeof unseen_text,
+                     "the data do not determine %s: no points lie near the part of the surface "
+                     "that %s; take points from there, or keep the value",
+                     names, strchr(names, ',') ? "they move" : "it moves");
+        const bool covered = bare <= UNCOVERED_MAX;
+        if (covered && unseen > 0)
+            sdm_fit_judge_add(v, SDM_FIT_CHECK_COVERED, false, SDM_FIT_DOUBTFUL, unseen, UNSEEN_MIN,
+                              "%s", unseen_text);
+        else
+            sdm_fit_judge_add(
+                v, SDM_FIT_CHECK_COVERED, covered,
+                grown || other ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, bare, UNCOVERED_MAX,
+                "%.0f %% of the fitted surface has no points near it, and %.0f %% of the points "
+                "lie on no surface of the shape: %s%s%s",
+                100 * bare, 100 * stray,
+                grown   ? "a fit that stopped at a wrong shape; give a better start, or take the "
+                          "strays out (sdm_fit_opts.tolerance allows more)"
+                : other ? "most of it, and half of the parameters or more end at their bounds: the "
+                          "data show another shape, or their lengths are in another unit"
+                : unseen > 0 ? ""
+                             : "the data show a part of the shape only, or it is too large",
+                (grown || other) && unseen > 0 ? "; " : "", unseen_text);
     }
+    sdm_free(voxel);
+    sdm_free(bare_at);
     sdm_free(on.x);
     sdm_free(strays.x);
     sdm_free(surface.x);

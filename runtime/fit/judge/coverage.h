@@ -4,5 +4,7 @@
 
 #include "fit/solver/problem.h"
 
-/* Adds the findings "patch" and "covered" of a fit to points. SDM_E_NOMEM. */
-sdm_status sdm_fit_check_coverage(const fit_problem *p, sdm_fit_verdict *v, sdm_error *err);
+/* Adds the findings "patch" and "covered" of a fit to points, whose covariance *r holds.
+   SDM_E_NOMEM. */
+sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v,
+                                  sdm_error *err);

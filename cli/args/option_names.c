@@ -20,6 +20,7 @@ static size_t structure_length(const char *at)
 static const char *const NAMES[][2] = {{"sdm_fit_source.grid", "--exact --spacing"},
                                        {"sdm_registry_load()", "--plugin FILE"},
                                        {"sdm_fit_opts.start_params", "-p NAME=VALUE"},
+                                       {"sdm_fit_opts.kept", "--keep NAME"},
                                        {"sdm_fit_opts.max_polish_iterations", "--polish"}};
 
 /* The pair of names that begins at `at`; NULL: none. */

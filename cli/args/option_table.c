@@ -555,7 +555,8 @@ const cli_option cli_options[] = {
      "standard deviation of the distance of points from the surface at the start (default 0.1, but "
      "0.125 to 1 voxel)"},
     {"keep", 0, CLI_LIST, "WHAT", NULL, 0, 0, ON(CLI_FIT), AT(fit.keep),
-     "keep at the start value: parameters, pose, blur or appearance; may be repeated"},
+     "keep at the start value: all parameters, pose, blur or appearance, or the parameter of this "
+     "name (its value: -p); may be repeated"},
     {"prior-sd", 0, CLI_REAL, "F", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_sd),
      "standard deviation of the prior of a parameter, in halves of its range or, if its "
      "distribution is normal, in deviations (default 1; 0: no prior)"},

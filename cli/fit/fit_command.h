@@ -47,6 +47,7 @@ typedef struct cli_fit {
     size_t n_params;
     double *start;      /* [n_params] parameters at the start */
     bool start_clamped; /* the start was clamped to the range of the parameters */
+    bool *kept;         /* [n_params] --keep NAME; NULL: none */
     double pivot[3];    /* middle of the shape at the start, in the shape's frame, mm */
     sdm_fit_source source;
 

@@ -4,6 +4,7 @@
 
 #include "fit_command.h"
 #include "report/terminal.h"
+#include "sdm/memory.h"
 
 static sdm_fit_law make_law(const double given[2], double weight)
 {
@@ -56,8 +57,22 @@ void cli_fit_notice_kept(const cli_fit *f)
         cli_notice("--keep parameters without -p: the parameters keep their default values");
 }
 
-static sdm_status read_keep(const cli_list *words, sdm_fit_opts *o, sdm_error *err)
+/* Marks the parameter of this name in f->kept; false: there is none. */
+static bool keep_named(cli_fit *f, const char *name)
 {
+    for (size_t k = 0; k < f->n_params; k++)
+        if (!strcmp(f->params[k].name, name)) return f->kept[k] = true;
+    return false;
+}
+
+static sdm_status read_keep(cli_fit *f, sdm_error *err)
+{
+    const cli_list *words = &f->args->fit.keep;
+    sdm_fit_opts *o = &f->opts;
+    size_t n_kept = 0;
+    if (!words->n) return SDM_OK;
+    sdm_status s = SDM_ALLOC(&f->kept, f->n_params, "parameters", err);
+    if (s) return s;
     const struct {
         const char *name;
         bool *field;
@@ -68,12 +83,19 @@ static sdm_status read_keep(const cli_list *words, sdm_fit_opts *o, sdm_error *e
     for (size_t i = 0; i < words->n; i++) {
         size_t k = 0;
         while (k < 4 && strcmp(words->items[i], known[k].name)) k++;
-        if (k == 4)
+        if (k < 4)
+            *known[k].field = true;
+        else if (keep_named(f, words->items[i]))
+            o->kept = f->kept;
+        else
             return sdm_fail(err, SDM_E_ARG,
-                            "--keep '%.100s': need one of parameters|pose|blur|appearance",
-                            words->items[i]);
-        *known[k].field = true;
+                            "--keep '%.100s': need one of parameters|pose|blur|appearance, or the "
+                            "name of a parameter of '%s' (%s lists them)",
+                            words->items[i], f->shape_name,
+                            f->model ? "`sdmgen info MODEL`" : "`sdmgen shapes NAME`");
     }
+    for (size_t k = 0; k < f->n_params; k++) n_kept += f->kept[k];
+    if (n_kept == f->n_params) o->keep_params = true;
     if (o->keep_params && o->keep_pose)
         return sdm_fail(err, SDM_E_ARG,
                         "--keep parameters and --keep pose together leave nothing to fit");
@@ -139,5 +161,5 @@ sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err)
     o->start_params = f->start;
     read_region(a, o);
     const sdm_status s = read_appearance(a, &o->appearance, err);
-    return s ? s : read_keep(&a->keep, o, err);
+    return s ? s : read_keep(f, err);
 }

@@ -56,6 +56,7 @@ void cli_fit_dispose(cli_fit *f)
     sdm_free(f->mask);
     sdm_volume_dispose(&f->image);
     sdm_free(f->start);
+    sdm_free(f->kept);
     sdm_free(f->truth);
     sdm_free(f->params);
     sdm_model_free(f->model);

@@ -115,6 +115,7 @@ def with_arguments(text: str) -> str:
     """A text of the C library, which names options of C, with the names of arguments in their place."""
     text = text.replace("sdm_fit_source.grid", "exact=True, spacing=...")
     text = text.replace("sdm_fit_opts.max_polish_iterations", "polish=True")
+    text = text.replace("sdm_fit_opts.kept", "keep")
     return re.sub(r"\bsdm_\w+_opts\.(\w+)", r"\1", text)
 
 

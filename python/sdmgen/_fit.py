@@ -528,8 +528,15 @@ def fit(
         opts.box_min[:] = [float(x) for x in corners.min(axis=0)]
         opts.box_max[:] = [float(x) for x in corners.max(axis=0)]
     _set_tissues(opts.appearance, inside, outside, air)
-    for word in words([keep] if isinstance(keep, str) else keep, _KEEP, "keep"):
-        setattr(opts, "keep_params" if word == "parameters" else f"keep_{word}", True)
+    own = [p.name for p in source.params]
+    kept = np.zeros(len(own), np.bool_)
+    for word in words([keep] if isinstance(keep, str) else keep, (*_KEEP, *own), "keep"):
+        if word in _KEEP:
+            setattr(opts, "keep_params" if word == "parameters" else f"keep_{word}", True)
+        else:
+            kept[own.index(word)] = True
+    opts.kept = address(kept)
+    opts.keep_params = opts.keep_params or bool(kept.all())
     if opts.keep_params and opts.keep_pose:
         raise argument_error("keep: parameters and pose together leave nothing to fit")
 

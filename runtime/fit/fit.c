@@ -470,7 +470,8 @@ static void report(fit_problem *p, sdm_fit_result *out)
     const fit_state *s = &p->state;
     for (size_t k = 0; k < p->n_params; k++) {
         out->params[k] = s->params[k];
-        out->at_bound[k] = s->params[k] <= p->low[k] || s->params[k] >= p->high[k];
+        out->at_bound[k] =
+            !fit_param_is_kept(p, k) && (s->params[k] <= p->low[k] || s->params[k] >= p->high[k]);
         out->prior_sd[k] = sdm_fit_prior_sd(p, k);
         out->by_prior[k] = out->sd[k] > FIT_BY_PRIOR * out->prior_sd[k];
     }

@@ -107,6 +107,9 @@ expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --blur 0.3 --keep blur
 has 'point spread 0.3 mm'
 ! grep -q 'are coarse' out || bad 'maps of 0.35 mm are fine beside a point spread of 0.3 mm'
 
+expect 0 - sdmgen fit $fit ct.nii.gz $near_truth -p rx=3.4 --keep rx
+has '^  rx                  3\.4 mm$'
+
 # Other starts: axis and turns, pairs of points, none; RAS coordinates.
 expect 0 - sdmgen fit $fit ct.nii.gz --start-centre=-20,30,10 --start-axis=0.2,-0.1,1 --ras --turns 4 --spacing 0.5 --json
 within rx 3.5 4
@@ -290,7 +293,7 @@ expect 2 'one of --rotation, --start-axis' sdmgen fit $fit ct.nii.gz --rotation 
 expect 2 'one of --translation, --start-centre' sdmgen fit $fit ct.nii.gz --translation 0,0,0 --start-centre 0,0,0
 expect 2 'one of --turns and --turns-sphere' sdmgen fit $fit ct.nii.gz --turns 3 --turns-sphere 3
 expect 2 'reference-label needs --reference FILE' sdmgen fit $fit ct.nii.gz --reference-label 1
-expect 2 "keep 'shape': need one of" sdmgen fit $fit ct.nii.gz --keep shape
+expect 2 "keep 'shape': need one of .*, or the name of a parameter of 'ellipsoid'" sdmgen fit $fit ct.nii.gz --keep shape
 expect 2 'leave nothing to fit' sdmgen fit $fit ct.nii.gz --keep parameters --keep pose
 expect 2 'standard deviations above 0' sdmgen fit $fit ct.nii.gz --inside 40,0
 expect 2 "region '1,2,3': need six numbers" sdmgen fit $fit ct.nii.gz --region 1,2,3

@@ -88,6 +88,8 @@ def test_labels_and_points(run, ct, tmp_path):
     told = run("fit", "--shape", "torus", tmp_path / "points.npy", *words)
     for target in (mesh.vertices, tmp_path / "points.npy"):
         compare(sdmgen.fit(shape, target, rotation=(0.1, 0, 0), spacing=0.8, threads=1, keep="appearance"), told)
+    kept = sdmgen.fit(shape, mesh, params={"major": 2.4}, rotation=(0.1, 0, 0), keep=["major"], threads=1)
+    assert kept.params["major"] == 2.4 and kept.sd["major"] == 0 < kept.sd["minor"]
 
 
 def test_a_network(run, model, model_file, tmp_path):

@@ -348,6 +348,16 @@ static void test_kept_unknowns_stay(void **state)
     assert_true(fabs(unknowns_penalised(&r) - 6) < 1e-6);
     sdm_fit_dispose(&r);
     o.keep_params = false;
+    // one of the parameters
+    const double one[3] = {START[0], TRUTH[1], START[2]};
+    o.start_params = one;
+    o.kept = (const bool[3]){false, true, false};
+    r = fit(&t, &o);
+    assert_true(r.params[1] == TRUTH[1] && r.sd[1] == 0 && !r.at_bound[1] && !r.by_prior[1]);
+    assert_true(largest_error(&r) < 4e-3 && r.sd[0] > 0 && r.sd[3] > 0);
+    assert_true(fabs(unknowns_penalised(&r) - 8) < 1e-6);
+    sdm_fit_dispose(&r);
+    o.kept = NULL;
     o.keep_pose = true;
     o.start_params = START;
     o.start_pose = POSE;

@@ -240,8 +240,15 @@ static void test_restless_unknown(void **state)
     sdm_fit_name_restless(&p, &r, &err);
     assert_non_null(strstr(err.text, "translation along x still moves by 5 of its"));
     assert_non_null(strstr(r.verdict.findings[0].text, "translation along x"));
+    // after few iterations, and where a standard deviation is unknown
+    p.recent.n = 2;
+    sdm_fit_name_restless(&p, &r, NULL);
+    assert_non_null(strstr(r.verdict.findings[0].text, "translation along x still moves by 5 of"));
+    p.recent.n = FIT_RECENT;
     sd[MOVES] = 1e3;
     sd[MOVES + 1] = NAN;
+    sdm_fit_name_restless(&p, &r, NULL);
+    assert_non_null(strstr(r.verdict.findings[0].text, "translation along y may still move"));
     sdm_fit_accept_small_steps(&p, &r);
     assert_false(r.converged);
     sd[MOVES] = 1, sd[N - 1] = 1e3;

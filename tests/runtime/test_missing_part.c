@@ -58,8 +58,7 @@ static sdm_fit_result fit_flask(bool whole, double start)
     assert_int_equal(sdm_fit_surface_points(&m, N, 2, x, NULL), SDM_OK);
     for (size_t i = 0; i < N; i++) {
         if (!whole && x[3 * i + 2] > HEIGHT + 0.3) continue; // the root of the neck stays
-        for (size_t k = 0; k < 3; k++)
-            x[3 * n + k] = x[3 * i + k] + 0.05 * sdm_rng_normal(1, k, i);
+        for (size_t k = 0; k < 3; k++) x[3 * n + k] = x[3 * i + k] + 0.05 * sdm_rng_normal(1, k, i);
         n++;
     }
     const sdm_fit_source source = {
@@ -80,7 +79,8 @@ static sdm_fit_result fit_flask(bool whole, double start)
 static const char *text_of_covered(const sdm_fit_result *r)
 {
     for (size_t i = 0; i < r->verdict.n_findings; i++)
-        if (r->verdict.findings[i].kind == SDM_FIT_CHECK_COVERED) return r->verdict.findings[i].text;
+        if (r->verdict.findings[i].kind == SDM_FIT_CHECK_COVERED)
+            return r->verdict.findings[i].text;
     return "";
 }
 

@@ -188,11 +188,11 @@ static double name_unseen(const fit_problem *p, const sdm_fit_result *r, size_t 
     const double edge = fit_longest_edge(&m->grid);
     double most = 0;
     *text = '\0';
-    for (size_t k = 0; k < p->n_params && m->jacobian && !p->opts->keep_params; k++) {
+    for (size_t k = 0; k < p->n_params && m->jacobian; k++) {
         double all = 0, unseen = 0, fastest = 0, low, high;
         const double sd = sdm_fit_prior_sd(p, k);
         const char *name = "";
-        if (!(r->sd[k] > HARDLY_KNOWN * sd)) continue;
+        if (fit_param_is_kept(p, k) || !(r->sd[k] > HARDLY_KNOWN * sd)) continue;
         for (size_t i = 0; i < n_places; i++) {
             const double by = (double)m->jacobian[k * m->n_voxels + voxel[i]];
             all += by * by;
@@ -213,8 +213,9 @@ static double share_at_bounds(const fit_problem *p)
 {
     size_t at = 0;
     for (size_t k = 0; k < p->n_params; k++)
-        at += !(p->state.params[k] > p->low[k] && p->state.params[k] < p->high[k]);
-    return p->n_params && !p->opts->keep_params ? (double)at / (double)p->n_params : 0;
+        at += !fit_param_is_kept(p, k) &&
+              !(p->state.params[k] > p->low[k] && p->state.params[k] < p->high[k]);
+    return p->n_params ? (double)at / (double)p->n_params : 0;
 }
 
 sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v,
@@ -256,7 +257,8 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
         if (unseen > 0)
             snprintf(unseen_text, sizeof unseen_text,
                      "the data do not determine %s: no points lie near the part of the surface "
-                     "that %s; take points from there, or keep the value",
+                     "that %s; take points from there, or keep a known value "
+                     "(sdm_fit_opts.kept)",
                      names, strchr(names, ',') ? "they move" : "it moves");
         const bool covered = bare <= UNCOVERED_MAX;
         if (covered && unseen > 0)

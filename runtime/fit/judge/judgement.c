@@ -62,8 +62,8 @@ static const sdm_fit_law *main_law(const sdm_fit_law *law, size_t n)
 // voxels at the surface; the robust correlations of all others are the steadier measure.
 static double evidence_of(const fit_problem *p, const sdm_fit_result *r, double factor)
 {
-    const double unknowns =
-        (p->opts->keep_params ? 0 : (double)p->n_params) + (p->opts->keep_pose ? 0 : 6);
+    double unknowns = p->opts->keep_pose ? 0 : 6;
+    for (size_t k = 0; k < p->n_params; k++) unknowns += !fit_param_is_kept(p, k);
     return (p->information.log_likelihood - r->log_likelihood_without) / factor -
            0.5 * unknowns * log((double)p->samples.n / factor);
 }

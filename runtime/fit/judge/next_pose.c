@@ -278,7 +278,8 @@ static sdm_status values_rank(fit_problem *p, const own_fit *own, fit_start *lis
 {
     sdm_status s = SDM_OK;
     *n = 0;
-    for (size_t k = 0; k < p->n_params && !s && !p->opts->keep_params; k++) {
+    for (size_t k = 0; k < p->n_params && !s; k++) {
+        if (fit_param_is_kept(p, k)) continue;
         fit_start one;
         s = value_find(p, own, k, &one, err);
         if (!s && one.param) sdm_fit_start_insert(list, n, PARAMS_TRIED, &one);

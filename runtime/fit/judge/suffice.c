@@ -53,8 +53,9 @@ static size_t free_unknowns(const fit_problem *p)
 {
     const sdm_fit_opts *o = p->opts;
     size_t n = 0, pose = 0;
-    for (size_t k = 0; k < p->n_params && !o->keep_params; k++)
-        n += p->distribution[k].kind != SDM_DISTRIBUTION_NORMAL || !(o->prior_sd > 0);
+    for (size_t k = 0; k < p->n_params; k++)
+        n += !fit_param_is_kept(p, k) &&
+             (p->distribution[k].kind != SDM_DISTRIBUTION_NORMAL || !(o->prior_sd > 0));
     if (!o->keep_pose && !(o->prior_rotation_sd > 0)) pose += 3;
     if (!o->keep_pose && !(o->prior_translation_sd > 0)) pose += 3;
     size_t open = p->n_motions < SYMMETRIES_MAX ? p->n_motions : SYMMETRIES_MAX;
@@ -222,7 +223,8 @@ void sdm_fit_check_labels(const fit_problem *p, sdm_fit_verdict *v)
     // a parameter at a bound shows that the fit has missed the part
     bool missed = false;
     for (size_t k = 0; k < p->n_params; k++)
-        missed = missed || !(p->state.params[k] > p->low[k] && p->state.params[k] < p->high[k]);
+        missed = missed || (!fit_param_is_kept(p, k) &&
+                            !(p->state.params[k] > p->low[k] && p->state.params[k] < p->high[k]));
     sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, voxel <= thick,
                       missed ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, voxel, thick,
                       "the voxels of the labels, %.3g mm, are longer than the thinnest part of the "
@@ -236,6 +238,7 @@ void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm
     size_t known = 0, open = 0, counted = 0;
     if (p->opts->keep_params || v->grade == SDM_FIT_FAILED) return;
     for (size_t k = 0; k < p->n_params; k++) {
+        if (fit_param_is_kept(p, k)) continue;
         known += !r->by_prior[k];
         // a distribution of its own says enough of a parameter
         if (p->distribution[k].kind == SDM_DISTRIBUTION_NORMAL && p->opts->prior_sd > 0) continue;

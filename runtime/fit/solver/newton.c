@@ -68,7 +68,7 @@ static void limits_set(const fit_problem *p, const fit_newton_opts *opts, fit_li
     const fit_state *s = &p->state;
     for (size_t i = 0; i < p->information.n_unknowns; i++) {
         l->min[i] = -INFINITY, l->max[i] = INFINITY;
-        l->kept[i] = i < n       ? opts->keep_params
+        l->kept[i] = i < n       ? opts->keep_params || fit_param_is_kept(p, i)
                      : i < n + 6 ? opts->keep_pose
                      : i > n + 6 ? opts->keep_appearance || fit_mean_is_kept(p, i)
                                  : false;

@@ -114,6 +114,12 @@ typedef struct fit_problem {
     const double *search_best;
 } fit_problem;
 
+/* Whether parameter k keeps its start value. */
+static inline bool fit_param_is_kept(const fit_problem *p, size_t k)
+{
+    return p->opts->keep_params || (p->opts->kept && p->opts->kept[k]);
+}
+
 /* Whether unknown i, the mean of a tissue, keeps its value. */
 static inline bool fit_mean_is_kept(const fit_problem *p, size_t i)
 {

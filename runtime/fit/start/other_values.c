@@ -65,6 +65,7 @@ static sdm_status values_rank(fit_problem *p, const double axes[9], double step,
     const fit_state from = p->state;
     *n = 0;
     for (size_t k = 0; k < p->n_params; k++) {
+        if (fit_param_is_kept(p, k)) continue;
         fit_start of_param = {.log_likelihood = -INFINITY};
         for (int i = 0; i < N_PARTS; i++) {
             const double part = (p->high[k] - p->low[k]) / N_PARTS,

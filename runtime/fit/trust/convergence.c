@@ -12,16 +12,24 @@
 // an unknown has converged when it moves by no more than this share of its sd
 #define UNREST_MAX 0.1
 
+// movement of unknown i in the last iterations; where there were too few, its last step
+static double movement(const fit_problem *p, size_t i)
+{
+    const size_t n = p->recent.n;
+    return n >= FIT_RECENT || !n ? sdm_fit_unrest(p, i) : fabs(p->recent.step[n - 1][i]);
+}
+
 // the unknown that moves most in the last iterations, and by how many of its standard deviations
 // (*most); infinite where this cannot be told
-static size_t most_restless(const fit_problem *p, const sdm_fit_result *r, double *most)
+static size_t most_restless(const fit_problem *p, const sdm_fit_result *r,
+                            double (*moves)(const fit_problem *p, size_t i), double *most)
 {
     size_t worst = 0;
     *most = 0;
     for (size_t i = 0; i < p->n_params + 6; i++) {
-        const bool kept = i < p->n_params ? p->opts->keep_params : p->opts->keep_pose;
+        const bool kept = i < p->n_params ? fit_param_is_kept(p, i) : p->opts->keep_pose;
         if (kept) continue;
-        double unrest = sdm_fit_unrest(p, i) / r->sd[i];
+        double unrest = moves(p, i) / r->sd[i];
         if (isnan(unrest)) unrest = INFINITY; // an unknown without a sd
         if (unrest > *most) *most = unrest, worst = i;
     }
@@ -32,7 +40,7 @@ void sdm_fit_accept_small_steps(const fit_problem *p, sdm_fit_result *r)
 {
     double most;
     if (r->converged) return;
-    (void)most_restless(p, r, &most);
+    (void)most_restless(p, r, sdm_fit_unrest, &most);
     if (!(most <= UNREST_MAX)) return;
     r->converged = true;
     snprintf(r->reason, sizeof r->reason,
@@ -46,23 +54,28 @@ static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_err
                                         "translation along y", "translation along z"};
     double most, low, high;
     const char *name;
-    const size_t worst = most_restless(p, r, &most);
+    const size_t worst = most_restless(p, r, movement, &most);
     if (worst < p->n_params)
         sdm_fit_bounds(p->source, worst, &low, &high, &name);
     else
         name = pose[worst - p->n_params];
-    char moves[200] = "";
-    if (isfinite(most))
+    char moves[200] = "", keep[160] = "data that determine what still moves";
+    if (isnan(r->sd[worst]))
+        snprintf(moves, sizeof moves, "; %.100s may still move, its standard deviation is unknown",
+                 name);
+    else if (isfinite(most))
         snprintf(moves, sizeof moves,
                  "; %.100s still moves by %.2g of its standard deviation, need %.2g", name, most,
                  UNREST_MAX);
+    if (*moves && worst < p->n_params)
+        snprintf(keep, sizeof keep,
+                 "data that determine %.60s, or keep it at a known value (sdm_fit_opts.kept)",
+                 name);
     // whoever has allowed more iterations already is not told to allow more
     const bool many = p->opts->max_iterations > FIT_ITERATIONS_USUAL;
     sdm_fail(err, SDM_E_QUALITY,
-             "not converged after %zu iterations (%s%s): %sa nearer start, or data that determine "
-             "what still moves",
-             r->n_iterations, r->reason, moves,
-             many ? "" : "more of them (sdm_fit_opts.max_iterations), ");
+             "not converged after %zu iterations (%s%s): %sa nearer start, or %s", r->n_iterations,
+             r->reason, moves, many ? "" : "more of them (sdm_fit_opts.max_iterations), ", keep);
 }
 
 void sdm_fit_name_restless(const fit_problem *p, sdm_fit_result *r, sdm_error *err)

@@ -94,6 +94,7 @@ sdm_status sdm_fit_pose_params_find(fit_problem *p, sdm_error *err)
     for (size_t k = 0; k < p->n_params && p->n_pose_params < FIT_MOTIONS_MAX && !s; k++) {
         fit_pose_param *found = &p->pose_param[p->n_pose_params];
         bool rigid = false;
+        if (fit_param_is_kept(p, k)) continue;
         found->param = k;
         if (undo_first_order(p, k, found->motion, work) > REST_MAX) continue;
         tried = true;

@@ -26,7 +26,7 @@ static size_t free_unknowns(const fit_problem *p, size_t *list)
     size_t count = 0;
     for (size_t i = 0; i < p->information.n_unknowns; i++) {
         const size_t n = p->n_params;
-        const bool kept = i < n       ? o->keep_params
+        const bool kept = i < n       ? fit_param_is_kept(p, i)
                           : i < n + 6 ? o->keep_pose
                           : i > n + 6 ? fit_mean_is_kept(p, i)
                                       : o->keep_blur || !p->maps.share;

@@ -254,6 +254,9 @@ typedef struct sdm_fit_opts {
        on the data and the other one beyond them. 0: never; nothing is tried where parameters or
        pose are kept */
     size_t max_restarts;
+    /* [n_params] true: this parameter is not estimated and keeps its start value; NULL: all or none
+       are estimated, see keep_params */
+    const bool *kept;
 } sdm_fit_opts;
 
 /* What is checked before a fit is trusted. New checks are added at the end. */

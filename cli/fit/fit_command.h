@@ -237,6 +237,10 @@ const char *cli_fit_grade_name(sdm_fit_grade grade);
 enum { FIT_WORDS_MAX = 80 };
 void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX]);
 
+/* After a trustworthy fit whose maps are doubtful, coarse or a network's: prints the command that
+ * goes on from its result with exact maps of the voxels that are needed. */
+void cli_fit_print_next(const cli_fit *f);
+
 /* Prints the verdict as text; adds it to a JSON object. */
 void cli_fit_print_verdict(const cli_fit *f);
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);

@@ -59,6 +59,19 @@ static bool name_prior(const cli_fit *f, char *text, size_t size)
     return true;
 }
 
+/* What of the start may be wrong, and the options that change it. */
+static void name_start(const cli_fit *f, char *text, size_t size)
+{
+    const bool turned = !isnan(f->args->pose.rotation[0]) && !f->opts.keep_pose,
+               values = !f->opts.keep_params;
+    if (!turned && !values) return;
+    snprintf(text, size, "; a wrong start ends like this, too: %s%s%s",
+             turned ? "without --rotation many are tried" : "", turned && values ? "; " : "",
+             !values             ? ""
+             : f->args->params.n ? "the values of -p may be wrong"
+                                 : "-p NAME=VALUE gives start values of parameters");
+}
+
 const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
 {
     const cli_fit_args *a = &f->args->fit;
@@ -84,9 +97,7 @@ const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
                  "; the points show a part of the shape, and the fit began at their middle: "
                  "--start-centre X,Y,Z says where the middle of the whole shape is, about");
     // tissues that are the wrong way round are no matter of the start
-    else if (!isnan(f->args->pose.rotation[0]) && !f->opts.keep_pose &&
-             !(f->found && found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY)))
-        snprintf(text, size,
-                 "; a wrong start ends like this, too: without --rotation many are tried");
+    else if (!(f->found && found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY)))
+        name_start(f, text, size);
     return text;
 }

@@ -142,6 +142,7 @@ void cli_fit_print(const cli_fit *f)
     print_overlap(f);
     print_target(f);
     cli_fit_print_verdict(f);
+    cli_fit_print_next(f);
     cli_fit_print_candidates(f);
     printf("%s after %zu iterations (%s)\n", r->converged ? "converged" : "NOT CONVERGED",
            r->n_iterations, r->reason);

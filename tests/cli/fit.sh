@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: a phantom is recovered, every kind of target and output, fits that must fail, mistakes.
-# Tests: fit_truth.c shell_word.c cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_mismatch.c fit_options.c fit_picture.c fit_remedy.c fit_repeat.c fit_report.c fit_result.c
+# Tests: fit_truth.c shell_word.c cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_mismatch.c fit_next.c fit_options.c fit_picture.c fit_remedy.c fit_repeat.c fit_report.c fit_result.c
 # fit_start.c fit_target.c progress_bar.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
@@ -89,6 +89,10 @@ has 'rx +3\.[0-9]+ \+- 0\.0'
 has 'reference: Dice 0.9'
 has 'converged after'
 has '^  map voxels   doubtful  0.35, need at most 0.2.*coarse beside the point spread of the image: .*with voxels of 0.2[0-9]* mm \(--exact --spacing\)'
+# the command that goes on from here with finer maps
+has '^finer maps from here, without a search:$'
+eval "$(sed -n 's/^  sdmgen fit ct/expect 0 - sdmgen fit ct/p' out)"
+has '^  map voxels   passed '
 # the truth of the test image beside the estimate; that of another shape, and a file without parameters, are refused
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --truth truth.json
 has '^  rx .* \+- .* mm +truth 3\.5, off by [0-9.]+ sd$'

@@ -298,15 +298,19 @@ static void check_tissues(const fit_problem *p, const fit_residuals *s, const sd
     const sdm_fit_law *law[2] = {main_law(a->outside, a->n_outside),
                                  main_law(a->inside, a->n_inside)},
                       *given = main_law(p->opts->appearance.inside, p->opts->appearance.n_inside);
+    // beside the shape of the data, the tissues are those of other places
+    const char *lost = v->grade == SDM_FIT_FAILED
+                           ? "the fit is not on the shape of the data, as from a wrong start, or "
+                           : "";
     for (int side = 1; side >= 0; side--) {
         const double wider = law[side]->sd / s->spread[side];
         if (!isfinite(wider) || (side ? a->n_inside : a->n_outside) > 2) continue;
         sdm_fit_judge_add(
             v, side ? SDM_FIT_CHECK_INSIDE : SDM_FIT_CHECK_OUTSIDE, wider <= WIDER_MAX,
             SDM_FIT_DOUBTFUL, wider, WIDER_MAX,
-            "the values %s spread by %.3g, but most of them by %.3g only: a second material lies "
-            "there, or the maps are too coarse for the walls",
-            side ? "inside" : "outside", law[side]->sd, s->spread[side]);
+            "the values %s spread by %.3g, but most of them by %.3g only: %sa second material "
+            "lies there, or the maps are too coarse for the walls",
+            side ? "inside" : "outside", law[side]->sd, s->spread[side], lost);
     }
     const sdm_fit_law *near[2] = {nearest_law(&p->opts->appearance, law[0]->mean), given};
     double off[2];
@@ -316,9 +320,9 @@ static void check_tissues(const fit_problem *p, const fit_residuals *s, const sd
     sdm_fit_judge_add(
         v, SDM_FIT_CHECK_GIVEN, off[side] <= FIT_GIVEN_MAX, SDM_FIT_DOUBTFUL, off[side],
         FIT_GIVEN_MAX,
-        "the %s has the mean %.4g, the start %.4g: other values than those of this kind of image "
+        "the %s has the mean %.4g, the start %.4g: %sother values than those of this kind of image "
         "were given",
-        side ? "inside" : "outside", law[side]->mean, near[side]->mean);
+        side ? "inside" : "outside", law[side]->mean, near[side]->mean, lost);
 }
 
 // how deep inside the shape the border of its map is, mm; 0: the border is outside

@@ -172,6 +172,7 @@ static sdm_status show_result(cli_fit *f, const char *json, sdm_error *err)
         measured = cli_fit_measure(f, err); // the result is shown without measures, too
         s = cli_fit_make_map(f, err);
         if (!s) s = cli_fit_compare(f, err);
+        if (!s) s = cli_fit_compare_truth(f, err);
         if (!s) cli_fit_warn_mismatch(f);
         if (!s && write) s = cli_fit_write_files(f, err);
         if (!s) s = write_json(f, json, err);

@@ -85,6 +85,7 @@ typedef struct cli_fit {
     double *truth; /* [n_params] */
     bool has_truth_pose;
     sdm_pose truth_pose;
+    bool truth_same; /* the true rotation is another one with the same surface */
 
     /* fit_result.c */
     sdm_fit_result result;
@@ -184,6 +185,10 @@ sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err);
 /* Before the fit: fills f->truth and, where the file has one, f->truth_pose from the file of
  * --truth, if it is given. SDM_E_ARG: the truth of another shape; SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_truth(cli_fit *f, sdm_error *err);
+
+/* After cli_fit_make_map(): sets f->truth_same where the rotation of --truth is another one. Errors
+ * of making the map. */
+sdm_status cli_fit_compare_truth(cli_fit *f, sdm_error *err);
 
 /* After the fit: prints how far the pose is from that of --truth; adds it to a JSON object. Nothing
  * where the file has no pose. */

@@ -14,6 +14,11 @@
 
 enum { TRUTH_BYTES_MAX = 1 << 20 };
 
+/* Beyond this angle (degrees) a rotation may lead to the same surface of a symmetric shape; it does
+ * if both have this Dice coefficient. */
+#define TURNED_MIN 10.0
+#define SAME_DICE 0.96
+
 /* Degrees in a radian; variance of an angle that may be any, rad^2: pi^2 / 3. */
 static const double DEGREES = 57.295779513082321, ANY_ANGLE = 3.2898681336964529;
 
@@ -136,6 +141,58 @@ static double compare_pose(const cli_fit *f, double *degrees)
     return sqrt(v3_dist2(a, b));
 }
 
+/* The pose less the true one, over its standard deviations: sqrt(e^T C^-1 e / 6) with the
+ * differences e and the covariance C of rotation and translation; about 1 where the deviations are
+ * right. NaN: C is not positive definite, as that of a pose that was kept. */
+static double pose_in_sd(const cli_fit *f)
+{
+    enum { N = 6 };
+    const size_t n = f->n_params, size = n + N;
+    const sdm_pose inverse = sdm_pose_inverse(&f->truth_pose),
+                   between = sdm_pose_compose(&f->result.pose, &inverse);
+    double root[N][N], y[N], sum = 0;
+    for (size_t i = 0; i < N; i++) {
+        y[i] = i < 3 ? between.rotation[i]
+                     : f->result.pose.translation[i - 3] - f->truth_pose.translation[i - 3];
+        for (size_t j = 0; j <= i; j++) {
+            double c = f->result.covariance[(n + i) * size + n + j];
+            for (size_t k = 0; k < j; k++) c -= root[i][k] * root[j][k];
+            if (i == j && !(c > 0)) return NAN;
+            root[i][j] = i == j ? sqrt(c) : c / root[j][j];
+        }
+        for (size_t k = 0; k < i; k++) y[i] -= root[i][k] * y[k];
+        y[i] /= root[i][i];
+        sum += y[i] * y[i];
+    }
+    return sqrt(sum / N);
+}
+
+sdm_status cli_fit_compare_truth(cli_fit *f, sdm_error *err)
+{
+    const size_t n = sdm_grid_count(&f->map_grid);
+    double degrees, here[3], there[3], both = 0, all = 0;
+    float *turned = NULL;
+    if (!f->has_truth_pose) return SDM_OK;
+    (void)compare_pose(f, &degrees);
+    if (!(degrees > TURNED_MIN)) return SDM_OK;
+    // the fitted shape, turned as the true one, about its centre
+    sdm_pose pose = f->truth_pose;
+    sdm_pose_apply(&f->result.pose, f->pivot, here);
+    sdm_pose_apply(&pose, f->pivot, there);
+    for (int a = 0; a < 3; a++) pose.translation[a] += here[a] - there[a];
+    sdm_status s = SDM_ALLOC(&turned, n, "distance map", err);
+    if (!s)
+        s = sdm_fit_map(&f->map_source, f->result.params, &pose, &f->map_grid, f->opts.n_threads,
+                        turned, err);
+    for (size_t i = 0; i < n && !s; i++) {
+        both += f->map[i] < 0 && turned[i] < 0;
+        all += (f->map[i] < 0) + (turned[i] < 0);
+    }
+    f->truth_same = !s && 2 * both > SAME_DICE * all;
+    sdm_free(turned);
+    return s;
+}
+
 double cli_fit_truth_shift(const cli_fit *f)
 {
     double degrees;
@@ -148,9 +205,13 @@ void cli_fit_print_truth_pose(const cli_fit *f)
     if (!f->has_truth_pose) return;
     const double shift = compare_pose(f, &degrees);
     printf("  pose         off the truth by %.3g mm at the centre of the shape", shift);
-    if (isfinite(degrees))
+    const double sd = pose_in_sd(f);
+    if (f->truth_same)
+        printf("; the same surface, turned by %.3g degrees", degrees);
+    else if (isfinite(degrees))
         printf(" and %.3g degrees%s", degrees,
                *f->result.open_motions ? " of what is determined" : "");
+    if (isfinite(sd) && !f->truth_same) printf(", %.2g sd", sd);
     printf("\n");
 }
 
@@ -162,5 +223,7 @@ void cli_fit_json_truth_pose(const cli_fit *f, sdm_json *j)
     sdm_json_open(j, "truth_pose_error", '{');
     sdm_json_real(j, "centre_mm", shift);
     sdm_json_real(j, "rotation_deg", degrees);
+    sdm_json_real(j, "rms_sd", f->truth_same ? NAN : pose_in_sd(f));
+    sdm_json_bool(j, "same_surface", f->truth_same);
     sdm_json_close(j, '}');
 }

@@ -96,10 +96,14 @@ has '^  map voxels   passed '
 # the truth of the test image beside the estimate; that of another shape, and a file without parameters, are refused
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --truth truth.json
 has '^  rx .* \+- .* mm +truth 3\.5, off by [0-9.]+ sd$'
-has '^  pose         off the truth by 0\.[01][0-9]* mm at the centre of the shape and [0-9](\.[0-9]+)? degrees$'
+has '^  pose         off the truth by 0\.[01][0-9]* mm at the centre of the shape and [0-9](\.[0-9]+)? degrees, [0-2](\.[0-9]+)? sd$'
 printf '{"parameters": {"rx": 3.5}, "pose": {"rotation_rad": [0.1, -0.2, 0.3], "translation_mm": [20, -30, 11]}}' >shifted.json
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --truth shifted.json --json
 near "$(json centre_mm)" 1 0.15
+# half a turn about its own x axis leaves the ellipsoid where it is
+printf '{"parameters": {"rx": 3.5}, "pose": {"rotation_rad": [-2.99276, -0.454213, -0.302808], "translation_mm": [20, -30, 10]}}' >turned.json
+sdmgen fit $fit ct.nii.gz $near_truth --truth turned.json >out 2>err
+has 'at the centre of the shape; the same surface, turned by 1[678][0-9] degrees$'
 printf '{"parameters": {"rx": 3.5}, "pose": {"rotation_rad": [0.1, -0.2]}}' >pose.json
 expect 3 'pose\.json: .pose. needs .rotation_rad. and .translation_mm., three numbers each' sdmgen fit $fit ct.nii.gz $near_truth --truth pose.json
 expect 2 'truth\.json: the truth of another shape than .torus.: ellipsoid' sdmgen fit --shape torus ct.nii.gz $near_truth --truth truth.json

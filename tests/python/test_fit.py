@@ -89,7 +89,7 @@ def test_labels_and_points(run, ct, tmp_path):
     for target in (mesh.vertices, tmp_path / "points.npy"):
         compare(sdmgen.fit(shape, target, rotation=(0.1, 0, 0), spacing=0.8, threads=1, keep="appearance"), told)
     kept = sdmgen.fit(shape, mesh, params={"major": 2.4}, rotation=(0.1, 0, 0), keep=["major"], threads=1)
-    assert kept.params["major"] == 2.4 and kept.sd["major"] == 0 < kept.sd["minor"]
+    assert kept.params[0] == 2.4 and kept.sd[0] == 0 < kept.sd[1]
 
 
 def test_a_network(run, model, model_file, tmp_path):

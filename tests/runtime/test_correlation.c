@@ -106,7 +106,7 @@ static void test_correction_recovers_the_sum(void **state)
     (void)state;
     static double e[VOXELS], influence[UNKNOWNS * UNKNOWNS], c[FIT_LAG_ZERO + 1],
         weighted[FIT_LAG_ZERO + 1];
-    double sum = 0, square = 0, before = 0, after = 0, variance = 0;
+    double sum = 0, square = 0, before = 0, after = 0, variance = 0, spread = 0, freedom = 0;
     fit_neighbours v;
     make_neighbours(&v, influence);
     for (int k = -REACH; k <= REACH; k++) sum += kernel(k), square += kernel(k) * kernel(k);
@@ -115,17 +115,25 @@ static void test_correction_recovers_the_sum(void **state)
         int width;
         smooth_noise(seed, e);
         cosines_fit(&v, influence, e);
-        assert_int_equal(sdm_fit_correlation_estimate(&v, 1, 1, c, &width, NULL), SDM_OK);
+        double of_one;
+        assert_int_equal(sdm_fit_correlation_estimate(&v, 1, 1, c, &width, &of_one, NULL), SDM_OK);
         before += sdm_fit_correlation_taper(c, width, true, weighted) / FITS;
+        freedom += of_one / FITS;
         assert_int_equal(sdm_fit_correlation_correct(&v, influence, width, 1, c, NULL), SDM_OK);
-        after += sdm_fit_correlation_taper(c, width, true, weighted) / FITS;
+        const double found = sdm_fit_correlation_taper(c, width, true, weighted);
+        after += found / FITS;
+        spread += (found - wanted) * (found - wanted) / FITS;
         variance += c[FIT_LAG_ZERO] / FITS;
     }
-    printf("sum of correlations %.1f: %.1f of residuals, %.1f freed; variance %.3f\n", wanted,
-           before, after, variance);
+    printf("sum of correlations %.1f: %.1f of residuals, %.1f freed; variance %.3f, relative "
+           "variance of the sum %.3f, by the degrees of freedom %.3f\n",
+           wanted, before, after, variance, spread / (wanted * wanted), 2 / freedom);
     assert_true(before < 0.75 * wanted);
     assert_true(fabs(after / wanted - 1) < 0.12);
     assert_true(fabs(variance - 1) < 0.05);
+    // a sum of twelve squares is within a factor of 2.5 of its mean in 99 % of all cases
+    const double ratio = spread / (wanted * wanted) * 0.5 * freedom;
+    assert_true(ratio > 0.4 && ratio < 2.5);
     free_neighbours(&v);
 }
 
@@ -140,8 +148,9 @@ static void test_same_bits_for_threads(void **state)
     cosines_fit(&v, influence, e);
     for (int i = 0; i < 2; i++) {
         int width;
-        assert_int_equal(sdm_fit_correlation_estimate(&v, 0.2, 1 + 2 * i, c[i], &width, NULL),
-                         SDM_OK);
+        double freedom;
+        assert_int_equal(
+            sdm_fit_correlation_estimate(&v, 0.2, 1 + 2 * i, c[i], &width, &freedom, NULL), SDM_OK);
         assert_int_equal(sdm_fit_correlation_correct(&v, influence, width, 1 + 2 * i, c[i], NULL),
                          SDM_OK);
     }

@@ -43,9 +43,10 @@ static void group_choose(int first, int k, lag_group *g)
     }
 }
 
-// c[number]: weighted mean of e_n e_(n+lag) and e_n e_(n-lag) over the voxels list[n]
+// c[number]: weighted mean of e_n e_(n+lag) and e_n e_(n-lag) over the voxels list[n];
+// present[number]: sum of the weights
 static void group_means(const fit_neighbours *v, const uint32_t *list, size_t n, lag_group *g,
-                        double *c)
+                        double *c, double *present)
 {
     for (size_t l = 0; l < g->n; l++) g->sum[l] = g->weight[l] = 0;
     for (size_t k = 0; k < n; k++)
@@ -57,17 +58,45 @@ static void group_means(const fit_neighbours *v, const uint32_t *list, size_t n,
                 g->sum[l] += w * (double)v->residual[i] * (double)v->residual[j];
                 g->weight[l] += w;
             }
-    for (size_t l = 0; l < g->n; l++)
+    for (size_t l = 0; l < g->n; l++) {
         c[g->number[l]] = g->weight[l] > 0 ? g->sum[l] / g->weight[l] : 0;
+        present[g->number[l]] = g->weight[l];
+    }
+}
+
+// weight of a lag in the window
+static double lag_taper(const int lag[3], int width, bool flat)
+{
+    double w = 1;
+    for (int a = 0; a < 3; a++) {
+        const double fraction = fabs((double)lag[a]) / (double)(width + 1);
+        w *= flat ? fmin(fmax(2 - 2 * fraction, 0), 1) : fmax(1 - fraction, 0);
+    }
+    return w;
+}
+
+// sum over all lags of the squared weights in the flat window, times the part of the voxels that
+// has a neighbour there
+static double window_size(const double *present, int width)
+{
+    double sum = 1;
+    for (int number = 0; number < FIT_LAG_ZERO && present[FIT_LAG_ZERO] > 0; number++) {
+        int lag[3];
+        sdm_fit_lag_vector(number, lag);
+        const double w = sdm_fit_lag_length(lag) > width ? 0 : lag_taper(lag, width, true);
+        sum += 2 * w * w * present[number] / present[FIT_LAG_ZERO];
+    }
+    return sum;
 }
 
 /* Shells of lags of the same length, outwards. The half width of the window is twice the length of
  * the last shell before the first one whose sum does not exceed its standard error. */
 sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, int n_threads,
-                                        double *c, int *width, sdm_error *err)
+                                        double *c, int *width, double *freedom, sdm_error *err)
 {
     uint32_t *list = NULL;
     size_t n;
+    double present[FIT_LAG_ZERO + 1] = {0};
     const sdm_status s = sdm_fit_neighbours_pick(v, effort * LAG_VOXELS, &list, &n, err);
     (void)n_threads; // unused without OpenMP
     *width = FIT_LAG_MAX;
@@ -78,7 +107,7 @@ sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, 
         for (int first = 0; first <= FIT_LAG_ZERO; first += LAG_GROUP) {
             lag_group g;
             group_choose(first, k, &g);
-            group_means(v, list, n, &g, c);
+            group_means(v, list, n, &g, c, present);
         }
         double sum = 0, lags = 0;
         for (int number = 0; number <= FIT_LAG_ZERO; number++) {
@@ -93,18 +122,8 @@ sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, 
             *width = 2 * (k - 1) < FIT_LAG_MAX ? 2 * (k - 1) : FIT_LAG_MAX - 1;
     }
     sdm_free(list);
+    *freedom = s ? 0 : (double)n / window_size(present, *width);
     return s;
-}
-
-// weight of a lag in the window
-static double lag_taper(const int lag[3], int width, bool flat)
-{
-    double w = 1;
-    for (int a = 0; a < 3; a++) {
-        const double fraction = fabs((double)lag[a]) / (double)(width + 1);
-        w *= flat ? fmin(fmax(2 - 2 * fraction, 0), 1) : fmax(1 - fraction, 0);
-    }
-    return w;
 }
 
 double sdm_fit_correlation_taper(const double *c, int width, bool flat, double *tapered)

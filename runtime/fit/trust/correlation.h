@@ -9,9 +9,13 @@
 /* c: C(lag) = mean of e_n e_(n+lag) of the residuals e, weighted; C(0), the variance of residuals,
    is about 1. *width: half width, in steps, of the window of lags whose correlations stand out from
    their error; c is 0 beyond the lags that were examined. effort, 0 .. 1: part of the voxel pairs
-   that is used. n_threads >= 1. */
+   that is used. n_threads >= 1.
+
+   *freedom: degrees of freedom of the sum of the correlations in the window, number of voxels over
+   sum of the squared weights of the lags (Priestley 1981): its relative variance is 2 / *freedom.
+ */
 sdm_status sdm_fit_correlation_estimate(const fit_neighbours *v, double effort, int n_threads,
-                                        double *c, int *width, sdm_error *err);
+                                        double *c, int *width, double *freedom, sdm_error *err);
 
 /* Turns c from the autocorrelation of the residuals into that of the errors. Residuals are errors
    less the part that the fit could explain, mostly the part that is constant over many voxels, so

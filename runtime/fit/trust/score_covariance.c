@@ -25,6 +25,8 @@
 // limit on the number of voxel pairs: the sum over n runs over a subsample of the voxels that gives
 // about this number
 #define PAIRS 30000000
+// least degrees of freedom of the correlations
+#define FREEDOM_MIN 6.0
 // part of PAIRS for a rough estimate
 #define ROUGH 0.2
 
@@ -116,6 +118,14 @@ static sdm_status noise_add(const fit_problem *p, const fit_neighbours *v, const
     return s;
 }
 
+// The correlations are estimated, too: with `freedom` degrees of freedom an error follows Student's
+// t, whose variance is larger by freedom / (freedom - 2).
+static void noise_widen(double *noise, size_t n, double freedom)
+{
+    const double most = fmax(freedom, FREEDOM_MIN);
+    for (size_t i = 0; i < n * n; i++) noise[i] *= most / (most - 2);
+}
+
 // adds the covariance caused by map errors that are constant within cubes of this edge (mm) and
 // independent between cubes
 static sdm_status model_error_add(const fit_problem *p, const fit_neighbours *v, double edge,
@@ -159,12 +169,15 @@ static sdm_status voxels_covariance(const fit_problem *p, double model_mm, const
     const int n_threads = sdm_threads(p->opts->n_threads);
     if (!s) {
         int width;
-        s = sdm_fit_correlation_estimate(&v, influence ? 1 : ROUGH, n_threads, c, &width, err);
+        double freedom;
+        s = sdm_fit_correlation_estimate(&v, influence ? 1 : ROUGH, n_threads, c, &width, &freedom,
+                                         err);
         double tapered[FIT_LAG_ZERO + 1];
         if (!s) out->noise_factor = sdm_fit_correlation_taper(c, width, true, tapered);
         if (!s && influence)
             s = sdm_fit_correlation_correct(&v, influence, width, n_threads, c, err);
         if (!s) s = noise_add(p, &v, c, width, n_threads, influence, out, err);
+        if (!s && influence && !p->given_labels) noise_widen(out->noise, v.n_unknowns, freedom);
     }
     if (!s && model_mm > 0) s = model_error_add(p, &v, model_mm, out->model, err);
     if (!s && influence && p->given_labels) s = sdm_fit_label_steps(p, &v, out->noise, err);

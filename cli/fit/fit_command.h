@@ -243,7 +243,8 @@ enum { FIT_WORDS_MAX = 80 };
 void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX]);
 
 /* After a trustworthy fit whose maps are doubtful, coarse or a network's: prints the command that
- * goes on from its result with exact maps of the voxels that are needed. */
+ * goes on from its result with exact maps of the voxels that are needed. After a fit that only
+ * stopped too early: prints the command that goes on with more iterations. */
 void cli_fit_print_next(const cli_fit *f);
 
 /* Prints the verdict as text; adds it to a JSON object. */

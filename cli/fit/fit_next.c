@@ -1,4 +1,4 @@
-/* The command that goes on from a fit with finer or exact maps. */
+/* The command that goes on from a fit: with finer or exact maps, or with more iterations. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,22 +6,40 @@
 #include "args/shell_word.h"
 #include "fit_command.h"
 
-/* Options that say where a fit starts, which maps it takes and what it writes: the command has its
- * own. */
-static const char *const LEFT_OUT[] = {
-    "param",   "rotation", "translation",  "start-centre", "start-axis", "start-points",
-    "turns",   "find",     "turns-sphere", "candidates",   "exact",      "polish",
-    "spacing", "output",   "label-out",    "json",         "report",     "returnparameterfile",
-    "force",   "quiet"};
+/* Options that say where a fit starts and what it writes, or which maps it takes: the command has
+ * its own. */
+static const char *const STARTS[] = {
+    "param",  "rotation",     "translation",   "start-centre", "start-axis",
+    "turns",  "start-points", "find",          "turns-sphere", "candidates",
+    "output", "label-out",    "json",          "report",       "returnparameterfile",
+    "force",  "quiet",        "max-iterations"};
+static const char *const MAPS[] = {"exact", "polish", "spacing"};
 
 /* Before the edge of the voxels that the check of the maps advises, in its text. */
 static const char ADVICE[] = "exact maps with voxels of ";
 
-static bool is_left_out(const char *name)
+/* Fewer iterations are no end of a fit. */
+enum { FEW = 60 };
+
+static bool is_left_out(const char *name, bool same_maps)
 {
-    for (size_t i = 0; i < sizeof LEFT_OUT / sizeof *LEFT_OUT; i++)
-        if (!strcmp(name, LEFT_OUT[i])) return true;
+    for (size_t i = 0; i < sizeof STARTS / sizeof *STARTS; i++)
+        if (!strcmp(name, STARTS[i])) return true;
+    for (size_t i = 0; i < sizeof MAPS / sizeof *MAPS && !same_maps; i++)
+        if (!strcmp(name, MAPS[i])) return true;
     return false;
+}
+
+/* Did the fit stop at the largest number of iterations, with nothing else against it? */
+static bool is_unfinished(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    size_t failed = 0;
+    for (size_t i = 0; i < v->n_findings; i++)
+        failed += v->findings[i].grade == SDM_FIT_FAILED &&
+                  v->findings[i].kind != SDM_FIT_CHECK_CONVERGED;
+    return v->n_findings && !failed && !f->result.converged &&
+           f->result.n_iterations >= f->opts.max_iterations;
 }
 
 /* The finding of this kind where it is doubtful, else NULL. */
@@ -53,8 +71,9 @@ void cli_fit_print_next(const cli_fit *f)
     const cli_args *a = f->args;
     const sdm_fit_result *r = &f->result;
     const sdm_fit_finding *voxels = doubtful(f, SDM_FIT_CHECK_VOXELS);
-    if (f->doubt.status || f->other_side || f->n_candidates || a->cohort.cases ||
-        (!voxels && !doubtful(f, SDM_FIT_CHECK_NETWORK_ERROR)))
+    const bool more = is_unfinished(f);
+    if ((f->doubt.status && !more) || f->other_side || f->n_candidates || a->cohort.cases ||
+        (!voxels && !more && !doubtful(f, SDM_FIT_CHECK_NETWORK_ERROR)))
         return;
     sdm_text t = {0};
     char text[96];
@@ -65,15 +84,17 @@ void cli_fit_print_next(const cli_fit *f)
     }
     for (size_t i = 0; i < a->n_given; i++) {
         const cli_option *o = a->given[i].option;
-        if (is_left_out(o->name)) continue;
+        if (is_left_out(o->name, more)) continue;
         if (o->kind == CLI_FLAG) {
             sdm_text_add(&t, " --%s", o->name);
         } else {
             add_option(&t, o->name, a->given[i].value);
         }
     }
-    if (f->model_path) sdm_text_add(&t, " --exact");
-    const char *advice = voxels ? strstr(voxels->text, ADVICE) : NULL;
+    if (f->model_path && !more) sdm_text_add(&t, " --exact");
+    const size_t iterations = 4 * f->opts.max_iterations;
+    if (more) sdm_text_add(&t, " --max-iterations=%zu", iterations > FEW ? iterations : FEW);
+    const char *advice = voxels && !more ? strstr(voxels->text, ADVICE) : NULL;
     if (advice) {
         snprintf(text, sizeof text, "%g", strtod(advice + strlen(ADVICE), NULL));
         add_option(&t, "spacing", text);
@@ -85,6 +106,8 @@ void cli_fit_print_next(const cli_fit *f)
     }
     add_three(&t, "rotation", r->pose.rotation);
     add_three(&t, "translation", r->pose.translation);
-    if (!t.failed) printf("finer maps from here, without a search:\n  %s\n", t.data);
+    if (!t.failed)
+        printf("%s from here, without a search:\n  %s\n", more ? "more iterations" : "finer maps",
+               t.data);
     sdm_text_dispose(&t);
 }

@@ -4,6 +4,7 @@
 
 #include "fit_command.h"
 #include "report/terminal.h"
+#include "sdm/internal/text.h"
 #include "sdm/memory.h"
 
 static sdm_fit_law make_law(const double given[2], double weight)
@@ -57,6 +58,16 @@ void cli_fit_notice_kept(const cli_fit *f)
         cli_notice("--keep parameters without -p: the parameters keep their default values");
 }
 
+/* The parameter whose name is like this one; NULL: none is. */
+static const char *nearest_param(const cli_fit *f, const char *name)
+{
+    enum { NAMES = 64 };
+    const char *names[NAMES];
+    const size_t n = f->n_params < NAMES ? f->n_params : NAMES;
+    for (size_t k = 0; k < n; k++) names[k] = f->params[k].name;
+    return sdm_nearest_name(name, names, n);
+}
+
 /* Marks the parameter of this name in f->kept; false: there is none. */
 static bool keep_named(cli_fit *f, const char *name)
 {
@@ -83,16 +94,19 @@ static sdm_status read_keep(cli_fit *f, sdm_error *err)
     for (size_t i = 0; i < words->n; i++) {
         size_t k = 0;
         while (k < 4 && strcmp(words->items[i], known[k].name)) k++;
-        if (k < 4)
+        if (k < 4) {
             *known[k].field = true;
-        else if (keep_named(f, words->items[i]))
+        } else if (keep_named(f, words->items[i])) {
             o->kept = f->kept;
-        else
+        } else {
+            const char *near = nearest_param(f, words->items[i]);
             return sdm_fail(err, SDM_E_ARG,
-                            "--keep '%.100s': need one of parameters|pose|blur|appearance, or the "
-                            "name of a parameter of '%s' (%s lists them)",
-                            words->items[i], f->shape_name,
+                            "--keep '%.100s'%s%s%s: need one of parameters|pose|blur|appearance, "
+                            "or the name of a parameter of '%s' (%s lists them)",
+                            words->items[i], near ? ", did you mean '" : "", near ? near : "",
+                            near ? "'?" : "", f->shape_name,
                             f->model ? "`sdmgen info MODEL`" : "`sdmgen shapes NAME`");
+        }
     }
     for (size_t k = 0; k < f->n_params; k++) n_kept += f->kept[k];
     if (n_kept == f->n_params) o->keep_params = true;

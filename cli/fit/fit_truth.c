@@ -143,7 +143,8 @@ static double compare_pose(const cli_fit *f, double *degrees)
 
 /* The pose less the true one, over its standard deviations: sqrt(e^T C^-1 e / 6) with the
  * differences e and the covariance C of rotation and translation; about 1 where the deviations are
- * right. NaN: C is not positive definite, as that of a pose that was kept. */
+ * right. NaN: C is not positive definite, as that of a pose that was kept, or a motion is open: the
+ * axis of an open rotation is not known exactly, so a large turn about it hides small errors. */
 static double pose_in_sd(const cli_fit *f)
 {
     enum { N = 6 };
@@ -151,6 +152,7 @@ static double pose_in_sd(const cli_fit *f)
     const sdm_pose inverse = sdm_pose_inverse(&f->truth_pose),
                    between = sdm_pose_compose(&f->result.pose, &inverse);
     double root[N][N], y[N], sum = 0;
+    if (*f->result.open_motions) return NAN;
     for (size_t i = 0; i < N; i++) {
         y[i] = i < 3 ? between.rotation[i]
                      : f->result.pose.translation[i - 3] - f->truth_pose.translation[i - 3];
@@ -210,7 +212,7 @@ void cli_fit_print_truth_pose(const cli_fit *f)
         printf("; the same surface, turned by %.3g degrees", degrees);
     else if (isfinite(degrees))
         printf(" and %.3g degrees%s", degrees,
-               *f->result.open_motions ? " of what is determined" : "");
+               *f->result.open_motions ? " of the open axis, as far as the fit knows it" : "");
     if (isfinite(sd) && !f->truth_same) printf(", %.2g sd", sd);
     printf("\n");
 }

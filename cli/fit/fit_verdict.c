@@ -102,6 +102,11 @@ void cli_fit_print_verdict(const cli_fit *f)
     const sdm_fit_verdict *v = &f->result.verdict;
     if (!v->n_findings) return;
     printf("verdict: %s\n", cli_fit_grade_name(v->grade));
+    if (f->source.model && !f->shape && !f->judge_shape)
+        printf("  %-12s not tested: the exact shape '%s' is not known here or has changed, so the "
+               "error of the network is not measured, and the standard deviations may be too "
+               "small; load its plug-in (--plugin FILE)\n",
+               sdm_fit_check_name(SDM_FIT_CHECK_NETWORK_ERROR), f->shape_name);
     // the worst first
     for (int grade = SDM_FIT_FAILED; grade >= SDM_FIT_PASSED; grade--)
         for (size_t i = 0; i < v->n_findings; i++)

@@ -236,6 +236,8 @@ within rx 3.5 4
 expect 4 'not converged after 1 iterations.*; --max-iterations 1 ended it too early to judge the fit.*; no file was written' sdmgen fit $fit ct.nii.gz $near_truth --max-iterations 1 -o no.stl ${vdb:+-o no.vdb}
 has 'NOT TO BE TRUSTED'
 has 'NOT CONVERGED'
+has '^more iterations from here, without a search:$'
+eval "$(sed -n 's/^  sdmgen fit ct/expect 0 - sdmgen fit ct/p' out)"
 expect 4 'not converged' sdmgen fit $fit ct.nii.gz $near_truth --max-iterations 1 -o forced.json --json --force
 [ "$(json trusted)" = false ] || bad 'a fit that failed must be marked'
 present forced.json
@@ -301,6 +303,7 @@ expect 2 'one of --rotation, --start-axis' sdmgen fit $fit ct.nii.gz --rotation 
 expect 2 'one of --translation, --start-centre' sdmgen fit $fit ct.nii.gz --translation 0,0,0 --start-centre 0,0,0
 expect 2 'one of --turns and --turns-sphere' sdmgen fit $fit ct.nii.gz --turns 3 --turns-sphere 3
 expect 2 'reference-label needs --reference FILE' sdmgen fit $fit ct.nii.gz --reference-label 1
+expect 2 "keep 'rxx', did you mean 'rx'\?: need one of" sdmgen fit $fit ct.nii.gz --keep rxx
 expect 2 "keep 'shape': need one of .*, or the name of a parameter of 'ellipsoid'" sdmgen fit $fit ct.nii.gz --keep shape
 expect 2 'leave nothing to fit' sdmgen fit $fit ct.nii.gz --keep parameters --keep pose
 expect 2 'standard deviations above 0' sdmgen fit $fit ct.nii.gz --inside 40,0

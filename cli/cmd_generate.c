@@ -202,6 +202,21 @@ static void warn_label_volumes(const job *j)
         cli_warn("%s: %s", j->args->files.items[0], why.text);
 }
 
+/* Maps and points hold distances far from the surface, too. */
+static void warn_far(const job *j)
+{
+    static const char *const maps[] = {".nii", ".nii.gz", ".nrrd", ".mha", ".npy"};
+    const char *line = strstr(j->info->quality.unfit, "distances far from the surface");
+    bool far = j->args->points;
+    for (size_t i = 0; i < j->args->outputs.n; i++)
+        for (size_t k = 0; k < sizeof maps / sizeof *maps; k++)
+            far = far || (cli_ends_with(j->args->outputs.items[i], maps[k]) &&
+                          !cli_ends_with(j->args->outputs.items[i], ".seg.nrrd"));
+    if (far && line)
+        cli_warn("%s: the training found the model not good for %.*s; nearer ones are right",
+                 j->args->files.items[0], (int)strcspn(line, "\n"), line);
+}
+
 /* Chooses the grid. On another grid than the model's, level sets alone need no whole maps. */
 static sdm_status choose_grid(job *j, sdm_error *err)
 {
@@ -269,6 +284,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     if (!s) s = choose_grid(j, err);
     if (!s) cli_warn_thin_model(args->files.items[0], j->info, &j->grid);
     if (!s) warn_label_volumes(j);
+    if (!s) warn_far(j);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
@@ -615,21 +631,45 @@ static void notice_between(const job *j, const char *measure)
                    rmse, between, measure);
 }
 
+/* Is x between the centres of the first and the last voxels? */
+static bool in_box(const sdm_grid *g, const double x[3])
+{
+    double index[3];
+    bool in = true;
+    sdm_grid_index(g, x, index);
+    for (int a = 0; a < 3; a++) in = in && index[a] >= 0 && index[a] <= (double)(g->n[a] - 1);
+    return in;
+}
+
 /* Where two parts of the surface are equally far, as in the middle of a handle, the distance has a
  * ridge. A network rounds it off: its gradient is short there, and its distance too small. */
-static void notice_ridges(const point_answers *a)
+static void notice_ridges(const job *j, const point_answers *a)
 {
     enum { PERCENT = 70 };
     size_t n = 0;
     for (size_t i = 0; i < a->n; i++) {
         const float *g = a->gradient + 3 * i;
-        n += 1e4f * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) < PERCENT * PERCENT;
+        n += in_box(&j->info->grid, a->x + 3 * i) &&
+             1e4f * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) < PERCENT * PERCENT;
     }
     if (n)
         cli_notice("at %zu of %zu points the gradient is shorter than 0.%d: they lie about in the "
-                   "middle between two parts of the surface, where distances of a network are too "
-                   "small; the errors that the training states are those near the surface",
+                   "middle between two parts of the surface, where distances of a network are "
+                   "wrong, mostly too small; the errors that the training states are those near "
+                   "the surface",
                    n, a->n, PERCENT / 10);
+}
+
+/* --outside bound gives less than the distance beyond the box of the network. */
+static void notice_bounds(const job *j, const point_answers *a)
+{
+    size_t n = 0;
+    if (cli_outside(j->args) != SDM_OUTSIDE_BOUND) return;
+    for (size_t i = 0; i < a->n; i++) n += !in_box(&j->info->grid, a->x + 3 * i);
+    if (n)
+        cli_notice("%zu of %zu points lie outside of the box of the network: their values are "
+                   "lower bounds of the distance (--outside exact computes distances)",
+                   n, a->n);
 }
 
 /* Does the work of --points. */
@@ -640,6 +680,7 @@ static sdm_status run_points(job *j, sdm_error *err)
     sdm_result result = {0};
     sdm_status s = cli_points_check_model(j->args, &table, err);
     if (!s) s = open_model(j, err);
+    if (!s) warn_far(j);
     if (!s) s = read_rows(j, err);
     if (!s) s = open_shape(j, err);
     if (!s) s = check_rows(j, err);
@@ -650,7 +691,8 @@ static sdm_status run_points(job *j, sdm_error *err)
     if (!s && result.clamped) notice_clamped(j, 0);
     if (!s) notice_row(j, 0, &result);
     if (!s) s = write_points(j, &a, &table, err);
-    if (!s && result.source != SDM_SOURCE_EXACT) notice_ridges(&a);
+    if (!s && result.source != SDM_SOURCE_EXACT) notice_ridges(j, &a);
+    if (!s && result.source != SDM_SOURCE_EXACT) notice_bounds(j, &a);
     if (!s && result.source != SDM_SOURCE_EXACT)
         notice_between(j, "sdmgen exact --points computes exact distances");
     cli_points_dispose(&table);

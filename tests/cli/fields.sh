@@ -44,6 +44,10 @@ printf 'x,y,z\n-6,-5.2,-4.4\n0.1,0.2,0.3\n' >points.csv
 expect 0 'stated error, RMSE .*sdmgen exact --points computes exact distances' sdmgen generate $model -p a=4.2 --points points.csv --columns distance,gradient -o at.csv -o at.npy --jacobian slopes.npy
 [ "$(head -n 1 at.csv)" = x,y,z,distance,gradient_x,gradient_y,gradient_z ] || bad 'points: wrong header'
 [ "$(wc -l <at.csv)" -eq 3 ] || bad 'points: wrong number of rows'
+echo '0,0,100' >far.csv
+sdmgen generate $model -p a=4.2 --points far.csv -o far_bound.csv --outside bound >out 2>err || bad "a point far away: $(cat err)"
+grep -q '1 of 1 points lie outside of the box of the network: their values are lower bounds' err || bad "a bound that is not told: $(cat err)"
+[ "$(grep -c 'gradient is shorter' err)" -eq 0 ] || bad "a ridge beyond the box: $(cat err)"
 expect 0 - sdmgen generate $model -p a=4.2 --points points.csv -o one.csv --outside bound --quiet
 printf 'x,y,z\n0,0,0\n\n90,1,1\n' >far.csv
 expect 5 'far\.csv:4: point 2 of 2 \(90, 1, 1\) mm lies outside of the box' sdmgen generate $model --points far.csv -o x.csv

@@ -346,6 +346,12 @@ static void turns_share_the_budget(void **state)
     const training_turns r = {.first = near};
     const turn_figures figures = trainer_turn_figures(SDM_NETWORK_TEMPLATE, &near);
     assert_true(trainer_score(&figures) == 5 && trainer_second_wins(&r, &far));
+    // the better grade wins with a worse score, too
+    sdm_train_report usable = far;
+    usable.verdict.grade = SDM_GRADE_USABLE;
+    const training_turns good = {.first = near},
+                         poor = {.first = {.verdict = {.grade = SDM_GRADE_POOR}}};
+    assert_true(!trainer_second_wins(&good, &usable) && trainer_second_wins(&poor, &usable));
     sdm_text metrics = {0};
     const trainer t = {.metrics = &metrics};
     history h;

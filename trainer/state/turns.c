@@ -59,6 +59,8 @@ double trainer_score(const turn_figures *f) { return hypot(f->rmse_voxel_mm, 0.1
 
 bool trainer_second_wins(const training_turns *r, const sdm_train_report *second)
 {
+    const int before = (int)r->first.verdict.grade, now = (int)second->verdict.grade;
+    if (now != before) return now < before;
     const turn_figures a = trainer_turn_figures(r->kind[0], &r->first),
                        b = trainer_turn_figures(r->kind[1], second);
     return trainer_score(&b) < trainer_score(&a);

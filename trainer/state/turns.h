@@ -41,7 +41,8 @@ turn_figures trainer_turn_figures(sdm_network_kind kind, const sdm_train_report 
    mean square error within a voxel of the surface and a hundredth of that of all voxels. */
 double trainer_score(const turn_figures *f);
 
-/* true if the second kind with this result is better than the first. */
+/* true if the second kind with this result has a better grade than the first, or the same and a
+   smaller score. */
 bool trainer_second_wins(const training_turns *r, const sdm_train_report *second);
 
 /* Appends a line with phase "auto" to *metrics: `kind` is trained next, or kept; then: the kind to

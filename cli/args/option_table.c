@@ -27,7 +27,8 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "folder: config.yaml (resolved), metrics.jsonl, checkpoint.sdmc, model.sdm, loss.png\n"
      "and slices.png.\n"
      "key=value overrides a key of the configuration, e.g. network.depth=4.\n"
-     "An interrupt (Ctrl-C) writes a checkpoint and stops; a second one stops at once.\n"
+     "An interrupt (Ctrl-C) writes a checkpoint and stops (before the maps are made there is\n"
+     "nothing to go on from); a second one stops at once.\n"
      "A folder that holds a model or a checkpoint stays unchanged unless --resume or --force\n"
      "is given.",
      "sdmgen train configs/cochlea.yaml train.minutes=5 --out runs/short", 1, SIZE_MAX},

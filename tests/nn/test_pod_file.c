@@ -79,6 +79,8 @@ static void file_keeps_everything(void **state)
     remove(path);
     assert_int_equal(sdm_model_open(path, &m, &e), SDM_E_IO);
     assert_null(m);
+    assert_int_equal(sdm_model_open(NULL, &m, &e), SDM_E_ARG);
+    assert_int_equal(sdm_model_open(path, NULL, &e), SDM_E_ARG);
     sdm_free(bytes);
     sdm_free(t.memory);
 }

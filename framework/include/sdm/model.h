@@ -51,10 +51,11 @@ typedef struct sdm_model_quality {
     /* of the mesh at the default parameters, the sum over its triangles; NaN: not known. A shape
        with others is not the one of the training (sdm_runtime_instance()). */
     double mesh_volume_mm3, mesh_area_mm2;
-    /* On a few held-out shapes, root mean square over the right value; NaN: not known. Of the
-       volume of a map (sdm_map_volume()); and, for the parameter for which they are largest: of the
-       derivatives of the map within half a voxel of the surface, and of the derivative of
-       the volume. */
+    /* Root mean square over that of the right values; NaN: not known. On up to 20 held-out shapes:
+       of the volume of a map (sdm_map_volume()). On up to four, so only a rough figure, and for the
+       parameter for which they are largest: of the derivatives of the map within half a voxel of
+       the surface, and of the derivative of the volume, where a parameter that changes the volume
+       by less than 5 % over its range counts as if it changed it by 5 %. */
     double volume_error, derivative_error, volume_derivative_error;
     /* as mesh_volume_mm3 and mesh_area_mm2, at three other parameter vectors; NaN: not known */
     double probe_volume_mm3[SDM_MODEL_PROBES], probe_area_mm2[SDM_MODEL_PROBES];
@@ -109,7 +110,8 @@ typedef struct sdm_model sdm_model;
 /* *out = the model of a file, to be freed with sdm_model_free(); NULL on error. All checksums are
    verified, and all sizes are compared with the length of the file before memory is allocated.
    SDM_E_IO: the file cannot be read. SDM_E_FORMAT: it is not a model, is damaged or truncated, is a
-   checkpoint, or has another format version. SDM_E_NOMEM. [any thread] */
+   checkpoint, or has another format version. SDM_E_ARG: path or out is NULL. SDM_E_NOMEM.
+   [any thread] */
 SDM_API sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
 
 /* The same for the content of a file, bytes[size], which is copied. `name` stands for the file in

@@ -26,7 +26,9 @@ sdm_status sdm_model_open_memory(const char *name, const uint8_t *bytes, size_t 
 
 sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err)
 {
+    if (!out) return sdm_fail(err, SDM_E_ARG, "model: a place for it is needed");
     *out = NULL;
+    if (!path) return sdm_fail(err, SDM_E_ARG, "model: the name of a file is needed");
     uint8_t *bytes;
     size_t size;
     sdm_status s = sdm_file_read(path, MODEL_BYTES_MAX, &bytes, &size, err);

@@ -10,6 +10,7 @@
 #include "report/json_values.h"
 #include "report/report_audit.h"
 #include "report/report_image.h"
+#include "report/report_verdict.h"
 #include "report/terminal.h"
 #include "sdm/internal/distribution.h"
 #include "sdm/internal/file.h"
@@ -17,13 +18,6 @@
 #include "sdm/memory.h"
 #include "sdm/model.h"
 #include "ssm/report_ssm.h"
-
-/* The uses for which the model is not good, as the training said them. */
-static void print_unfit(const sdm_model_quality *q)
-{
-    for (const char *at = q->unfit; *at; at += strcspn(at, "\n") + 1)
-        cli_print("%-12s %.*s\n", at == q->unfit ? "not for" : "", (int)strcspn(at, "\n"), at);
-}
 
 static void print_model(const char *path, const sdm_model *model)
 {
@@ -57,7 +51,7 @@ static void print_model(const char *path, const sdm_model *model)
         "%.5f mm\n",
         a->q50_mm, a->q90_mm, a->q99_mm);
     cli_print_quality(m);
-    print_unfit(&m->quality);
+    cli_print_unfit(m->quality.unfit, "not for", 12);
     cli_print("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
               (long long)m->train_samples, (unsigned long long)m->seed, m->version);
     if (m->fine_width) cli_print("fine level   %zu units a layer (docs/grids.md)\n", m->fine_width);

@@ -7,9 +7,9 @@
  * read. */
 sdm_model *cli_model_before(const char *folder);
 
-/* RMSE of `before` on its held-out shapes, mm, if the new model in the file `path` has the same
-   shape, ranges, distributions and grid, so that both errors can be compared; else NaN. before may
-   be NULL. */
+/* The root mean square error that the model `before` states for its held-out shapes, mm. NaN: it
+   cannot be compared with that of the new model in the file `path`, because shape, options, ranges,
+   distributions or grid differ, or `before` is NULL. */
 double cli_before_rmse(const sdm_model *before, const char *path);
 
 /* Prints the line `before` of the end of a training: both errors, and which is smaller. */

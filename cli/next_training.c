@@ -8,18 +8,11 @@
 #include "args/shell_word.h"
 #include "sdm/internal/text.h"
 
-/* Appends " word" to a command. */
-static void add_word(sdm_text *command, const char *word)
-{
-    sdm_text_add(command, " ");
-    cli_add_shell_word(command, word);
-}
-
-/* Appends an option and its value. */
+/* Appends an option and its value to a command. */
 static void add_option(sdm_text *command, const char *option, const char *value)
 {
-    add_word(command, option);
-    add_word(command, value);
+    cli_add_next_word(command, option);
+    cli_add_next_word(command, value);
 }
 
 /* The same with a number, which is 0 where the option was not given. */
@@ -50,20 +43,20 @@ static void add_changes(sdm_text *command, const cli_args *args, const sdm_verdi
         if (!(grid && sets_key(word, "grid")) && !(v->key[0] && sets_key(word, v->key)) &&
             !(budget && sets_key(word, "train.minutes")) &&
             !(kind && sets_key(word, "network.kind")))
-            add_word(command, word);
+            cli_add_next_word(command, word);
     }
-    if (grid) add_word(command, "grid=auto");
+    if (grid) cli_add_next_word(command, "grid=auto");
     if (v->key[0]) {
         snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
-        add_word(command, change);
+        cli_add_next_word(command, change);
     }
     if (budget) {
         snprintf(change, sizeof change, "train.minutes=%.6g", v->minutes);
-        add_word(command, change);
+        cli_add_next_word(command, change);
     }
     if (!kind) return;
     snprintf(change, sizeof change, "network.kind=%s", kind);
-    add_word(command, change);
+    cli_add_next_word(command, change);
 }
 
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
@@ -80,7 +73,7 @@ void cli_print_next(const cli_args *args, const sdm_train_report *r, const char 
     add_changes(&command, args, v, kind);
     for (size_t i = 0; i < args->plugins.n; i++)
         add_option(&command, "--plugin", args->plugins.items[i]);
-    if (args->isolate) add_word(&command, "--isolate");
+    if (args->isolate) cli_add_next_word(&command, "--isolate");
     add_number(&command, "--isolate-seconds", args->isolate_seconds);
     add_number(&command, "--isolate-memory", args->isolate_memory);
     add_number(&command, "--ranks", (double)args->ranks);

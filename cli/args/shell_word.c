@@ -15,3 +15,9 @@ void cli_add_shell_word(sdm_text *t, const char *word)
     for (; *word; word++) sdm_text_add(t, *word == '\'' ? "'\\''" : "%c", *word);
     sdm_text_add(t, "'");
 }
+
+void cli_add_next_word(sdm_text *command, const char *word)
+{
+    sdm_text_add(command, " ");
+    cli_add_shell_word(command, word);
+}

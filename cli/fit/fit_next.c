@@ -15,12 +15,6 @@ static const char *const STARTS[] = {
     "force",  "quiet",        "max-iterations"};
 static const char *const MAPS[] = {"exact", "polish", "spacing"};
 
-/* Before the edge of the voxels that the check of the maps advises, in its text. */
-static const char ADVICE[] = "exact maps with voxels of ";
-
-/* Fewer iterations are no end of a fit. */
-enum { FEW = 60 };
-
 static bool is_left_out(const char *name, bool same_maps)
 {
     for (size_t i = 0; i < sizeof STARTS / sizeof *STARTS; i++)
@@ -78,10 +72,7 @@ void cli_fit_print_next(const cli_fit *f)
     sdm_text t = {0};
     char text[96];
     sdm_text_add(&t, "sdmgen fit");
-    for (size_t i = 0; i < a->files.n; i++) {
-        sdm_text_add(&t, " ");
-        cli_add_shell_word(&t, a->files.items[i]);
-    }
+    for (size_t i = 0; i < a->files.n; i++) cli_add_next_word(&t, a->files.items[i]);
     for (size_t i = 0; i < a->n_given; i++) {
         const cli_option *o = a->given[i].option;
         if (is_left_out(o->name, more)) continue;
@@ -92,17 +83,16 @@ void cli_fit_print_next(const cli_fit *f)
         }
     }
     if (f->model_path && !more) sdm_text_add(&t, " --exact");
-    const size_t iterations = 4 * f->opts.max_iterations;
-    if (more) sdm_text_add(&t, " --max-iterations=%zu", iterations > FEW ? iterations : FEW);
-    const char *advice = voxels && !more ? strstr(voxels->text, ADVICE) : NULL;
-    if (advice) {
-        snprintf(text, sizeof text, "%g", strtod(advice + strlen(ADVICE), NULL));
+    const size_t iterations = 4 * f->opts.max_iterations, usual = sdm_fit_defaults().max_iterations;
+    if (more) sdm_text_add(&t, " --max-iterations=%zu", iterations > usual ? iterations : usual);
+    if (voxels && !more) {
+        snprintf(text, sizeof text, "%.2g", r->advised_voxel_mm);
         add_option(&t, "spacing", text);
     }
     for (size_t i = 0; i < f->n_params; i++) {
         snprintf(text, sizeof text, "%.60s=%.7g", f->params[i].name, r->params[i]);
-        sdm_text_add(&t, " -p ");
-        cli_add_shell_word(&t, text);
+        sdm_text_add(&t, " -p");
+        cli_add_next_word(&t, text);
     }
     add_three(&t, "rotation", r->pose.rotation);
     add_three(&t, "translation", r->pose.translation);

@@ -59,7 +59,8 @@ static bool name_prior(const cli_fit *f, char *text, size_t size)
     return true;
 }
 
-/* What of the start may be wrong, and the options that change it. */
+/* Writes into `text` that a wrong start may be the cause of the failure, and the options that
+ * change the start; nothing where the start is kept. */
 static void name_start(const cli_fit *f, char *text, size_t size)
 {
     const bool turned = !isnan(f->args->pose.rotation[0]) && !f->opts.keep_pose,

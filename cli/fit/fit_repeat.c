@@ -25,10 +25,7 @@ void cli_fit_json_repeat(const cli_fit *f, sdm_json *j)
     const cli_args *a = f->args;
     sdm_text command = {0};
     sdm_text_add(&command, "sdmgen");
-    for (int i = 1; i < a->argc; i++) {
-        sdm_text_add(&command, " ");
-        cli_add_shell_word(&command, a->argv[i]);
-    }
+    for (int i = 1; i < a->argc; i++) cli_add_next_word(&command, a->argv[i]);
     if (command.failed)
         j->text.failed = true;
     else

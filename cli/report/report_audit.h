@@ -23,9 +23,9 @@ void cli_name_part(const sdm_part_audit *a, size_t index, sdm_text *text);
  * no other, or that it lies inside one; appends nothing if there is none. */
 void cli_describe_apart(const sdm_mesh *mesh, const sdm_part_audit *audit, sdm_text *text);
 
-/* Appends a sentence to `text` about all parts that are inside out and that the engine does not
- * turn: numbers, vertices and boxes of the first four, and what becomes of them in maps. Appends
- * nothing if there are none. */
+/* Parts whose triangles face inwards (inside out) are missing from maps, unless the exact engine
+ * turns them. Appends a sentence to `text` about all those that it does not turn, with the numbers,
+ * vertices and boxes of the first four. Appends nothing if there are none. */
 void cli_describe_inside_out(const sdm_part_audit *a, sdm_text *text);
 
 /* Writes one line about the part with most open edges to `text`: where it is, where its first open

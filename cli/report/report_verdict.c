@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "terminal.h"
+
 /* The part of the error with its share of the sum of all parts. */
 static void print_part(const sdm_verdict *v, sdm_cause cause, double sum, bool first)
 {
@@ -43,14 +45,10 @@ static const char *percent(double share, char text[16])
     return text;
 }
 
-/* The purposes for which a model of this grade is not good, a line each. */
-static void print_unfit(const sdm_verdict *v)
+void cli_print_unfit(const char *lines, const char *label, int width)
 {
-    char lines[SDM_MODEL_UNFIT];
-    bool first = true;
-    sdm_verdict_unfit(v, lines);
-    for (const char *at = lines; *at; at += strcspn(at, "\n") + 1, first = false)
-        printf("  %-11s %.*s\n", first ? "not for" : "", (int)strcspn(at, "\n"), at);
+    for (const char *at = lines; *at; at += strcspn(at, "\n") + 1)
+        cli_print("%-*s %.*s\n", width, at == lines ? label : "", (int)strcspn(at, "\n"), at);
 }
 
 /* Errors of volumes and derivatives. */
@@ -74,12 +72,13 @@ static void print_derivatives(const sdm_verdict *v)
 void cli_print_verdict(const sdm_verdict *v)
 {
     const double voxel = v->voxel_mm;
-    char text[SDM_GRADE_TEXT], few[SDM_GRADE_FEW], grade[48];
+    char text[SDM_GRADE_TEXT], few[SDM_GRADE_FEW], grade[48], unfit[SDM_MODEL_UNFIT];
     snprintf(grade, sizeof grade, "%s%s", sdm_grade_name(v->grade), sdm_grade_few(v->heldout, few));
     printf("  in voxels   all %.4f, within a voxel of the surface %.4f; Dice %.4f, smallest %.4f\n",
            v->rmse_mm / voxel, v->rmse_voxel_mm / voxel, v->dice, v->dice_min);
     printf("  %-11s %s\n", grade, sdm_grade_text(v, text));
-    print_unfit(v);
+    sdm_verdict_unfit(v, unfit);
+    cli_print_unfit(unfit, "  not for", 13);
     print_far(v);
     print_derivatives(v);
     print_parts(v);

@@ -6,3 +6,7 @@
 /* Prints on stdout how good the model is, the parts of its error, one per line, and what limits it.
  */
 void cli_print_verdict(const sdm_verdict *v);
+
+/* Prints `lines` (sdm_model_quality.unfit) on stdout, each after `width` columns and a space, the
+ * first one with `label`. */
+void cli_print_unfit(const char *lines, const char *label, int width);

@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "args/options.h"
@@ -271,13 +270,6 @@ sdm_status cli_print_text(sdm_text *text, sdm_error *err)
     if (!failed) fputs(text->data, stdout);
     sdm_text_dispose(text);
     return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the text") : SDM_OK;
-}
-
-double cli_thread_clock(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 const char *cli_format_count(int64_t n, char buf[32])

@@ -85,8 +85,5 @@ sdm_status cli_print_json(sdm_json *json, sdm_error *err);
 /* Prints a text on stdout and frees it. SDM_E_NOMEM: it is incomplete. */
 sdm_status cli_print_text(sdm_text *text, sdm_error *err);
 
-/* Processor time of the calling thread, s: other programs on the machine do not count. */
-double cli_thread_clock(void);
-
 /* Writes n into buf with commas between groups of three digits; returns buf. */
 const char *cli_format_count(int64_t n, char buf[32]);

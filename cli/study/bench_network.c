@@ -62,9 +62,9 @@ static sdm_status time_call(derivative_work *w, void (*call)(derivative_work *),
     size_t n = 0;
     call(w);
     while (n < RUNS && (n < RUNS_MIN || sdm_clock() - begin < TIME_LIMIT_S)) {
-        const double start = cli_thread_clock();
+        const double start = sdm_thread_clock();
         call(w);
-        each[n++] = 1e3 * (cli_thread_clock() - start);
+        each[n++] = 1e3 * (sdm_thread_clock() - start);
         const sdm_status s = cli_check_interrupt(err);
         if (s) return s;
     }
@@ -134,19 +134,19 @@ static sdm_status measure_machine(size_t bytes, network_times *t, sdm_error *err
     // matrix product
     double best = INFINITY, read = INFINITY;
     for (int i = 0; i < REPEATS && !s; i++) {
-        const double start = cli_thread_clock();
+        const double start = sdm_thread_clock();
         sdm_gemm(N, N, N, (sdm_view){a, N, 1}, (sdm_view){a + N * N, N, 1}, false, a + 2 * N * N, N,
                  1);
-        best = fmin(best, cli_thread_clock() - start);
+        best = fmin(best, sdm_thread_clock() - start);
     }
     // reading
     for (int i = 0; i < 2 * REPEATS && !s; i++) {
-        const double start = cli_thread_clock();
+        const double start = sdm_thread_clock();
         words a0 = {0}, a1 = a0, a2 = a0, a3 = a0;
         for (size_t k = 0; k < n_words; k += 4)
             a0 += data[k], a1 += data[k + 1], a2 += data[k + 2], a3 += data[k + 3];
         total += a0 + a1 + a2 + a3;
-        read = fmin(read, cli_thread_clock() - start);
+        read = fmin(read, sdm_thread_clock() - start);
     }
     t->peak_gmacs = 1e-9 * (double)N * N * N / best;
     t->read_gbs = 1e-9 * (double)(n_words * sizeof *data) / read;

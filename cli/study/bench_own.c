@@ -25,9 +25,9 @@ static sdm_status time_method(const cli_bench_case *c, const sdm_method *m, int 
     double best = INFINITY;
     for (size_t i = 0; i < c->repeat && (i == 0 || sdm_clock() - begin < TIME_LIMIT_S); i++) {
         const long before = i == 0 ? cli_bench_peak_start() : -1;
-        const double start = threads == 1 ? cli_thread_clock() : sdm_clock();
+        const double start = threads == 1 ? sdm_thread_clock() : sdm_clock();
         const sdm_status s = m->map(&c->mesh, &c->grid, &opts, values, report, err);
-        const double ms = 1e3 * ((threads == 1 ? cli_thread_clock() : sdm_clock()) - start);
+        const double ms = 1e3 * ((threads == 1 ? sdm_thread_clock() : sdm_clock()) - start);
         if (s) return s;
         if (i == 0) row->peak_mb = cli_bench_peak_mb(before);
         if (!(ms < best)) continue;
@@ -48,7 +48,7 @@ static sdm_status time_naive(const cli_bench_case *c, float *values, cli_bench_r
     const sdm_grid *g = &c->grid;
     const double share = fmin(c->share, NAIVE_PAIRS / ((double)c->voxels * (double)c->mesh.n_tri));
     int64_t done = 0;
-    const double start = cli_thread_clock();
+    const double start = sdm_thread_clock();
     for (int64_t r = 0; r < g->n[1] * g->n[2]; r++) {
         const bool wanted = cli_bench_has_row(share, r);
         for (int64_t i = 0; i < g->n[0]; i++) {
@@ -61,7 +61,7 @@ static sdm_status time_naive(const cli_bench_case *c, float *values, cli_bench_r
         done += wanted;
     }
     row->share = (double)done / (double)(g->n[1] * g->n[2]);
-    row->ms_map = 1e3 * (cli_thread_clock() - start) / row->share;
+    row->ms_map = 1e3 * (sdm_thread_clock() - start) / row->share;
     row->peak_mb = 0;
     row->done = true;
     return SDM_OK;

@@ -52,11 +52,11 @@ static sdm_status time_network(const sdm_model *m, uint64_t seed, bool fastest, 
     size_t n = 0;
     for (size_t i = 0; i <= N_NETWORK && (n < N_MIN || sdm_clock() - begin < TIME_LIMIT_S); i++) {
         cli_eval_params(m, seed, fastest ? 0 : i, p);
-        const double start = cli_thread_clock();
+        const double start = sdm_thread_clock();
         sdm_status s = sdm_generate(m, p, &opts, values, NULL, err);
         if (!s) s = cli_check_interrupt(err);
         if (s) return s;
-        if (i > 0) ms[n++] = 1e3 * (cli_thread_clock() - start); // the first map warms up
+        if (i > 0) ms[n++] = 1e3 * (sdm_thread_clock() - start); // the first map warms up
     }
     out->ms_network = summary(fastest, ms, n);
     out->n_network = n;
@@ -69,11 +69,11 @@ sdm_status cli_time_maker(const cli_map_maker *m, uint64_t seed, float *values, 
     double p[SDM_MAX_PARAMS], each[N_EXACT];
     for (size_t i = 0; i <= N_EXACT; i++) {
         cli_maker_params(m, seed, i, p);
-        const double start = cli_thread_clock();
+        const double start = sdm_thread_clock();
         sdm_status s = m->make(m->user, p, values, err);
         if (!s) s = cli_check_interrupt(err);
         if (s) return s;
-        if (i > 0) each[i - 1] = 1e3 * (cli_thread_clock() - start);
+        if (i > 0) each[i - 1] = 1e3 * (sdm_thread_clock() - start);
     }
     *ms = cli_median(each, N_EXACT);
     return SDM_OK;
@@ -99,10 +99,10 @@ static sdm_status time_batch(const sdm_model *m, uint64_t seed, bool fastest, si
                              size * sizeof *values, "batch of maps to time", err);
     for (size_t i = 0; i < size; i++) cli_eval_params(m, seed, i, p + i * n_params);
     for (size_t k = 0; k <= N_BATCHES && !s && (n < 1 || sdm_clock() - begin < TIME_LIMIT_S); k++) {
-        const double start = cli_thread_clock();
+        const double start = sdm_thread_clock();
         s = sdm_generate_batch(m, p, size, &opts, values, NULL, err);
         if (!s) s = cli_check_interrupt(err);
-        if (k > 0) ms[n++] = 1e3 * (cli_thread_clock() - start) / (double)size;
+        if (k > 0) ms[n++] = 1e3 * (sdm_thread_clock() - start) / (double)size;
     }
     if (!s) out->ms_batch = summary(fastest, ms, n);
     out->batch_size = size;
@@ -117,12 +117,12 @@ static sdm_status time_exact(const sdm_model *m, const sdm_instance *shape, uint
     double p[SDM_MAX_PARAMS], ms[N_EXACT];
     for (size_t i = 0; i <= N_EXACT; i++) {
         cli_eval_params(m, seed, fastest ? 0 : i, p);
-        const double start = cli_thread_clock();
+        const double start = sdm_thread_clock();
         sdm_status s =
             sdm_exact_shape_map(shape, p, &opts, &sdm_model_get_info(m)->grid, values, NULL, err);
         if (!s) s = cli_check_interrupt(err);
         if (s) return s;
-        if (i > 0) ms[i - 1] = 1e3 * (cli_thread_clock() - start);
+        if (i > 0) ms[i - 1] = 1e3 * (sdm_thread_clock() - start);
     }
     out->ms_exact = summary(fastest, ms, N_EXACT);
     out->n_exact = N_EXACT;
@@ -143,10 +143,10 @@ static sdm_status time_naive_mesh(const sdm_mesh *mesh, const sdm_grid *grid, do
     sdm_status s = naive ? SDM_ALLOC(&values, sdm_grid_count(&thin), "map of the naive method", err)
                          : SDM_E_INTERNAL;
     if (s) return s;
-    const double start = cli_thread_clock();
+    const double start = sdm_thread_clock();
     s = naive->map(mesh, &thin, &opts, values, NULL, err);
     *share = (double)thin.n[2] / (double)grid->n[2];
-    *ms = 1e3 * (cli_thread_clock() - start) / *share;
+    *ms = 1e3 * (sdm_thread_clock() - start) / *share;
     sdm_free(values);
     return s;
 }

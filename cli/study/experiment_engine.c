@@ -61,11 +61,11 @@ static sdm_status time_method(const cli_experiment_run *run, const cli_experimen
     size_t n = 0;
     while (n < TIMED_MAX && (n == 0 || sdm_clock() - begin < TIME_LIMIT_S)) {
         cli_maker_params(&job->maker, run->e->experiment.seed, n, p);
-        const double start = cli_thread_clock();
+        const double start = sdm_thread_clock();
         sdm_status s = job->maker.make(job->maker.user, p, values, err);
         if (!s) s = cli_check_interrupt(err);
         if (s) return s;
-        ms[n++] = 1e3 * (cli_thread_clock() - start);
+        ms[n++] = 1e3 * (sdm_thread_clock() - start);
     }
     *median = cli_median(ms, n);
     return SDM_OK;

@@ -10,6 +10,7 @@
 #include "report/progress_bar.h"
 #include "report/terminal.h"
 #include "sdm/fit.h"
+#include "sdm/internal/clock.h"
 #include "sdm/memory.h"
 
 /* Number of shapes on which the naive method is timed. */
@@ -131,11 +132,11 @@ static sdm_status fit_one(const cli_experiment_job *job, const sdm_fit_source *s
     opts.max_polish_iterations = polish ? opts.max_iterations : 0;
     opts.n_threads = 1; // the table has times of one core
     opts.cancelled = cli_interrupted;
-    const double begin = cli_thread_clock();
+    const double begin = sdm_thread_clock();
     sdm_status s = sdm_fit(source, &target, &opts, &r, why);
     if (!s) s = check_mirror(job, source, &target, &opts, &r, why);
     if (s == SDM_E_ARG && wrong) s = SDM_E_QUALITY; // the start lies outside of the image
-    out->seconds = cli_thread_clock() - begin;
+    out->seconds = sdm_thread_clock() - begin;
     // store the estimate
     out->converged = !s;
     if (s) {

@@ -130,6 +130,7 @@ static sdm_status result_create(size_t n, sdm_fit_result *out, sdm_error *err)
     out->n_params = n;
     out->log_likelihood_without = out->evidence = NAN;
     out->inside_share = out->noise_factor = out->model_error_mm = out->network_error_sd = NAN;
+    out->advised_voxel_mm = NAN;
     sdm_status s = SDM_ALLOC(&out->params, n, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->covariance, size * size, "result of the fit", err);
     if (!s) s = SDM_ALLOC(&out->sd, size, "result of the fit", err);

@@ -44,7 +44,7 @@ typedef struct label_trial {
     uint64_t cases;
 } label_trial;
 
-/* What the fits of a trial find. */
+/* Results of the fits of a trial. */
 typedef struct label_errors {
     /* mean square of the errors over their deviations, of the edges and of the rotation */
     double edges, rotation;

@@ -2,17 +2,10 @@
 #include "map_time.h"
 
 #include <math.h>
-#include <time.h>
 
+#include "sdm/internal/clock.h"
 #include "sdm/internal/heap.h"
 #include "sdm/memory.h"
-
-static double thread_seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 sdm_status trainer_map_time(const dataset *d, const sdm_model *m, double *ms, sdm_error *err)
 {
@@ -23,9 +16,9 @@ sdm_status trainer_map_time(const dataset *d, const sdm_model *m, double *ms, sd
     if (!s) s = sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "time of a map", err);
     *ms = INFINITY;
     for (int i = 0; i < MAPS && !s; i++) {
-        const double start = thread_seconds();
+        const double start = sdm_thread_clock();
         sdm_model_forward(m, d->holdout_params, 1, map, scratch);
-        *ms = fmin(*ms, 1e3 * (thread_seconds() - start));
+        *ms = fmin(*ms, 1e3 * (sdm_thread_clock() - start));
     }
     sdm_free(scratch);
     sdm_free(map);

@@ -1,4 +1,4 @@
-/* The uses for which a trained model is not good, in words. */
+/* Writes the uses for which a trained model is not accurate enough, one line of text for each. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>

@@ -321,9 +321,9 @@ static void panel_i8(size_t batch, size_t outputs, size_t n_wide, size_t k, cons
 {
     const size_t wide = (n_wide + 1) / 2, narrow = (k + 1) / 2 - wide,
                  panel = wide * WIDE + narrow * NARROW;
-    // few rows read the panels once
-    const size_t few = batch <= BYTES_ROWS, two = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL,
-                 step = few ? outputs : two;
+    // rows that are computed together read each panel once, in any case
+    const size_t two = 2 * VW > SDM_PANEL ? 2 * VW : SDM_PANEL,
+                 step = batch <= BYTES_ROWS ? outputs : two;
     for (size_t o = 0; o < outputs; o += step, w += step / SDM_PANEL * panel) {
         const sdm_panel_out at = out_from(to, 0, o);
         bytes_batch(batch, outputs - o < step ? outputs - o : step, wide, narrow, w, x, ldx, scale,

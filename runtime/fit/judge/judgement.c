@@ -433,7 +433,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
         s = sdm_fit_measure_beyond(p, r, &bounds, err);
     if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
     if (!s) check_bounds(p, &misfit, &bounds, r, v);
-    if (!s) sdm_fit_check_voxels(p, coarse, v);
+    if (!s) sdm_fit_check_voxels(p, coarse, r);
     if (!s && labels) sdm_fit_check_labels(p, v);
     if (!s) sdm_fit_check_determined(p, r, v);
     sdm_fit_residuals_dispose(&residuals);

@@ -200,12 +200,13 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
     return c;
 }
 
-void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_verdict *v)
+void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_result *r)
 {
     const double voxel = fit_longest_edge(&p->maps.grid);
     if (p->opts->keep_params || fit_maps_direct(&p->maps)) return;
+    if (voxel > coarse.limit) r->advised_voxel_mm = coarse.advice;
     sdm_fit_judge_add(
-        v, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit),
+        &r->verdict, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit),
         coarse.blind ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, voxel, coarse.limit,
         "the voxels of the maps are coarse beside %s: parameters may be biased, and their "
         "standard deviations %s; exact maps with voxels of %.2g mm "

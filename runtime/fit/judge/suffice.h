@@ -26,8 +26,9 @@ typedef struct fit_coarseness {
  * target is no image. */
 fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur);
 
-/* Adds the finding "map voxels", unless the parameters are kept. */
-void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_verdict *v);
+/* Adds the finding "map voxels" to r->verdict, and sets r->advised_voxel_mm where it has not
+ * passed; does nothing if the parameters are kept. */
+void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_result *r);
 
 /* Labels: adds the finding "data", doubtful where their voxels are longer than the thinnest part of
  * the fitted shape is thick, mm; nothing where that is not known. */

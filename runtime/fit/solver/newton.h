@@ -29,7 +29,8 @@ typedef struct fit_newton_opts {
 /* How the iterations ended. */
 typedef struct fit_newton_end {
     bool converged;
-    /* converged by eps_sd, or by max_flat, not by the size of the steps */
+    /* the iterations ended because of eps_sd (small) or of max_flat (flat), before the size of the
+       steps fell to eps */
     bool small, flat;
     /* size of the last step, in the units of sdm_fit_opts.eps */
     double step;

@@ -24,7 +24,8 @@
 // lags that are computed together: three rows of lags
 enum { LAG_GROUP = 3 * FIT_LAGS };
 
-/* Lags that are computed together, consecutive numbers: their neighbours are close in memory. */
+/* Lags with consecutive numbers, whose correlations are computed together: the neighbours of a
+ * voxel at these lags lie close together in memory. */
 typedef struct lag_group {
     size_t n;
     int lag[LAG_GROUP][3], number[LAG_GROUP];

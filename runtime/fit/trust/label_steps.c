@@ -39,8 +39,8 @@ typedef struct piece {
     /* sums over the samples of the piece; the weight of a sample is its information about the
        place of the surface */
     fit_step_phase phase;
-    /* sums of weight times normal; weight times place above the lower layer, and times its square,
-       in voxels */
+    /* sums over the samples of weight * normal, weight * height and weight * height^2; height:
+       distance of the surface, in voxels, from the layer of voxels below it */
     double normal[3], first, second;
     /* extent of the samples along the other two axes, in voxels */
     double low[2], high[2];

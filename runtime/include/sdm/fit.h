@@ -514,6 +514,9 @@ typedef struct sdm_fit_result {
        measured */
     double network_error_sd;
     size_t network_error_param;
+    /* edge of the voxels of exact maps (mm) that would be fine enough, where the check
+       SDM_FIT_CHECK_VOXELS has not passed; else NaN */
+    double advised_voxel_mm;
 } sdm_fit_result;
 
 /* Fits the shape of source to target. Errors: SDM_E_ARG: source, options or start, or no voxel near

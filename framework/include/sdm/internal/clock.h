@@ -1,4 +1,4 @@
-/* Monotonic clock for measuring elapsed time. */
+/* Clocks for measuring elapsed time and processor time. */
 #pragma once
 
 #include "sdm/export.h"
@@ -10,6 +10,9 @@ extern "C" {
 /* Time in seconds since an arbitrary start; it never decreases, so only differences are meaningful.
  * [any thread] */
 double sdm_clock(void);
+
+/* Processor time of the calling thread in seconds; only differences are meaningful. [any thread] */
+double sdm_thread_clock(void);
 
 #ifdef __cplusplus
 }

@@ -206,15 +206,14 @@ static void warn_label_volumes(const job *j)
 static void warn_far(const job *j)
 {
     static const char *const maps[] = {".nii", ".nii.gz", ".nrrd", ".mha", ".npy"};
-    const char *line = strstr(j->info->quality.unfit, "distances far from the surface");
+    sdm_error why = {0};
     bool far = j->args->points;
     for (size_t i = 0; i < j->args->outputs.n; i++)
         for (size_t k = 0; k < sizeof maps / sizeof *maps; k++)
             far = far || (cli_ends_with(j->args->outputs.items[i], maps[k]) &&
                           !cli_ends_with(j->args->outputs.items[i], ".seg.nrrd"));
-    if (far && line)
-        cli_warn("%s: the training found the model not good for %.*s; nearer ones are right",
-                 j->args->files.items[0], (int)strcspn(line, "\n"), line);
+    if (far && sdm_model_check_use(j->model, SDM_USE_DISTANCE, &why) == SDM_E_QUALITY)
+        cli_warn("%s: %s", j->args->files.items[0], why.text);
 }
 
 /* Chooses the grid. On another grid than the model's, level sets alone need no whole maps. */

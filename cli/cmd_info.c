@@ -71,6 +71,8 @@ static void json_quality(sdm_json *j, const sdm_model_quality *q)
     sdm_json_real(j, "volume_error", q->volume_error);
     sdm_json_real(j, "derivative_error", q->derivative_error);
     sdm_json_real(j, "volume_derivative_error", q->volume_derivative_error);
+    sdm_json_real(j, "surface_volume_error", q->surface_volume_error);
+    sdm_json_real(j, "far_error_mm", q->far_error_mm);
     sdm_json_text(j, "unfit", q->unfit);
     sdm_json_close(j, '}');
 }

@@ -65,6 +65,9 @@ void cli_print_quality(const sdm_model_info *m)
                   q->thickness_mm);
     if (!isnan(q->volume_error))
         cli_print("             volumes of maps are off by %.3g %%\n", 100 * q->volume_error);
+    if (!isnan(q->surface_volume_error))
+        cli_print("             volumes of their surfaces (.stl) are off by %.3g %%\n",
+                  100 * q->surface_volume_error);
     if (!isnan(q->derivative_error))
         cli_print("             derivatives of maps near the surface are off by %.3g %% for the "
                   "worst parameter\n",

@@ -56,13 +56,18 @@ static void print_derivatives(const sdm_verdict *v)
 {
     char text[16], largest[16];
     if (isfinite(v->volume_error))
-        printf("  volumes     of maps are off by %s %%, at most by %s %%\n",
+        printf("  volumes     of maps are off by %s %%, at most by %s %%",
                percent(v->volume_error, text), percent(v->volume_error_max, largest));
+    if (isfinite(v->surface_volume_error))
+        printf("; of their surfaces (.stl) by %s %%, at most by %s %%",
+               percent(v->surface_volume_error, text),
+               percent(v->surface_volume_error_max, largest));
+    if (isfinite(v->volume_error)) printf("\n");
     if (!isfinite(v->derivative_error)) return;
     printf(
-        "  derivatives by the parameters: of maps near the surface off by %s %% (by %s, the worst "
-        "one)",
-        percent(v->derivative_error, text), v->derivative_by);
+        "  derivatives by the parameters, of %d shapes: of maps near the surface off by %s %% (by "
+        "%s, the worst one)",
+        (int)v->derivative_shapes, percent(v->derivative_error, text), v->derivative_by);
     if (isfinite(v->volume_derivative_error))
         printf(", of volumes by %s %% (by %s)", percent(v->volume_derivative_error, text),
                v->volume_derivative_by);

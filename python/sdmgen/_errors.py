@@ -116,6 +116,7 @@ def with_arguments(text: str) -> str:
     text = text.replace("sdm_fit_source.grid", "exact=True, spacing=...")
     text = text.replace("sdm_fit_opts.max_polish_iterations", "polish=True")
     text = text.replace("sdm_fit_opts.kept", "keep")
+    text = text.replace("(sdm_registry_load())", "(plugin=FILE of sdmgen.Model)")
     return re.sub(r"\bsdm_\w+_opts\.(\w+)", r"\1", text)
 
 

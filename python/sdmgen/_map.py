@@ -174,6 +174,9 @@ class Doubts:
     def __init__(self, texts: Optional[dict[str, str]] = None) -> None:
         self._texts = texts or {}
 
+    def has(self, use: str) -> bool:
+        return use in self._texts
+
     def warn(self, use: str) -> None:
         text = self._texts.pop(use, None)
         if text:

@@ -21,7 +21,7 @@ from ._shape import InstanceShape, Param, Registry, Shape, param_of
 Params = Union[None, ArrayLike, Mapping[str, float]]
 POLICIES = ("refuse", "clamp", "exact")
 STATISTICS = ("max", "q95", "rmse", "mean")
-USES = ("surface", "volume", "derivative", "volume_derivative")
+USES = ("surface", "volume", "derivative", "volume_derivative", "distance", "surface_volume")
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,9 @@ class Quality:
     the surface between the voxels, `thickness_mm` the thickness of the thinnest part. Root mean
     square over the right value, NaN if not known: `volume_error` of the volume of maps,
     `derivative_error` and `volume_derivative_error` of the derivatives, by the worst parameter, of
-    maps near the surface and of the volume."""
+    maps near the surface and of the volume, `surface_volume_error` of the volume inside surfaces of
+    maps. `far_error_mm`: the largest error of distances farther than `Accuracy.near_mm` from the
+    surface. `unfit`: the uses that the model is not for, with their figures, in words."""
 
     grade: str
     cut: float
@@ -61,6 +63,9 @@ class Quality:
     volume_error: float
     derivative_error: float
     volume_derivative_error: float
+    surface_volume_error: float
+    far_error_mm: float
+    unfit: tuple[str, ...]
 
 
 #: largest share of shapes that the grid of a good model cuts (docs/network.md)
@@ -69,8 +74,8 @@ CUT_MAX = 0.05
 
 def _quality_of(c: Any, name: str) -> Quality:
     """The quality of a model; warns, as the program does, of one that is poor or cuts its shapes."""
-    numbers = [name for name in Quality.__dataclass_fields__ if name != "grade"]
-    result = Quality(c.grade.decode(), *(getattr(c, name) for name in numbers))
+    numbers = {key: getattr(c, key) for key in Quality.__dataclass_fields__ if key not in ("grade", "unfit")}
+    result = Quality(grade=c.grade.decode(), unfit=tuple(c.unfit.decode().splitlines()), **numbers)
     if result.grade == "poor":
         warn(f"{name}: the training graded this model poor (sdmgen info)")
     if result.cut > CUT_MAX:
@@ -82,7 +87,7 @@ def _quality_of(c: Any, name: str) -> Quality:
 def _doubts_of(model: Model) -> Doubts:
     """The uses that the training found the model not good enough for, with the texts of their warnings."""
     texts = {}
-    for use in ("volume", "derivative", "volume_derivative"):
+    for use in ("volume", "derivative", "volume_derivative", "distance"):
         try:
             model.check_use(use)
         except QualityError as error:
@@ -194,8 +199,9 @@ class Model:
 
     def check_use(self, use: str) -> None:
         """Tells whether the training found the model good enough for a use: "surface", "volume" (of
-        maps), "derivative" (of maps by the parameters) or "volume_derivative". Raises QualityError,
-        whose text has the measured figure, if it did not, and UnsupportedError if it measured none."""
+        maps), "derivative" (of maps by the parameters), "volume_derivative", "distance" (far from the
+        surface) or "surface_volume" (inside surfaces of maps). Raises QualityError, whose text has the
+        measured figure, if it did not, and UnsupportedError if it measured none."""
         call("sdm_model_check_use", self, choice(use, USES, "use"))
 
     def values(self, params: Params = None, **named: float) -> Float64:
@@ -328,6 +334,12 @@ class Model:
         if info.source == "network":
             self._doubts.warn("volume_derivative" if of_volume else "derivative")
 
+    def _warn_distances(self, info: MapInfo, distance: Float32) -> None:
+        """Warns once of distances by the network far from the surface that its training found to be wrong."""
+        if info.source == "network" and self._doubts.has("distance"):
+            if (np.abs(distance) > self.accuracy.near_mm).any():
+                self._doubts.warn("distance")
+
     def _differentiated(self, values: Float32, result: Any) -> Map:
         """The map of derivatives that have been computed."""
         info = info_of(result)
@@ -430,7 +442,8 @@ class Model:
         threads: int = 0,
         **named: float,
     ) -> Samples:
-        """Signed distances (mm, NEGATIVE INSIDE) at points [n, 3], LPS mm, and their derivatives."""
+        """Signed distances (mm, NEGATIVE INSIDE) at points [n, 3], LPS mm, and their derivatives. Warns once
+        of points far from the surface, if the training found distances there to be wrong."""
         field = self.field(
             self.values(params, **named), derivatives=slopes, policy=policy, outside=outside, threads=threads
         )
@@ -529,6 +542,7 @@ class Field:
             address(result.gradient),
             address(result.slopes),
         )
+        self._model._warn_distances(self.info, result.distance)
         return result
 
     def grid(self, grid: Grid) -> Map:

@@ -31,8 +31,8 @@ for kind in sdmnn deepsdf imnet template; do
          END { exit !(NR == 1 && near && (told ? ratio < 2.6 : ratio > 2.4)) }' times || bad "$kind: verify: times: $(cat out)"
     # warnings of these small networks: poor, some have surface at the border of the grid or torn ones
     sdmgen generate $model -o $kind.nii -o $kind.png --json --threads 1 >out 2>err || bad "$kind: generate: $(cat err)"
-    grep -Evq '^sdmgen: warning: .*(graded this model poor|not good for distances far from the surface|the surface leaves the grid|the surface is torn)' err && bad "$kind: generate: $(cat err)"
-    [ $kind != deepsdf ] || grep -q 'not good for distances far from the surface: wrong by up to' err || bad "$kind: far distances: $(cat err)"
+    grep -Evq '^sdmgen: warning: .*(graded this model poor|distances of its maps farther than|the surface leaves the grid|the surface is torn)' err && bad "$kind: generate: $(cat err)"
+    [ $kind != deepsdf ] || grep -q 'distances of its maps farther than .* are wrong by up to' err || bad "$kind: far distances: $(cat err)"
     present $kind.nii $kind.png
     hash=$(json values_crc64)
     sdmgen generate $model --json --threads 3 >out 2>err || bad "$kind: generate: $(cat err)"

@@ -6,14 +6,14 @@ model=../files-of-train/run/model.sdm
 present $model
 
 expect 0 - sdmgen info $model
-has '^not for +volumes: off by [0-9.]+ %$' # a network of seconds
+has '^not for +volumes of maps: off by [0-9.]+ %$' # a network of seconds
 has '^ +derivatives of maps by [a-z]+: off by [0-9]+ %'
 has "of shape 'cochlea'"
 has '^parameters +a +2 \.\. 5 mm, default [0-9.]+, uniform$'
 has '^verdict +(good|usable|poor) \(from 8 shapes only\); the grid cuts [0-9.]+ % of the held-out shapes$'
 expect 0 "warning: .*volumes of its maps are off by [0-9.]+ %, more than 2 %" sdmgen generate $model -o labels.seg.nrrd -q
 expect 0 - sdmgen info $model --json
-has '"quality": *\{"grade": *"(good|usable|poor)", "cut": [0-9.]+, "between_mm": [0-9.e-]+, "thickness_mm": [0-9.e-]+, "volume_error": [0-9.e-]+, "derivative_error": [0-9.e-]+, "volume_derivative_error": [0-9.e-]+, "unfit": "volumes: off by'
+has '"quality": *\{"grade": *"(good|usable|poor)", "cut": [0-9.]+, "between_mm": [0-9.e-]+, "thickness_mm": [0-9.e-]+, "volume_error": [0-9.e-]+, "derivative_error": [0-9.e-]+, "volume_derivative_error": [0-9.e-]+, "surface_volume_error": [0-9.e-]+, "far_error_mm": [0-9.e-]+, "unfit": "volumes of maps: off by'
 for key in checksum train_seconds rmse_mm q99_mm weight_bytes; do [ -n "$(json $key)" ] || bad "info: no $key"; done
 
 has '"name": "a", .*"distribution": "uniform"\}'

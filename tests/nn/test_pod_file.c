@@ -266,9 +266,20 @@ static void quality_is_kept(void **state)
     assert_true(!*q->grade && isnan(q->cut) && isnan(q->between_mm));
     assert_int_equal(sdm_model_check_use(m, SDM_USE_SURFACE, NULL), SDM_E_UNSUPPORTED);
     sdm_model_free(m);
-    t.info.quality = (sdm_model_quality){
-        "poor", 0.25, NAN, 0.5,         12.5,        30,
-        0.01,   NAN,  0.5, {1, 2, NAN}, {3, 4, NAN}, "volumes: off by 3 %\nits tips\n"};
+    t.info.quality = (sdm_model_quality){.grade = "poor",
+                                         .cut = 0.25,
+                                         .between_mm = NAN,
+                                         .thickness_mm = 0.5,
+                                         .mesh_volume_mm3 = 12.5,
+                                         .mesh_area_mm2 = 30,
+                                         .volume_error = 0.01,
+                                         .derivative_error = NAN,
+                                         .volume_derivative_error = 0.5,
+                                         .surface_volume_error = 0.0202,
+                                         .far_error_mm = 7,
+                                         .probe_volume_mm3 = {1, 2, NAN},
+                                         .probe_area_mm2 = {3, 4, NAN},
+                                         .unfit = "volumes: off by 3 %\nits tips\n"};
     m = toy_open(&t);
     q = &sdm_model_get_info(m)->quality;
     assert_string_equal(q->grade, "poor");
@@ -276,11 +287,13 @@ static void quality_is_kept(void **state)
     assert_true(q->mesh_volume_mm3 == 12.5 && q->mesh_area_mm2 == 30);
     assert_true(q->volume_error == 0.01 && isnan(q->derivative_error));
     assert_true(q->volume_derivative_error == 0.5);
+    assert_true(q->surface_volume_error == 0.0202 && q->far_error_mm == 7);
     assert_true(q->probe_volume_mm3[1] == 2 && q->probe_area_mm2[1] == 4);
     assert_true(isnan(q->probe_volume_mm3[2]) && isnan(q->probe_area_mm2[2]));
     assert_string_equal(q->unfit, "volumes: off by 3 %\nits tips\n");
     assert_true(sdm_model_get_info(m)->file_bytes > without);
-    // uses: a poor grade, a good volume, derivatives not measured, bad derivatives of volumes
+    // uses: a poor grade, a good volume, derivatives not measured, bad derivatives of volumes; the
+    // figure is seen to exceed its bound
     sdm_error err;
     assert_int_equal(sdm_model_check_use(m, SDM_USE_SURFACE, &err), SDM_E_QUALITY);
     assert_int_equal(sdm_model_check_use(m, SDM_USE_VOLUME, &err), SDM_OK);
@@ -288,18 +301,25 @@ static void quality_is_kept(void **state)
     assert_int_equal(sdm_model_check_use(m, SDM_USE_VOLUME_DERIVATIVE, &err), SDM_E_QUALITY);
     assert_string_equal(err.text,
                         "derivatives of volumes of its maps are off by 50 % for the "
-                        "worst parameter, more than 20 %: exact maps have right ones, unless the "
-                        "parameters change the triangles");
-    assert_int_equal(sdm_model_check_use(m, (sdm_model_use)4, &err), SDM_E_ARG);
+                        "worst parameter, more than 20 %; those of exact maps are right if the "
+                        "shape has the same triangles for all parameters");
+    assert_int_equal(sdm_model_check_use(m, SDM_USE_SURFACE_VOLUME, &err), SDM_E_QUALITY);
+    assert_string_equal(err.text, "volumes inside the surfaces of its maps are off by 2.02 %, more "
+                                  "than 2 %: they cut edges and thin walls between the voxels");
+    assert_int_equal(sdm_model_check_use(m, SDM_USE_DISTANCE, &err), SDM_E_QUALITY);
+    assert_non_null(strstr(err.text, "from the surface are wrong by up to 7 mm; nearer ones"));
+    assert_int_equal(sdm_model_check_use(m, (sdm_model_use)6, &err), SDM_E_ARG);
     assert_int_equal(sdm_model_check_use(NULL, SDM_USE_VOLUME, &err), SDM_E_ARG);
     sdm_model_free(m);
     // an unknown grade and an impossible share are damage
-    const sdm_model_quality wrong[] = {{"fine", 0, 0, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}, ""},
-                                       {"good", 1.5, 0, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}, ""},
-                                       {"good", 0, -1, 1, NAN, NAN, NAN, NAN, NAN, {0}, {0}, ""},
-                                       {"good", 0, 0, -1, NAN, NAN, NAN, NAN, NAN, {0}, {0}, ""},
-                                       {"good", 0, 0, 1, NAN, NAN, -0.1, NAN, NAN, {0}, {0}, ""}};
-    for (size_t i = 0; i < 5; i++) {
+    const sdm_model_quality wrong[] = {{.grade = "fine"},
+                                       {.grade = "good", .cut = 1.5},
+                                       {.grade = "good", .between_mm = -1},
+                                       {.grade = "good", .thickness_mm = -1},
+                                       {.grade = "good", .volume_error = -0.1},
+                                       {.grade = "good", .surface_volume_error = -0.1},
+                                       {.grade = "good", .far_error_mm = -1}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         uint8_t *bytes;
         size_t size;
         t.info.quality = wrong[i];

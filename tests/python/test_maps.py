@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import pickle
+import re
 import signal
 import threading
 import time
@@ -10,9 +11,10 @@ import warnings
 
 import numpy as np
 import pytest
-from conftest import ball, in_threads
+from conftest import SOURCE, ball, in_threads
 
 import sdmgen
+from sdmgen._errors import with_arguments
 
 P = {"a": 4.1, "alpha": 0.5}
 WORDS = ["-p", "a=4.1", "-p", "alpha=0.5"]
@@ -121,6 +123,30 @@ def test_derivatives_and_volumes_that_are_bad_warn_once(model_file, tmp_path):
         fresh.sample([[0, 0, 0]], P)
         assert fresh(P, max_error=0.001).volume > 0
         assert pickle.loads(pickle.dumps(sdmgen.Map(fresh(P).values, fresh.grid))).volume > 0
+
+
+def test_wrong_distances_far_from_the_surface_warn_once(model_file):
+    model = sdmgen.Model(model_file)
+    model.check_use("distance")  # the test network has right ones
+    assert model.quality.far_error_mm <= model.grid.spacing.min() and model.quality.surface_volume_error > 0.02
+    assert model.quality.unfit[0].startswith("volumes of maps: off by ")
+    model._doubts = type(model._doubts)({"distance": "distances"})
+    values = np.abs(model(P).values)
+    index = {far: np.argwhere((values > model.accuracy.near_mm) == far)[0][::-1] for far in (False, True)}
+    near, far = ([model.grid.origin + i * model.grid.spacing] for i in index.values())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model.sample(near, P)
+    with pytest.warns(UserWarning, match="distances") as caught:
+        model.sample(far, P)
+        model.field(P).sample(far)
+    assert len(caught) == 1 and caught[0].filename == __file__
+
+
+def test_a_shape_that_is_not_known_asks_for_the_argument():
+    text = (SOURCE / "runtime/maps/model_shape.c").read_text()
+    asked = re.search(r'"(\(sdm_registry_load\(\)\))"', text)
+    assert with_arguments(asked[1]) == "(plugin=FILE of sdmgen.Model)"
 
 
 def test_a_map_that_the_grid_cuts_is_marked(model):

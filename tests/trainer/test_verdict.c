@@ -1,7 +1,7 @@
 /* The verdict on a training: the decision from given figures, the measured parts, and that
  * following the advice makes the error smaller. Tests: judge.c verdict.c verdict_unfit.c
  * pod_parts.c tree_pass.c
- * surface_check.c derivative_check.c history.c progress.c */
+ * surface_check.c derivative_check.c volume_check.c history.c progress.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -191,11 +191,11 @@ static void error_far_from_the_surface(void **state)
     assert_true(!v.key[0] &&
                 strstr(v.sentence, "set network.kind to pod, which may be worse near"));
     assert_non_null(strstr(v.sentence, "75 %"));
-    v.near_mm = 1.6, v.largest_mm = 0.9, v.largest_at_mm = -5;
+    v.largest_mm = 2, v.far_largest_mm = 0.9;
     assert_true(sdm_verdict_errs_far(&v));
-    v.largest_at_mm = 1.5;
+    v.far_largest_mm = 0.7;
     assert_false(sdm_verdict_errs_far(&v));
-    v.largest_mm = 0.7, v.largest_at_mm = 5;
+    v.far_largest_mm = NAN; // no voxel is so far
     assert_false(sdm_verdict_errs_far(&v));
 }
 
@@ -309,26 +309,33 @@ static void uses_and_spacing(void **state)
     (void)state;
     char text[SDM_GRADE_TEXT];
     sdm_verdict v = figures();
-    v.coarse_mm = v.voxel_mm, v.thickness_mm = 5, v.thin = 0.2;
+    v.coarse_mm = v.voxel_mm, v.thickness_mm = 5, v.volume_error = v.surface_volume_error = 0.01;
     assert_string_equal(sdm_grade_text(&v, text),
                         "for level sets, surfaces, measurements and fits to images");
     assert_true(isnan(sdm_verdict_spacing(&v)));
-    // volumes that are off, edges that are cut, a part that is broken: no measurements
-    v.volume_error = 0.03;
-    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and fits to images");
-    v.volume_error = NAN, v.thickness_mm = 3;
-    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and fits to images");
-    assert_true(fabs(sdm_verdict_spacing(&v) - 0.75) < 1e-9);
-    v.thin = 0.05;
-    assert_non_null(strstr(sdm_grade_text(&v, text), "measurements"));
-    // the lines of the uses
     char lines[SDM_MODEL_UNFIT];
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "");
+    // volumes that are off, edges that are cut, a part that is broken: no measurements
+    v.volume_error = 0.03;
+    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and fits to images");
+    v.volume_error = 0.004, v.surface_volume_error = 0.029;
+    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and fits to images");
+    assert_true(fabs(sdm_verdict_spacing(&v) - 0.59) < 1e-9);
+    sdm_verdict_unfit(&v, lines);
+    assert_string_equal(lines, "volumes of surfaces (.stl): off by 2.9 %, voxels of 0.8 mm cut "
+                               "edges and thin parts; grid.spacing 0.59 keeps more of them\n");
+    // a finer grid does not help where the network errs
+    v.volume_error = 0.025;
+    assert_true(isnan(sdm_verdict_spacing(&v)));
+    sdm_verdict_unfit(&v, lines);
+    assert_string_equal(lines, "volumes of maps: off by 2.5 %\n"
+                               "volumes of surfaces (.stl): off by 2.9 %\n");
+    // the lines of the uses
     v.volume_error = 0.123, v.thickness_mm = 1;
     strcpy(v.derivatives_bad, "r: off by 32 %");
     sdm_verdict_unfit(&v, lines);
-    assert_string_equal(lines, "volumes: off by 12 %\n"
+    assert_string_equal(lines, "volumes of maps: off by 12 %\n"
                                "its thinnest part and volumes of surfaces (.stl): it is 1 mm "
                                "thick, too thin for voxels of 0.8 mm, and will be missing or "
                                "broken; grid.spacing 0.5 shows it\n"
@@ -610,9 +617,31 @@ static void volumes_and_derivatives(void **state)
         const sdm_model_quality *q = &sdm_model_get_info(m)->quality;
         assert_true(fabs(q->volume_error / v->volume_error - 1) < 1e-6);
         assert_true(fabs(q->derivative_error / v->derivative_error - 1) < 1e-6);
+        assert_true(fabs(q->surface_volume_error / v->surface_volume_error - 1) < 1e-6);
+        assert_true(fabs(q->far_error_mm / v->far_largest_mm - 1) < 1e-6);
+        // all held-out shapes that the grid does not cut, also beside them
+        assert_true(v->derivative_shapes >= 12 && v->derivative_shapes <= 16);
         assert_true(fabs(q->volume_derivative_error / v->volume_derivative_error - 1) < 1e-6);
         sdm_model_free(m);
     }
+}
+
+// On coarse voxels a surface encloses too little while its map holds the volume, which the uses
+// tell with the spacing that mends it.
+static void surfaces_lose_volume(void **state)
+{
+    (void)state;
+    static const char *const set[] = {"grid.spacing=1.2", "grid.size=[12,10,10]"};
+    char lines[SDM_MODEL_UNFIT];
+    const sdm_train_report r = train(set, 2);
+    const sdm_verdict *v = &r.verdict;
+    const double spacing = sdm_verdict_spacing(v);
+    sdm_verdict_unfit(v, lines);
+    if (!(v->surface_volume_error > 0.02) || !(v->surface_volume_error > 2 * v->volume_error) ||
+        !strstr(lines, "volumes of surfaces (.stl): off by"))
+        fail_msg("maps %g, surfaces %g: %s", v->volume_error, v->surface_volume_error, lines);
+    assert_true(v->surface_volume_error_max >= v->surface_volume_error);
+    assert_true(spacing < 1.2 && spacing > 0.2);
 }
 
 // Each limit is provoked, named, and the advice followed: the error becomes smaller.
@@ -707,6 +736,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(surface_of_a_sphere),
         cmocka_unit_test(parts_add_up),
         cmocka_unit_test(volumes_and_derivatives),
+        cmocka_unit_test(surfaces_lose_volume),
         cmocka_unit_test(progress_is_true),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "sdm/exact.h"
 #include "sdm/internal/part_audit.h"
 #include "sdm/internal/rng.h"
 #include "sdm/internal/shape_box.h"
@@ -102,6 +101,18 @@ bool trainer_is_cut(const sdm_mesh *m, const sdm_grid *g)
     for (size_t v = 0; v < m->n_vert; v++)
         if (sdm_grid_beyond(g, m->vert + 3 * v, NULL) > 0) return true;
     return false;
+}
+
+sdm_status trainer_exact_within(const dataset *d, const double *p, int n_threads, sdm_exact **out,
+                                sdm_error *err)
+{
+    const sdm_exact_opts opts = {.n_threads = n_threads};
+    sdm_mesh mesh = {0};
+    *out = NULL;
+    sdm_status s = sdm_instance_mesh(d->shape, p, &mesh, err);
+    if (!s && !trainer_is_cut(&mesh, d->grid)) s = sdm_exact_create(&mesh, &opts, out, err);
+    sdm_mesh_dispose(&mesh);
+    return s;
 }
 
 /* Adds 1 to *n if parts of the mesh are inside out and stay so; lowers *thickness to that of the

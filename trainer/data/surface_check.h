@@ -3,6 +3,7 @@
 #pragma once
 
 #include "dataset.h"
+#include "sdm/exact.h"
 
 typedef struct surface_check {
     /* Root mean square of exact maps, interpolated trilinearly at points of the exact surface,
@@ -23,6 +24,11 @@ typedef struct surface_check {
 
 /* Does the mesh reach beyond the outer voxel centres of the grid? */
 bool trainer_is_cut(const sdm_mesh *m, const sdm_grid *g);
+
+/* *out = the exact engine of the shape at p[n_params], with n_threads threads; NULL: the grid cuts
+   this shape. Free it with sdm_exact_free(). [any thread] */
+sdm_status trainer_exact_within(const dataset *d, const double *p, int n_threads, sdm_exact **out,
+                                sdm_error *err);
 
 /* *param = the first parameter of which the mesh has other numbers of vertices or other triangles
    at the ends of its range, with the other parameters of the first held-out shape; n_params: there

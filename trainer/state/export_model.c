@@ -82,7 +82,7 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     const double voxel = trainer_dataset_voxel(d);
     const float near_mm = (float)sdm_grid_near(d->grid);
     double square = 0, absolute = 0, near = 0, largest = 0, at_surface = 0, dice = 0, dice_min = 1;
-    double far[2] = {0, 0}, largest_at = 0; // far from the surface: outside, inside
+    double far[2] = {0, 0}, largest_at = 0, far_largest = NAN; // far: outside, inside
     size_t n_near = 0, n_at_surface = 0, n_far[2] = {0, 0};
     // sum the errors over maps and voxels
     for (size_t i = 0; i < n && !s; i++) {
@@ -105,7 +105,8 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
             if (fabsf(truth[v]) <= near_mm)
                 near += e * e, n_near++;
             else
-                far[truth[v] < 0] += e * e, n_far[truth[v] < 0]++;
+                far[truth[v] < 0] += e * e, n_far[truth[v] < 0]++,
+                    far_largest = fmax(far_largest, fabs(e));
             if (fabs((double)truth[v]) <= voxel) at_surface += e * e, n_at_surface++;
             const bool known = sdm_inside_beside(truth[v], values[v], (float)voxel);
             inside += (size_t)known + (size_t)(values[v] < 0);
@@ -138,7 +139,8 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
                                .rmse_inside_mm = sqrt(far[1] / (double)n_far[1]),
                                .rmse_outside_mm = sqrt(far[0] / (double)n_far[0]),
                                .far_mm2 = (far[0] + far[1]) / voxels,
-                               .largest_at_mm = largest_at};
+                               .largest_at_mm = largest_at,
+                               .far_largest_mm = far_largest};
     }
     trainer_workbench_dispose(&w);
     sdm_free(each);
@@ -336,7 +338,9 @@ static sdm_status set_quality(const sdm_verdict *v, const trainer *t, const sdm_
     *q = (sdm_model_quality){.cut = v->cut,
                              .between_mm = sqrt(v->part_mm2[SDM_CAUSE_GRID]),
                              .thickness_mm = v->thickness_mm,
+                             .far_error_mm = v->far_largest_mm,
                              .volume_error = v->volume_error,
+                             .surface_volume_error = v->surface_volume_error,
                              .derivative_error = v->derivative_error,
                              .volume_derivative_error = v->volume_derivative_error};
     snprintf(q->grade, sizeof q->grade, "%s", sdm_grade_name(v->grade));
@@ -355,6 +359,21 @@ static sdm_status set_quality(const sdm_verdict *v, const trainer *t, const sdm_
     return s;
 }
 
+/* Volumes and derivatives. That they cannot be measured is no reason to lose the network: it is
+ * told only. */
+static void measure_uses(trainer *t, const sdm_model *m, model_errors *more)
+{
+    sdm_error why = {0};
+    if (trainer_volume_check(t, m, &more->volumes, &why)) {
+        trainer_volumes_unknown(&more->volumes);
+        trainer_message(t, "volumes were not measured: %s", why.text);
+    }
+    if (trainer_derivative_check(t, m, &more->derivatives, &why)) {
+        trainer_derivatives_unknown(&more->derivatives);
+        trainer_message(t, "derivatives were not measured: %s", why.text);
+    }
+}
+
 sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error *err)
 {
     description *d = NULL;
@@ -370,12 +389,7 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
                      "the trained network gives numbers that are not finite: use "
                      "network.weights=f32 or lower the "
                      "learning rates");
-    sdm_error why = {0};
-    if (!s && trainer_derivative_check(t, model, &more.derivatives, &why)) {
-        // no reason to lose the network: a notice only
-        trainer_derivatives_unknown(&more.derivatives);
-        trainer_message(t, "volumes and derivatives were not measured: %s", why.text);
-    }
+    if (!s) measure_uses(t, model, &more);
     double map_ms = NAN;
     if (!s && t->turns->n > 1) s = trainer_map_time(&t->data, model, &map_ms, err);
     sdm_model_free(model);

@@ -376,8 +376,7 @@ static void set_derivatives(const trainer *t, const derivative_check *c, sdm_ver
 {
     size_t n;
     const sdm_param *p = sdm_instance_params(t->shape, &n);
-    v->volume_error = c->volume;
-    v->volume_error_max = c->volume_max;
+    v->derivative_shapes = (int64_t)c->shapes;
     v->derivative_error = c->slope;
     v->volume_derivative_error = c->volume_slope;
     list_bad(p, c->slopes, isfinite(c->slope) ? n : 0, v->derivatives_bad,
@@ -420,6 +419,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                          .rmse_outside_mm = errors->rmse_outside_mm,
                          .largest_mm = t->accuracy.max_abs_mm,
                          .largest_at_mm = errors->largest_at_mm,
+                         .far_largest_mm = errors->far_largest_mm,
                          .dice = errors->dice,
                          .dice_min = errors->dice_min,
                          .heldout = t->accuracy.samples,
@@ -433,6 +433,10 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                          .coarse_mm = sdm_grid_coarsest(d->grid),
                          .cut = surface.cut,
                          .inside_out = surface.inside_out,
+                         .volume_error = errors->volumes.map,
+                         .volume_error_max = errors->volumes.map_max,
+                         .surface_volume_error = errors->volumes.surface,
+                         .surface_volume_error_max = errors->volumes.surface_max,
                          .saved_seconds = t->saved_seconds,
                          .fall = fmax(trainer_history_fall(&h, SDM_PHASE_MODE_FIT, floor),
                                       trainer_history_fall(&h, SDM_PHASE_REFINE, floor))};

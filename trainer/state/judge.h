@@ -4,6 +4,7 @@
 #include "derivative_check.h"
 #include "kind.h"
 #include "sdm/internal/verdict.h"
+#include "volume_check.h"
 
 /* Errors of the finished model that sdm_accuracy does not have. */
 typedef struct model_errors {
@@ -13,9 +14,11 @@ typedef struct model_errors {
     /* root mean square errors of the voxels farther from the surface than sdm_accuracy.near_mm,
        inside and outside; NaN: there are none */
     double rmse_inside_mm, rmse_outside_mm;
-    double far_mm2;       /* what these voxels add to the mean square error of all voxels */
-    double largest_at_mm; /* exact signed distance at the voxel with the largest error */
+    double far_mm2;        /* what these voxels add to the mean square error of all voxels */
+    double largest_at_mm;  /* exact signed distance at the voxel with the largest error */
+    double far_largest_mm; /* largest error of the voxels farther than near_mm; NaN: none */
     derivative_check derivatives;
+    volume_check volumes;
 } model_errors;
 
 /* Measures the parts of the error and fills *out. t->accuracy must be set. */

@@ -7,10 +7,9 @@
 
 #include "sdm/internal/part_audit.h"
 
-/* From this share of a surface with edges, or thinner than two voxels, on, and below this number of
-   voxels across the thinnest part, volumes of surfaces are too small: a spanner with half of its
-   surface near edges lost 5 % of its volume with 3.6 voxels, 10 % with 1.9, 1 % with 7.3. */
-static const double EDGES_MANY = 0.1, VOXELS_MANY = 4;
+/* The grid, not the network, changes the volumes of surfaces if their error is this multiple of
+   that of the volumes of maps, which edges between the voxels change little. */
+static const double GRID_SHARE = 2;
 
 const char *sdm_cause_name(sdm_cause cause)
 {
@@ -51,9 +50,9 @@ bool sdm_verdict_lacks_part(const sdm_verdict *v)
     return sdm_too_thin(v->thickness_mm, v->coarse_mm);
 }
 
-bool sdm_verdict_cuts_edges(const sdm_verdict *v)
+bool sdm_verdict_surfaces_off(const sdm_verdict *v)
 {
-    return v->thin >= EDGES_MANY && v->thickness_mm < VOXELS_MANY * v->coarse_mm;
+    return v->surface_volume_error > SDM_VOLUME_BAD;
 }
 
 /* Why a poor model is not for use. */
@@ -75,7 +74,7 @@ static const char *poor_text(const sdm_verdict *v, char *text)
 const char *sdm_grade_text(const sdm_verdict *v, char *text)
 {
     // a volume is a measurement
-    const bool measures = !(v->volume_error > SDM_VOLUME_BAD) && !sdm_verdict_cuts_edges(v) &&
+    const bool measures = !(v->volume_error > SDM_VOLUME_BAD) && !sdm_verdict_surfaces_off(v) &&
                           !sdm_verdict_lacks_part(v);
     if (v->grade == SDM_GRADE_POOR) return poor_text(v, text);
     if (v->grade == SDM_GRADE_GOOD)
@@ -90,17 +89,18 @@ const char *sdm_grade_text(const sdm_verdict *v, char *text)
 double sdm_verdict_spacing(const sdm_verdict *v)
 {
     if (!strcmp(v->key, "grid.spacing")) return v->to;
-    const double most = sdm_verdict_lacks_part(v)   ? 0.5 * v->thickness_mm
-                        : sdm_verdict_cuts_edges(v) ? v->thickness_mm / VOXELS_MANY
-                                                    : NAN,
+    const bool grid =
+        sdm_verdict_surfaces_off(v) && !(v->surface_volume_error < GRID_SHARE * v->volume_error);
+    // the volume that edges and thin walls lose is about quadratic in the spacing
+    const double loss = SDM_VOLUME_BAD / v->surface_volume_error,
+                 most = sdm_verdict_lacks_part(v) ? 0.5 * v->thickness_mm
+                        : grid                    ? 0.9 * sqrt(loss) * v->coarse_mm
+                                                  : NAN,
                  unit = pow(10, floor(log10(most)) - 1);
     return floor(most / unit) * unit;
 }
 
-bool sdm_verdict_errs_far(const sdm_verdict *v)
-{
-    return v->largest_mm > v->voxel_mm && fabs(v->largest_at_mm) > v->near_mm;
-}
+bool sdm_verdict_errs_far(const sdm_verdict *v) { return v->far_largest_mm > v->voxel_mm; }
 
 void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
 {
@@ -115,6 +115,7 @@ void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
     sdm_json_real(j, "rmse_outside_mm", v->rmse_outside_mm);
     sdm_json_real(j, "largest_mm", v->largest_mm);
     sdm_json_real(j, "largest_at_mm", v->largest_at_mm);
+    sdm_json_real(j, "far_largest_mm", v->far_largest_mm);
     sdm_json_real(j, "dice", v->dice);
     sdm_json_real(j, "dice_min", v->dice_min);
     for (int i = 0; i < SDM_CAUSES; i++) {
@@ -132,6 +133,9 @@ void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
     sdm_json_real(j, "inside_out", v->inside_out);
     sdm_json_real(j, "volume_error", v->volume_error);
     sdm_json_real(j, "volume_error_max", v->volume_error_max);
+    sdm_json_real(j, "surface_volume_error", v->surface_volume_error);
+    sdm_json_real(j, "surface_volume_error_max", v->surface_volume_error_max);
+    sdm_json_int(j, "derivative_shapes", v->derivative_shapes);
     sdm_json_real(j, "derivative_error", v->derivative_error);
     sdm_json_text(j, "derivative_by", v->derivative_by);
     sdm_json_real(j, "volume_derivative_error", v->volume_derivative_error);

@@ -28,28 +28,39 @@ static void add(unfit_lines *l, const char *format, ...)
     l->text[l->size] = '\0';
 }
 
+/* text[16] = a relative error in per cent with two digits, from 10 % on a whole number. Returns
+ * text. */
+static const char *percent(double error, char text[16])
+{
+    snprintf(text, 16, error >= 0.1 ? "%.0f" : "%.2g", 100 * error);
+    return text;
+}
+
 /* Parts that the maps lack, or cut. */
 static void add_parts(const sdm_verdict *v, unfit_lines *l)
 {
+    char text[16];
+    const double spacing = sdm_verdict_spacing(v);
     if (v->inside_out > 0) add(l, "the parts that are inside out, which are missing");
     // the line of the grade tells of more, unless parts are inside out
     if (v->cut > 0 && (v->cut <= SDM_CUT_POOR || v->inside_out > 0))
         add(l, "the %.2g %% of the shapes that the grid cuts", fmin(99, 100 * v->cut));
     if (sdm_verdict_errs_far(v))
-        add(l, "distances far from the surface: wrong by up to %.2g mm", v->largest_mm);
+        add(l, "distances far from the surface: wrong by up to %.2g mm", v->far_largest_mm);
     if (v->volume_error > SDM_VOLUME_BAD)
-        add(l, v->volume_error >= 0.1 ? "volumes: off by %.0f %%" : "volumes: off by %.2g %%",
-            100 * v->volume_error);
+        add(l, "volumes of maps: off by %s %%", percent(v->volume_error, text));
     if (sdm_verdict_lacks_part(v))
         add(l,
             "its thinnest part and volumes of surfaces (.stl): it is %.2g mm thick, too thin for "
             "voxels of %.3g mm, and will be missing or broken; grid.spacing %.2g shows it",
-            v->thickness_mm, v->coarse_mm, sdm_verdict_spacing(v));
-    else if (sdm_verdict_cuts_edges(v))
+            v->thickness_mm, v->coarse_mm, spacing);
+    else if (sdm_verdict_surfaces_off(v) && spacing < v->coarse_mm)
         add(l,
-            "volumes of surfaces (.stl): voxels of %.3g mm cut the edges of its parts, the "
-            "thinnest of which is %.2g mm thick; grid.spacing %.2g keeps more of them",
-            v->coarse_mm, v->thickness_mm, sdm_verdict_spacing(v));
+            "volumes of surfaces (.stl): off by %s %%, voxels of %.3g mm cut edges and thin parts; "
+            "grid.spacing %.2g keeps more of them",
+            percent(v->surface_volume_error, text), v->coarse_mm, spacing);
+    else if (sdm_verdict_surfaces_off(v))
+        add(l, "volumes of surfaces (.stl): off by %s %%", percent(v->surface_volume_error, text));
 }
 
 void sdm_verdict_unfit(const sdm_verdict *v, char text[SDM_MODEL_UNFIT])

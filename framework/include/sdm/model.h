@@ -52,11 +52,18 @@ typedef struct sdm_model_quality {
        with others is not the one of the training (sdm_runtime_instance()). */
     double mesh_volume_mm3, mesh_area_mm2;
     /* Root mean square over that of the right values; NaN: not known. On up to 20 held-out shapes:
-       of the volume of a map (sdm_map_volume()). On up to four, so only a rough figure, and for the
-       parameter for which they are largest: of the derivatives of the map within half a voxel of
-       the surface, and of the derivative of the volume, where a parameter that changes the volume
-       by less than 5 % over its range counts as if it changed it by 5 %. */
+       of the volume of a map (sdm_map_volume()). On up to 32 (of more than twelve parameters, or in
+       a short training, fewer), and for the parameter for which they are largest: of the
+       derivatives of the map within half a voxel of the surface, and of the derivative of the
+       volume, where a parameter that changes the volume by less than 5 % over its range counts as
+       if it changed it by 5 %. */
     double volume_error, derivative_error, volume_derivative_error;
+    /* as volume_error, of the volume inside the surface of a map (sdm_isosurface()): edges and thin
+       walls between the voxels are cut */
+    double surface_volume_error;
+    /* largest error of a distance farther than sdm_accuracy.near_mm from the surface, mm; NaN: not
+       known */
+    double far_error_mm;
     /* as mesh_volume_mm3 and mesh_area_mm2, at three other parameter vectors; NaN: not known */
     double probe_volume_mm3[SDM_MODEL_PROBES], probe_area_mm2[SDM_MODEL_PROBES];
     /* what the training found the model not good for, in words, with the parameters: lines that end
@@ -71,10 +78,12 @@ typedef struct sdm_model_quality {
 /* Uses of a model, for sdm_model_check_use(), each with the figure of sdm_model_quality that
    decides. */
 typedef enum sdm_model_use {
-    SDM_USE_SURFACE = 0,          /* surfaces, level sets: grade; "poor" is not for them */
-    SDM_USE_VOLUME = 1,           /* volume_error > SDM_VOLUME_BAD */
-    SDM_USE_DERIVATIVE = 2,       /* of maps: derivative_error > SDM_DERIVATIVE_BAD */
-    SDM_USE_VOLUME_DERIVATIVE = 3 /* volume_derivative_error > SDM_DERIVATIVE_BAD */
+    SDM_USE_SURFACE = 0,           /* surfaces, level sets: grade; "poor" is not for them */
+    SDM_USE_VOLUME = 1,            /* of maps: volume_error > SDM_VOLUME_BAD */
+    SDM_USE_DERIVATIVE = 2,        /* of maps: derivative_error > SDM_DERIVATIVE_BAD */
+    SDM_USE_VOLUME_DERIVATIVE = 3, /* volume_derivative_error > SDM_DERIVATIVE_BAD */
+    SDM_USE_DISTANCE = 4,          /* far from the surface: far_error_mm > a voxel */
+    SDM_USE_SURFACE_VOLUME = 5     /* inside surfaces: surface_volume_error > SDM_VOLUME_BAD */
 } sdm_model_use;
 
 /* Description of a model. All pointers stay valid until sdm_model_free(); texts are

@@ -21,6 +21,9 @@ void sdm_quality_describe(const sdm_model_quality *q, sdm_text *t)
     if (!isnan(q->derivative_error)) sdm_text_add_real(t, "derivative_error", q->derivative_error);
     if (!isnan(q->volume_derivative_error))
         sdm_text_add_real(t, "volume_derivative_error", q->volume_derivative_error);
+    if (!isnan(q->surface_volume_error))
+        sdm_text_add_real(t, "surface_volume_error", q->surface_volume_error);
+    if (!isnan(q->far_error_mm)) sdm_text_add_real(t, "far_error_mm", q->far_error_mm);
     for (int i = 0; i < SDM_MODEL_PROBES; i++) {
         if (isnan(q->probe_volume_mm3[i]) || isnan(q->probe_area_mm2[i])) break;
         sdm_text_add_real(t, "probe_volume_mm3", q->probe_volume_mm3[i]);
@@ -46,8 +49,18 @@ static void read_unfit(sdm_lines *r, char text[SDM_MODEL_UNFIT])
 sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sdm_error *err)
 {
     static const char *const grades[] = {"good", "usable", "poor"};
-    *q = (sdm_model_quality){
-        "", NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, {NAN, NAN, NAN}, {NAN, NAN, NAN}, ""};
+    *q = (sdm_model_quality){.cut = NAN,
+                             .between_mm = NAN,
+                             .thickness_mm = NAN,
+                             .mesh_volume_mm3 = NAN,
+                             .mesh_area_mm2 = NAN,
+                             .volume_error = NAN,
+                             .derivative_error = NAN,
+                             .volume_derivative_error = NAN,
+                             .surface_volume_error = NAN,
+                             .far_error_mm = NAN,
+                             .probe_volume_mm3 = {NAN, NAN, NAN},
+                             .probe_area_mm2 = {NAN, NAN, NAN}};
     if (!section) return SDM_OK;
     sdm_lines r = {.at = section->data};
     r.end = r.at + section->size;
@@ -64,6 +77,9 @@ sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sd
         q->derivative_error = sdm_lines_real(&r, "derivative_error");
     if (sdm_lines_next_is(&r, "volume_derivative_error"))
         q->volume_derivative_error = sdm_lines_real(&r, "volume_derivative_error");
+    if (sdm_lines_next_is(&r, "surface_volume_error"))
+        q->surface_volume_error = sdm_lines_real(&r, "surface_volume_error");
+    if (sdm_lines_next_is(&r, "far_error_mm")) q->far_error_mm = sdm_lines_real(&r, "far_error_mm");
     for (int i = 0; i < SDM_MODEL_PROBES && sdm_lines_next_is(&r, "probe_volume_mm3"); i++) {
         q->probe_volume_mm3[i] = sdm_lines_real(&r, "probe_volume_mm3");
         q->probe_area_mm2[i] = sdm_lines_real(&r, "probe_area_mm2");
@@ -74,7 +90,7 @@ sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sd
         known = known || !strcmp(q->grade, grades[i]);
     if (!known || q->cut < 0 || q->cut > 1 || q->between_mm < 0 || q->thickness_mm < 0 ||
         q->mesh_area_mm2 < 0 || q->volume_error < 0 || q->derivative_error < 0 ||
-        q->volume_derivative_error < 0)
+        q->volume_derivative_error < 0 || q->surface_volume_error < 0 || q->far_error_mm < 0)
         r.failed = true;
     return sdm_lines_check(&r, err);
 }

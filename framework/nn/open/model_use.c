@@ -4,35 +4,67 @@
 
 #include "sdm/model.h"
 
+/* Digits after the point with which 100 * error is seen to exceed 100 * bad. */
+static int digits_over(double error, double bad)
+{
+    int n = error < 0.1;
+    while (n < 6 && rint(100 * error * pow(10, n)) <= 100 * bad * pow(10, n)) n++;
+    return n;
+}
+
+static sdm_status check_grade(const sdm_model_quality *q, sdm_error *err)
+{
+    if (!q->grade[0]) return sdm_fail(err, SDM_E_UNSUPPORTED, "the model has no grade");
+    return strcmp(q->grade, "poor")
+               ? SDM_OK
+               : sdm_fail(err, SDM_E_QUALITY, "the training graded this model poor");
+}
+
+static sdm_status check_distances(const sdm_model_info *m, sdm_error *err)
+{
+    const double *h = m->grid.spacing, voxel = fmin(h[0], fmin(h[1], h[2])),
+                 error = m->quality.far_error_mm;
+    if (isnan(error))
+        return sdm_fail(err, SDM_E_UNSUPPORTED,
+                        "the training did not measure distances far from the surface");
+    if (error <= voxel) return SDM_OK;
+    return sdm_fail(err, SDM_E_QUALITY,
+                    "distances of its maps farther than %.3g mm from the surface are wrong by up "
+                    "to %.2g mm; nearer ones are right, and so are all of exact maps",
+                    m->accuracy.near_mm, error);
+}
+
 sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error *err)
 {
-    if (!m || (int)use < SDM_USE_SURFACE || use > SDM_USE_VOLUME_DERIVATIVE)
+    if (!m || (int)use < SDM_USE_SURFACE || use > SDM_USE_SURFACE_VOLUME)
         return sdm_fail(err, SDM_E_ARG, "model: a model and a use of it are needed");
-    const sdm_model_quality *q = &sdm_model_get_info(m)->quality;
-    if (use == SDM_USE_SURFACE) {
-        if (!q->grade[0]) return sdm_fail(err, SDM_E_UNSUPPORTED, "the model has no grade");
-        return strcmp(q->grade, "poor")
-                   ? SDM_OK
-                   : sdm_fail(err, SDM_E_QUALITY, "the training graded this model poor");
-    }
+    const sdm_model_info *info = sdm_model_get_info(m);
+    const sdm_model_quality *q = &info->quality;
+    if (use == SDM_USE_SURFACE) return check_grade(q, err);
+    if (use == SDM_USE_DISTANCE) return check_distances(info, err);
+    static const char worst[] = " for the worst parameter",
+                      slopes[] = "; those of exact maps are right if the shape has the same "
+                                 "triangles for all parameters";
     const struct {
         const char *name, *worst;
         double error, bad;
-    } figures[] = {[SDM_USE_VOLUME] = {"volumes", "", q->volume_error, SDM_VOLUME_BAD},
-                   [SDM_USE_DERIVATIVE] = {"derivatives", " for the worst parameter",
-                                           q->derivative_error, SDM_DERIVATIVE_BAD},
-                   [SDM_USE_VOLUME_DERIVATIVE] = {"derivatives of volumes",
-                                                  " for the worst parameter",
-                                                  q->volume_derivative_error, SDM_DERIVATIVE_BAD}},
+        const char *remedy;
+    } figures[] =
+        {[SDM_USE_VOLUME] = {"volumes of its maps", "", q->volume_error, SDM_VOLUME_BAD,
+                             "; those of exact maps are right"},
+         [SDM_USE_SURFACE_VOLUME] = {"volumes inside the surfaces of its maps", "",
+                                     q->surface_volume_error, SDM_VOLUME_BAD,
+                                     ": they cut edges and thin walls between the voxels"},
+         [SDM_USE_DERIVATIVE] = {"derivatives of its maps", worst, q->derivative_error,
+                                 SDM_DERIVATIVE_BAD, slopes},
+         [SDM_USE_VOLUME_DERIVATIVE] = {"derivatives of volumes of its maps", worst,
+                                        q->volume_derivative_error, SDM_DERIVATIVE_BAD, slopes}},
       *f = &figures[use];
     if (isnan(f->error))
-        return sdm_fail(err, SDM_E_UNSUPPORTED,
-                        "the training did not measure the errors of %s of the model's maps",
+        return sdm_fail(err, SDM_E_UNSUPPORTED, "the training did not measure the errors of %s",
                         f->name);
     if (f->error <= f->bad) return SDM_OK;
-    return sdm_fail(err, SDM_E_QUALITY,
-                    "%s of its maps are off by %.*f %%%s, more than %g %%: exact maps have right "
-                    "ones%s",
-                    f->name, f->error < 0.1, 100 * f->error, f->worst, 100 * f->bad,
-                    use == SDM_USE_VOLUME ? "" : ", unless the parameters change the triangles");
+    return sdm_fail(err, SDM_E_QUALITY, "%s are off by %.*f %%%s, more than %g %%%s", f->name,
+                    digits_over(f->error, f->bad), 100 * f->error, f->worst, 100 * f->bad,
+                    f->remedy);
 }

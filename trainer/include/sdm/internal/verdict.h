@@ -51,6 +51,7 @@ typedef struct sdm_verdict {
        (two voxels), and of those farther inside and outside; NaN: there are none */
     double near_mm, rmse_near_mm, rmse_inside_mm, rmse_outside_mm;
     double largest_mm, largest_at_mm; /* largest error of a voxel; exact signed distance there */
+    double far_largest_mm; /* largest error of a voxel farther than near_mm; NaN: there are none */
     sdm_grade grade;
     int64_t heldout;             /* number of the shapes on which the figures were measured */
     double part_mm2[SDM_CAUSES]; /* parts of the mean square error; of the grid: of the surface */
@@ -71,9 +72,12 @@ typedef struct sdm_verdict {
     /* fraction of a few held-out shapes with parts that are inside out and overlap others */
     double inside_out;
     /* On a few held-out shapes, over the right value; NaN: not measured. Volumes of maps: root mean
-       square, and the largest. Derivatives by the parameter for which they are worst, root mean
-       square: of maps within half a voxel of the surface, and of the volume of maps. */
-    double volume_error, volume_error_max, derivative_error, volume_derivative_error;
+       square, and the largest; the same of the surfaces of these maps. Derivatives by the parameter
+       for which they are worst, root mean square: of maps within half a voxel of the surface, and
+       of the volume of maps. */
+    double volume_error, volume_error_max, surface_volume_error, surface_volume_error_max,
+        derivative_error, volume_derivative_error;
+    int64_t derivative_shapes;                        /* on which derivatives were measured */
     char derivative_by[64], volume_derivative_by[64]; /* names of these parameters; "": none */
     /* all parameters whose errors exceed SDM_DERIVATIVE_BAD, the worst first, as "a: off by 32 %;
        by b: off by 24 %"; cut where they are too many */
@@ -127,20 +131,21 @@ const char *sdm_grade_text(const sdm_verdict *v, char *text);
    none. [any thread] */
 void sdm_verdict_unfit(const sdm_verdict *v, char text[SDM_MODEL_UNFIT]);
 
-/* Volumes of surfaces on the grid are too small: at least a tenth of the surface has edges or is
-   thinner than two voxels, and the thinnest part is thinner than four voxels. [any thread] */
-bool sdm_verdict_cuts_edges(const sdm_verdict *v);
+/* The surfaces of the maps enclose too small or too large volumes (surface_volume_error exceeds
+   SDM_VOLUME_BAD). [any thread] */
+bool sdm_verdict_surfaces_off(const sdm_verdict *v);
 
 /* The grid does not show the thinnest part of the shapes (sdm_too_thin()). [any thread] */
 bool sdm_verdict_lacks_part(const sdm_verdict *v);
 
 /* The one spacing that the verdict advises, mm: that of its key, or the spacing that shows the
-   thinnest part or keeps the volumes of surfaces; NaN: none. Rounded down to two digits. [any
+   thinnest part or keeps the volumes of surfaces where the grid changes them, not the network; NaN:
+   none. Rounded down to two digits. [any
    thread] */
 double sdm_verdict_spacing(const sdm_verdict *v);
 
-/* true: the largest error exceeds a voxel and lies farther than near_mm from the surface, where the
-   grade says nothing. [any thread] */
+/* true: farther than near_mm from the surface, where the grade says nothing, the largest error
+   exceeds a voxel. [any thread] */
 bool sdm_verdict_errs_far(const sdm_verdict *v);
 
 /* Adds the figures of the verdict to the open object of *j. */

@@ -47,6 +47,7 @@ typedef struct job {
     cli_points_table points; /* of --points */
     sdm_measures measures;   /* of --measure */
     double ms_build, ms_query;
+    bool thin;                        /* a part is too thin for the voxels, as was told */
     sdm_sign_certificate certificate; /* checked == 0 without --certify */
     double bound_mm;                  /* bound on the error of the distances; 0: exact */
 } job;
@@ -286,7 +287,7 @@ static bool writes_labels(const cli_args *args)
     return false;
 }
 
-static void notice_mesh(const job *j)
+static void notice_mesh(job *j)
 {
     const sdm_audit *a = &j->report.audit;
     int64_t inside = 1; // a level set without voxels inside is refused when it is written
@@ -296,22 +297,21 @@ static void notice_mesh(const job *j)
         cli_warn_cut_shape(&j->grid, j->mesh.vert, j->mesh.n_vert,
                            "a larger grid (--size, --spacing, --origin) holds it");
     const double size = sqrt(v3_dist2(a->min, a->max));
-    bool thin = false;
     if (size > 0 && (size < SDM_SURVEY_SIZE_MIN || size > SDM_SURVEY_SIZE_MAX))
         cli_warn("the mesh measures %.3g mm across: is it in %s? lengths are mm", size,
                  sdm_unit_near(size < SDM_SURVEY_SIZE_MIN ? 1e3 : 1e-3, NULL));
     // a closed part that meets no other cannot be inside out after the engine has turned it; the
     // audit of the single part of a file, which may be large, would only tell its thickness
     if (a->components > 1 || !a->closed || j->args->shape)
-        thin = cli_warn_mesh(&j->mesh, j->args->points ? 0 : sdm_grid_coarsest(&j->grid),
-                             j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
+        j->thin = cli_warn_mesh(&j->mesh, j->args->points ? 0 : sdm_grid_coarsest(&j->grid),
+                                j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
     else {
         cli_warn_audit(a);
         if (j->report.turned) cli_notice("the mesh is inside out; maps turn it");
     }
     // a part that is too thin, told above, is the cause of both
-    if (!thin && inside) warn_torn(j);
-    if (!thin && !inside) tell_nothing_inside(&j->grid);
+    if (!j->thin && inside) warn_torn(j);
+    if (!j->thin && !inside) tell_nothing_inside(&j->grid);
     if (inside && a->closed && !j->args->points)
         cli_tell_hits(&j->mesh, &j->grid, writes_labels(j->args), !j->args->like);
     if (j->report.unioned)
@@ -352,6 +352,7 @@ static sdm_status write_outputs(const job *j, sdm_error *err)
                    .params = j->params.data ? j->params.data : "",
                    .source = SDM_SOURCE_EXACT,
                    .error_mm = j->report.union_error_mm + j->bound_mm,
+                   .thin = j->thin,
                    .origin = j->args->method,
                    .engine = j->args->narrow > 0 ? NULL : j->engine};
     if (cli_writes_surface(j->args)) cli_map_compare(&j->mesh, &map);

@@ -44,6 +44,7 @@ typedef struct job {
     size_t n_rows;
     sdm_grid grid;             /* of all maps */
     bool own;                  /* the grid is that of the model */
+    bool thin;                 /* a part of the shapes is too thin for it, as was told */
     bool banded;               /* bands suffice: only level sets are wanted */
     double width;              /* of the bands, mm */
     sdm_blocks band;           /* of the last row */
@@ -281,7 +282,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
                         "--measure or --json");
     sdm_status s = open_model(j, err);
     if (!s) s = choose_grid(j, err);
-    if (!s) cli_warn_thin_model(args->files.items[0], j->info, &j->grid);
+    if (!s) j->thin = cli_warn_thin_model(args->files.items[0], j->info, &j->grid);
     if (!s) warn_label_volumes(j);
     if (!s) warn_far(j);
     if (!s) s = read_rows(j, err);
@@ -320,6 +321,7 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
                    .source = result->source,
                    .clamped = result->clamped,
                    .error_mm = result->error_mm,
+                   .thin = j->thin,
                    .origin = result->source == SDM_SOURCE_EXACT ? "exact" : origin,
                    .reason = result->reason,
                    .check = result->checked ? &result->check : NULL};
@@ -445,7 +447,9 @@ static sdm_status make_map(job *j, const double *p, const sdm_generate_opts *opt
     sdm_status s = j->banded ? make_band(j, p, opts, result, err) : SDM_OK;
     if (s || j->band.tile) return s;
     if (!j->own)
-        s = sdm_generate_grid(m, p, opts, &j->grid, j->values, j->jacobian, result, err);
+        s = cli_explain_size(
+            j->args, &j->info->grid, &j->grid,
+            sdm_generate_grid(m, p, opts, &j->grid, j->values, j->jacobian, result, err), err);
     else if (j->jacobian)
         s = sdm_generate_jacobian(m, p, opts, j->values, j->jacobian, result, err);
     else

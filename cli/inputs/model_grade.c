@@ -30,12 +30,14 @@ void cli_warn_quality(const char *path, const sdm_model_info *m)
                  poor && cut ? "; " : "", shapes);
 }
 
-void cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_grid *g)
+bool cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_grid *g)
 {
     const double thick = m->quality.thickness_mm,
                  voxel = fmax(sdm_grid_coarsest(&m->grid), sdm_grid_coarsest(g));
-    if (sdm_too_thin(thick, voxel))
+    const bool thin = sdm_too_thin(thick, voxel);
+    if (thin)
         cli_warn("%s: a part of its shapes is " CLI_THIN_PART, path, thick, voxel, 0.5 * thick);
+    return thin;
 }
 
 void cli_warn_derivatives(const char *path, const sdm_model *m)

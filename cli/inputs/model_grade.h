@@ -8,8 +8,8 @@
 void cli_warn_quality(const char *path, const sdm_model_info *m);
 
 /* Warns in one line if the thinnest part of the shapes of the training is too thin for the voxels
- * of the model or of the grid g, whichever are larger. */
-void cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_grid *g);
+ * of the model or of the grid g, whichever are larger. Returns whether it did. */
+bool cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_grid *g);
 
 /* Warns if the derivatives of the model's maps are off by over a fifth for a parameter. */
 void cli_warn_derivatives(const char *path, const sdm_model *m);

@@ -61,3 +61,25 @@ sdm_status cli_model_grid(const cli_args *args, const sdm_grid *model, sdm_grid 
         out->origin[a] = has_origin ? args->origin[a] : centre[a] - world[a];
     return sdm_grid_check(out, err);
 }
+
+sdm_status cli_explain_size(const cli_args *args, const sdm_grid *model, const sdm_grid *g,
+                            sdm_status s, sdm_error *err)
+{
+    double centre[3], edge[3];
+    int64_t n[3];
+    if (s != SDM_E_RANGE || !(args->size[0] > 0) || args->spacing[0] > 0 ||
+        isfinite(args->origin[0]) || isfinite(args->direction[0]))
+        return s;
+    box_of(model, centre, edge);
+    // rounded down to five digits, the voxels still fit
+    const double unit = pow(10, floor(log10(g->spacing[0])) - 4),
+                 spacing = floor(g->spacing[0] / unit) * unit;
+    for (int a = 0; a < 3; a++) {
+        const int64_t most = (int64_t)floor(edge[a] / spacing + 1e-9) + 1;
+        n[a] = g->n[a] < most ? g->n[a] : most;
+    }
+    return sdm_fail_in(err, s,
+                       "--size alone makes cubes that cover the box of the model (--size "
+                       "%lld,%lld,%lld --spacing %.5g stays in it)",
+                       (long long)n[0], (long long)n[1], (long long)n[2], spacing);
+}

@@ -118,6 +118,11 @@ sdm_status cli_grid_for_box(const cli_args *args, const double min[3], const dou
 sdm_status cli_model_grid(const cli_args *args, const sdm_grid *model, sdm_grid *out, bool *own,
                           sdm_error *err);
 
+/* Returns s, the status of a map on the grid g of cli_model_grid(). Where --size alone made this
+ * grid leave the box of the model, begins the message with size and spacing that do not. */
+sdm_status cli_explain_size(const cli_args *args, const sdm_grid *model, const sdm_grid *g,
+                            sdm_status s, sdm_error *err);
+
 /* As sdm_mesh_read(), but returns SDM_E_FORMAT instead of SDM_E_UNSUPPORTED for an unknown type of
  * file. */
 sdm_status cli_read_mesh(const char *path, sdm_mesh *out, sdm_error *err);

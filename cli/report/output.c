@@ -156,14 +156,18 @@ static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *s
                  "a voxel of %.3g mm and is torn; %s shows it",
                  path, audit.components, map->pieces, trained ? map->trained_mm : voxel,
                  trained ? "a training with a smaller grid.spacing" : "a smaller --spacing");
-    else if (fabs(more) > VOLUME_OFF_MAX)
+    else if (fabs(more) > VOLUME_OFF_MAX) {
+        const double cuts = trained ? map->trained_mm : voxel;
+        char advice[96] = "";
+        if (trained || !map->thin)
+            snprintf(advice, sizeof advice, "; %s%.2g shows more of them",
+                     trained ? "a training with grid.spacing " : "--spacing ", 0.5 * cuts);
         cli_warn(
             "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
-            "%.3g mm cut its edges and thin parts; %s%.2g shows more of them",
+            "%.3g mm cut its edges and thin parts%s",
             path, fabs(audit.volume), 100 * fabs(more), more < 0 ? "less" : "more", map->volume,
-            trained ? map->trained_mm : voxel,
-            trained ? "a training with grid.spacing " : "--spacing ",
-            0.5 * (trained ? map->trained_mm : voxel));
+            cuts, advice);
+    }
 }
 
 #ifdef SDM_HAVE_VDB

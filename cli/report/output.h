@@ -24,6 +24,7 @@ typedef struct cli_map {
     double volume; /* of the shape, mm^3: a surface that encloses much less or more is warned of; 0:
                       not known */
     double trained_mm; /* of a network: longest edge of a voxel of its training; 0: exact maps */
+    bool thin;         /* a part is too thin for the voxels, as was told with a better spacing */
     size_t pieces;     /* closed surfaces of the shape: more of them in a file are warned of; 0: not
                           known */
     const char *origin; /* "model CHECKSUM", or the method without a network: "exact", "edt" ... */

@@ -120,8 +120,11 @@ static sdm_status print_text(const check *c, sdm_error *err)
     printf("mesh     %zu vertices, %zu triangles, %.3g ms\n", f->n_vert, f->n_tri, f->ms_mesh);
     if (f->volume[0] <= f->volume[1])
         printf("volume   %.6g .. %.6g mm^3, of the union\n", f->volume[0], f->volume[1]);
-    printf("box      %.4g %.4g %.4g .. %.4g %.4g %.4g mm\n", f->low[0], f->low[1], f->low[2],
-           f->high[0], f->high[1], f->high[2]);
+    if (!(f->low[0] <= f->high[0]))
+        printf("box      not known: no mesh was made\n");
+    else
+        printf("box      %.4g %.4g %.4g .. %.4g %.4g %.4g mm\n", f->low[0], f->low[1], f->low[2],
+               f->high[0], f->high[1], f->high[2]);
     if (f->has_velocity)
         printf("velocity differs from differences of meshes by %.2g at most (relative)\n",
                f->velocity_error);

@@ -38,6 +38,9 @@ if sdmgen generate $model -p a=4.2 --spacing 0.1 -o band.vdb --quiet 2>err; then
     expect 2 'a level set needs voxels of one size' sdmgen generate $model --spacing 0.1,0.1,0.2 -o x.vdb
     expect 2 'need a larger one' sdmgen generate $model --spacing 1e-6 -o x.vdb
 fi
+# Cubes that cover the box of the model leave it: the size that fits is told, and it does.
+expect 5 'makes cubes that cover the box of the model \(--size 20,17,14 --spacing 0\.71052 stays in it\): the grid leaves' sdmgen generate $model --size 20,20,20 -o x.npy
+expect 0 - sdmgen generate $model --size 20,17,14 --spacing 0.71052 -q -o cubes.npy
 
 # Points: the values of the grid, gradients, derivatives.
 printf 'x,y,z\n-6,-5.2,-4.4\n0.1,0.2,0.3\n' >points.csv

@@ -48,6 +48,7 @@ sdm_status trainer_history_read(const trainer *t, history *out, sdm_error *err)
         const size_t length = (size_t)(end - p);
         const history_point point = {.phase = phase_of(p),
                                      .step = number_after(p, length, "\"step\": "),
+                                     .seconds = number_after(p, length, "\"seconds\": "),
                                      .loss = number_after(p, length, "\"loss_mm2\": "),
                                      .heldout = number_after(p, length, "\"heldout_mse_mm2\": ")};
         // the training of another kind begins
@@ -102,39 +103,71 @@ double trainer_history_fall(const history *h, sdm_phase phase, double floor)
     return error > 0 ? fmax(0, 1 - beyond(last, floor) / error) : 0;
 }
 
+/* The curves of loss.png. */
+typedef struct loss_curves {
+    double *x;                        // [n] of all points
+    double *loss, *refined, *heldout; // [n] root mean square errors, mm; NaN: not of this curve
+    double end[2];                    // of the finished model
+    double begin[2], height[2];       // the line where the refinement begins; NaN: it does not
+} loss_curves;
+
+static sdm_status curves_create(size_t n, loss_curves *c, sdm_error *err)
+{
+    sdm_status s = SDM_ALLOC(&c->x, n, "loss curve", err);
+    if (!s) s = SDM_ALLOC(&c->loss, n, "loss curve", err);
+    if (!s) s = SDM_ALLOC(&c->refined, n, "loss curve", err);
+    if (!s) s = SDM_ALLOC(&c->heldout, n, "loss curve", err);
+    return s;
+}
+
+static void curves_dispose(loss_curves *c)
+{
+    sdm_free(c->heldout);
+    sdm_free(c->refined);
+    sdm_free(c->loss);
+    sdm_free(c->x);
+}
+
+static void curves_fill(const history *h, bool timed, loss_curves *c)
+{
+    double low = INFINITY, high = 0, begin = NAN;
+    for (size_t i = 0; i < h->n; i++) {
+        const history_point *p = &h->point[i];
+        const bool finished = p->phase == SDM_PHASE_EVALUATE, other = p->phase == SDM_PHASE_REFINE,
+                   first = other && !isfinite(begin);
+        c->x[i] = timed ? p->seconds : p->step;
+        if (first) begin = c->x[i];
+        if (finished) c->end[0] = c->x[i], c->end[1] = sqrt(p->heldout);
+        c->heldout[i] = finished ? NAN : sqrt(p->heldout);
+        c->loss[i] = other ? NAN : sqrt(p->loss);
+        // before the first step of the refinement the last batch is one of the fit
+        c->refined[i] = other && !first ? sqrt(p->loss) : NAN;
+        low = fmin(low, fmin(sqrt(p->heldout), sqrt(p->loss)));
+        high = fmax(high, fmax(sqrt(p->heldout), sqrt(p->loss)));
+    }
+    c->begin[0] = c->begin[1] = begin;
+    c->height[0] = low, c->height[1] = high;
+}
+
 sdm_status trainer_history_picture(const trainer *t, const history *h, sdm_error *err)
 {
     char path[SDM_PATH_TEXT_MAX + 32];
-    double *step = NULL, *loss = NULL, *refined = NULL, *heldout = NULL, end[2] = {NAN, NAN};
-    bool refines = false;
-    sdm_status s = SDM_ALLOC(&step, h->n, "loss curve", err);
-    if (!s) s = SDM_ALLOC(&loss, h->n, "loss curve", err);
-    if (!s) s = SDM_ALLOC(&refined, h->n, "loss curve", err);
-    if (!s) s = SDM_ALLOC(&heldout, h->n, "loss curve", err);
-    for (size_t i = 0; i < h->n && !s; i++) {
-        const history_point *p = &h->point[i];
-        const bool finished = p->phase == SDM_PHASE_EVALUATE;
-        if (finished) end[0] = p->step, end[1] = sqrt(p->heldout);
-        step[i] = p->step;
-        // the refinement has another loss
-        const bool other = p->phase == SDM_PHASE_REFINE;
-        refines |= other;
-        loss[i] = other ? NAN : sqrt(p->loss);
-        refined[i] = other ? sqrt(p->loss) : NAN;
-        heldout[i] = finished ? NAN : sqrt(p->heldout);
-    }
+    loss_curves c = {.end = {NAN, NAN}};
+    bool timed = true;
+    for (size_t i = 0; i < h->n; i++) timed = timed && isfinite(h->point[i].seconds);
+    sdm_status s = curves_create(h->n, &c, err);
     if (!s) {
+        curves_fill(h, timed, &c);
         snprintf(path, sizeof path, "%s/loss.png", t->folder);
-        const sdm_curve curves[] = {{"training (one batch)", step, loss, h->n},
-                                    {"held-out shapes", step, heldout, h->n},
-                                    {"finished model, held-out shapes", &end[0], &end[1], 1},
-                                    {"refinement (one batch)", step, refined, h->n}};
-        s = sdm_picture_plot(path, "Error of the network while it is trained", "optimiser steps",
-                             "root mean square error, mm", true, curves, refines ? 4 : 3, err);
+        const sdm_curve curves[] = {{"training (one batch)", c.x, c.loss, h->n},
+                                    {"held-out shapes", c.x, c.heldout, h->n},
+                                    {"finished model", &c.end[0], &c.end[1], 1},
+                                    {"refinement (one batch)", c.x, c.refined, h->n},
+                                    {"refinement begins", c.begin, c.height, 2}};
+        s = sdm_picture_plot(path, "Error of the network while it is trained",
+                             timed ? "seconds" : "optimiser steps", "root mean square error, mm",
+                             true, curves, isfinite(c.begin[0]) ? 5 : 3, err);
     }
-    sdm_free(heldout);
-    sdm_free(refined);
-    sdm_free(loss);
-    sdm_free(step);
+    curves_dispose(&c);
     return s;
 }

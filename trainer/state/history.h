@@ -4,8 +4,8 @@
 #include "trainer.h"
 
 typedef struct history_point {
-    sdm_phase phase; /* SDM_PHASE_MODE_FIT, SDM_PHASE_REFINE or SDM_PHASE_EVALUATE */
-    double step;
+    sdm_phase phase;      /* SDM_PHASE_MODE_FIT, SDM_PHASE_REFINE or SDM_PHASE_EVALUATE */
+    double step, seconds; /* seconds: NaN without a budget of time */
     double loss, heldout; /* mean square errors, mm^2; NaN: not known */
 } history_point;
 
@@ -27,6 +27,7 @@ int64_t trainer_history_last_step(const history *h);
    fewer than three times in this phase. */
 double trainer_history_fall(const history *h, sdm_phase phase, double floor);
 
-/* Draws loss.png: root mean square errors on training batches and on held-out shapes over the
-   steps, and that of the finished model. */
+/* Draws loss.png: root mean square errors on training batches and on held-out shapes, and that of
+   the finished model, over the seconds, without a budget of time over the steps. A line tells where
+   the refinement begins, whose batches are others. */
 sdm_status trainer_history_picture(const trainer *t, const history *h, sdm_error *err);

@@ -30,8 +30,8 @@ static bool curve_point(const sdm_curve *curve, size_t i, bool log_y, double p[2
     return fabs(p[0]) <= FLT_MAX && fabs(p[1]) <= FLT_MAX;
 }
 
-/* Finds the range of the points. The range of y is widened by 5 % below and above; a range of
-   length 0 is widened, too. */
+/* Finds the range of the points. The range of y is widened by 5 % below and above, that of x by
+   1.5 % above; a range of length 0 is widened, too. */
 static void find_window(window *w, const sdm_curve *curves, size_t n_curves)
 {
     for (int d = 0; d < 2; d++) {
@@ -50,9 +50,11 @@ static void find_window(window *w, const sdm_curve *curves, size_t n_curves)
     for (int d = 0; d < 2; d++) {
         if (!(w->low[d] <= w->high[d])) w->low[d] = w->high[d] = 0;
         const double size = fmax(fabs(w->low[d]), fabs(w->high[d]));
-        double room = d ? 0.05 * (w->high[d] - w->low[d]) : 0;
-        if (!(w->high[d] - w->low[d] > 1e-12 * size)) room = size > 0 ? 0.5 * size : 0.5;
-        w->low[d] -= room;
+        double room = (d ? 0.05 : 0.015) * (w->high[d] - w->low[d]);
+        const bool single = !(w->high[d] - w->low[d] > 1e-12 * size);
+        if (single) room = size > 0 ? 0.5 * size : 0.5;
+        // curves begin at the y axis; the markers at their ends are whole
+        if (d || single) w->low[d] -= room;
         w->high[d] += room;
     }
 }

@@ -21,6 +21,18 @@ expect 0 - sdmgen config "$cochlea" network.depth=4 --dump
 has '^  depth: 4$'
 expect 0 - sdmgen config "$cochlea" --seed 77 --dump
 has '^seed: 77$'
+# Keys that have no effect are told in one line.
+echo 'shape: {name: ellipsoid}
+train: {minutes: 1}' >vain.yaml
+vain() {
+    sdmgen config vain.yaml "$@" >out 2>err || bad "config vain.yaml $*: $(cat err)"
+    grep -E 'no effect' err | sed 's/^sdmgen: //' >told
+    cat told
+}
+[ -z "$(vain network.kind=pod network.rank=12 train.refine_batch=8 network.width=64)" ] || bad "keys in vain: $(cat told)"
+[ "$(vain train.refine=0 train.refine_batch=8 train.refine_rate=1e-4)" = 'train.refine is 0, so these keys have no effect: train.refine_batch, train.refine_rate' ] || bad "refinement in vain: $(cat told)"
+[ "$(vain network.kind=pod network.depth=0 network.width=64)" = 'network.depth is 0, so these keys have no effect: network.width' ] || bad "width in vain: $(cat told)"
+vain network.kind=template network.rank=12 | grep -q '^these keys are for the correction of a template, .* no effect: network.rank$' || bad "rank of a template: $(cat told)"
 expect 0 - sdmgen config --keys
 has 'network\.depth'
 expect 0 - sdmgen config --keys --markdown

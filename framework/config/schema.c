@@ -211,9 +211,8 @@ static const sdm_field DATA[] = {
      .shown_range = "auto, 0 .. 1000",
      .unit = "points",
      .help = "points of the static grid, a regular grid of parameters, along each parameter: one "
-             "number for all or a list with one per parameter; 0: no static grid; auto: at most 5, "
-             "and at most 256 in the grid, or where that leaves 2, at most 3 and 750; with "
-             "train.minutes at most 300 for each minute, of more than 256 at most 150"},
+             "number for all or a list with one per parameter; 0: no static grid; auto: 5 to 2, by "
+             "the number of parameters and the minutes (docs/configuration.md)"},
     ROW("online", INT64, data.online, 0, 1e7, "4096", "shapes",
         "random shapes generated during training"),
     ROW("start", INT64, data.start, 0, 1e6, "3456", "shapes",

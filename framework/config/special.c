@@ -224,6 +224,16 @@ static int64_t count_within(double limit, size_t n_params, int64_t most)
     return 0;
 }
 
+/* With three points along as many parameters as `limit` allows, from the first one on, and two
+ * along the others: those along parameter i. */
+static int64_t count_mixed(double limit, size_t n_params, size_t i)
+{
+    double all = pow(2, (double)n_params);
+    size_t three = 0;
+    while (three < n_params && all * 1.5 <= limit) all *= 1.5, three++;
+    return i < three ? 3 : 2;
+}
+
 int64_t sdm_config_static_count(const sdm_config *c, size_t n_params, size_t i)
 {
     if (!c->data.n_static_counts) return 0;
@@ -233,14 +243,23 @@ int64_t sdm_config_static_count(const sdm_config *c, size_t n_params, size_t i)
                  all = fmin(STATIC_AUTO_ALL, STATIC_AUTO_A_MINUTE * minutes),
                  of_few = fmin(STATIC_AUTO_ALL_OF_FEW, STATIC_AUTO_A_MINUTE_OF_FEW * minutes);
     const int64_t usual = count_within(all, n_params, STATIC_AUTO_MOST);
-    return usual > 2 ? usual : count_within(fmax(all, of_few), n_params, 3);
+    if (usual > 2) return usual;
+    const bool three = pow(3, (double)n_params) <= STATIC_AUTO_ALL_OF_FEW;
+    const int64_t two = count_within(fmax(all, of_few), n_params, 2);
+    return two && three ? count_mixed(of_few, n_params, i) : two;
 }
 
 void sdm_config_set_static(sdm_config *c, size_t n_params)
 {
     if (c->data.n_static_counts != 1 || c->data.static_counts[0] != SDM_STATIC_AUTO) return;
-    c->data.static_counts[0] = sdm_config_static_count(c, n_params, 0);
-    if (!c->data.static_counts[0]) c->data.n_static_counts = 0;
+    int64_t counts[SDM_MAX_PARAMS] = {0};
+    bool same = true;
+    for (size_t i = 0; i < n_params; i++) {
+        counts[i] = sdm_config_static_count(c, n_params, i);
+        same = same && counts[i] == counts[0];
+    }
+    memcpy(c->data.static_counts, counts, sizeof counts);
+    c->data.n_static_counts = !counts[0] ? 0 : same ? 1 : n_params;
 }
 
 static void dump_three(const double v[3], sdm_text *out)

@@ -69,14 +69,24 @@ static void test_defaults(void **state)
     // with a budget of time at most 300 maps for each minute of it
     const double budget = config.train.minutes;
     config.train.minutes = 1;
-    static const int64_t of_a_minute[] = {0, 5, 5, 5, 4, 3, 2, 2, 2, 0};
+    static const int64_t of_a_minute[] = {0, 5, 5, 5, 4, 3, 3, 2, 2, 0};
     for (size_t n = 1; n < sizeof of_a_minute / sizeof *of_a_minute; n++)
         assert_int_equal(sdm_config_static_count(&config, n, 0), of_a_minute[n]);
     // ... and more minutes do not make a grid of three points along each parameter finer
     for (config.train.minutes = 4; config.train.minutes < 6; config.train.minutes++)
         for (size_t n = 1; n < sizeof by_params / sizeof *by_params; n++)
-            assert_int_equal(sdm_config_static_count(&config, n, 0),
-                             n == 6 && config.train.minutes < 5 ? 2 : by_params[n]);
+            assert_int_equal(sdm_config_static_count(&config, n, 0), by_params[n]);
+    // with six parameters minutes add points parameter by parameter, from 144 in all to 729
+    static const size_t threes[] = {0, 2, 3, 4, 5, 6, 6};
+    for (size_t minutes = 1; minutes < sizeof threes / sizeof *threes; minutes++) {
+        config.train.minutes = (double)minutes;
+        for (size_t i = 0; i < 6; i++)
+            assert_int_equal(sdm_config_static_count(&config, 6, i), i < threes[minutes] ? 3 : 2);
+        sdm_config c = config;
+        sdm_config_set_static(&c, 6);
+        assert_int_equal(c.data.n_static_counts, threes[minutes] == 6 ? 1 : 6);
+        assert_int_equal(c.data.static_counts[0], 3);
+    }
     config.train.minutes = budget;
     assert_int_equal(config.data.online, 4096);
     assert_int_equal(config.data.start, 3456);

@@ -220,10 +220,11 @@ void sdm_config_dump(const sdm_config *c, sdm_text *out);
 void sdm_config_set_grid(sdm_config *c, const sdm_grid *grid);
 
 /* Number of points of the static grid along parameter i of n_params, 0: no static grid.
- * data.static: auto is the largest number up to 5 with which the grid has at most 256 points; where
- * that is below 3, the largest up to 3 with at most 750; with a budget of time at most 300 for each
- * minute, of more than 256 at most 150. With more than 9 parameters 2 make too many, and there is
- * no static grid. */
+ * data.static: auto is the largest number up to 5 with which the grid has at most 256 points, with
+ * a budget of time at most 300 for each minute. Where that is below 3, it is 2 along each, and with
+ * up to 6 parameters 3 along as many of them, from the first one on, as 750 points in all, or 150
+ * for each minute, allow. With more than 9 parameters 2
+ * make too many, and there is no static grid. */
 int64_t sdm_config_static_count(const sdm_config *c, size_t n_params, size_t i);
 
 /* Puts this number in place of `auto`. */

@@ -87,16 +87,16 @@ static void print_budget(const sdm_config *c, const sdm_train_work *w, const sdm
     if (!(c->train.minutes > 0)) return;
     if (seconds <= half) {
         printf(
-            "  budget   train.minutes is %.4g: at most half of it is for the maps before training "
-            "(%s), the rest for as many steps as fit\n",
+            "  budget   train.minutes is %.4g: the maps before training take %s of it, the rest is "
+            "for as many steps as fit\n",
             c->train.minutes, format_seconds(seconds, a));
         return;
     }
-    printf("  budget   half of train.minutes (%s) is enough for %s of the %s maps before training, "
-           "which then starts with these: lower data.static or data.start, or raise train.minutes "
-           "to %.4g\n",
-           format_seconds(half, a), cli_format_count((int64_t)(before * half / seconds), made),
-           cli_format_count((int64_t)before, all), ceil(10 * seconds / 30) / 10);
+    printf(
+        "  budget   the training begins after half of train.minutes (%s), with %s of the %s maps: "
+        "raise train.minutes to %.4g for all of them, or lower data.start or data.static\n",
+        format_seconds(half, a), cli_format_count((int64_t)(before * half / seconds), made),
+        cli_format_count((int64_t)before, all), ceil(10 * seconds / 30) / 10);
 }
 
 static void print_text(const sdm_config *config, const sdm_train_work *w, const sdm_train_plan *p,

@@ -8,6 +8,7 @@
 
 #include "blob.h"
 #include "bounds.h"
+#include "cause.h"
 #include "coverage.h"
 #include "far_labels.h"
 #include "finding.h"
@@ -39,8 +40,6 @@
 #define STRAY_MAX 0.35
 // the same where the data want a parameter beyond its bound: these points may show the rest
 #define STRAY_AT_BOUND_MAX 0.02
-// voxels longer than this multiple of their limit explain residuals far beyond theirs
-#define MUCH_COARSER 2.0
 // part of a voxel by which the border of the maps may be inside the shape
 #define BORDER_MAX 0.1
 // largest fraction of the shapes of its family that a good network's grid cuts
@@ -185,46 +184,28 @@ static void check_residuals(const fit_problem *p, const fit_misfit *own, const f
                           sqrt(feet->scatter_chi_square));
         return;
     }
-    // the likely causes in their order; voxels that are a little too coarse do not explain
-    // residuals far beyond their limit
-    const bool other = beyond > FAR_BEYOND && voxel < MUCH_COARSER * coarse.limit;
-    char cause[400] = "";
-    const fit_observation *o = &p->observation;
-    bool absent = image && o->n_in > 0; // no tissue of the inside is in the image
-    for (size_t i = 0; i < o->n_in; i++) absent = absent && p->absent[i];
-    if (absent)
-        snprintf(cause, sizeof cause,
-                 "the image holds no values like those given for the inside (mean %.4g, sd %.3g)",
-                 o->tissue[0].mean, o->tissue[0].sd);
-    else if (bounds->n_wanted)
-        snprintf(cause, sizeof cause, "%s", bounds->text);
-    else if (isfinite(coarse.advice))
-        snprintf(
-            cause, sizeof cause,
-            "%sthe voxels of the maps, %.2g mm, are coarse beside %s: try exact maps with voxels "
-            "of %.2g mm (sdm_fit_source.grid)%s",
-            other ? "another shape lies there, or " : "", voxel, coarse.detail, coarse.advice,
-            other ? "" : ", or another shape lies there");
-    else
-        snprintf(cause, sizeof cause,
-                 "%s, or the organ differs from the model (then say by how much it may: "
-                 "sdm_fit_opts.tolerance)",
-                 refused ? "another shape lies there"
-                         : "the data have errors of their own, the fit stopped beside the best "
-                           "place, another shape lies there");
+    char why[FIT_CAUSE_MAX];
+    sdm_fit_residuals_explain(p, m,
+                              &(fit_suspects){.refused = refused,
+                                              .beyond = beyond,
+                                              .no_shape = !has_passed(v, SDM_FIT_CHECK_NO_SHAPE),
+                                              .coarse = &coarse,
+                                              .bounds = bounds},
+                              why);
     sdm_fit_judge_add(
         v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1], inside, m->chi_square[1],
         m->limit[1],
         "the residuals inside the shape are not noise, they deviate by %.2g times what noise "
-        "explains: %s",
-        sqrt(m->chi_square[1]), cause);
+        "explains%s",
+        sqrt(m->chi_square[1]), why);
     if (points) return;
+    sdm_fit_beside_explain(p, m, why);
     sdm_fit_judge_add(
         v, SDM_FIT_CHECK_BESIDE, m->chi_square[0] <= m->limit[0], SDM_FIT_DOUBTFUL,
         m->chi_square[0], m->limit[0],
         "the residuals beside the shape are not noise: neighbourhoods deviate by %.2g times what "
-        "noise explains",
-        sqrt(m->chi_square[0]));
+        "noise explains%s",
+        sqrt(m->chi_square[0]), why);
 }
 
 // the volumes that the data contradict

@@ -237,6 +237,19 @@ static double label_beyond(const fit_problem *p)
     return fmax(all - near, 0);
 }
 
+// a unit that contradicts the shape, by its mean over the standard deviation; sum[2]: the sums of
+// the squares of those with less and with more material than the shape
+static void place_add(const fit_problem *p, const member *m, size_t n, double z,
+                      fit_worst_place *worst, double sum[2])
+{
+    sum[z > 0] += z * z;
+    if (z * z <= worst->chi_square) return;
+    *worst = (fit_worst_place){.chi_square = z * z, .more = z > 0};
+    for (size_t k = 0; k < n; k++)
+        for (size_t a = 0; a < 3; a++)
+            worst->world[a] += p->samples.world[3 * (size_t)m[k].sample + a] / (double)n;
+}
+
 sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *out, sdm_error *err)
 {
     const bool points = p->target->kind == SDM_FIT_POINTS;
@@ -252,7 +265,7 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
     const bool labels = p->given_labels || p->target->kind == SDM_FIT_LABEL;
     const double least = labels ? fmax(LABEL_ERROR / r->edge[0], MEAN_SD_MIN) : MEAN_SD_MIN;
     const double factor = points ? points_volume_factor(p) : 1;
-    double correlation = 1;
+    double correlation = 1, sum[2][2] = {{0}};
     if (!s && r->at_feet) s = points_correlation(p, r, m, n, &correlation, err);
     correlation = fmin(correlation + CORRELATION_ERROR, 1);
     if (labels) out->beyond = label_beyond(p), out->missing = out->beyond / volume;
@@ -272,9 +285,10 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
                                        (sd * sd * (one + (1 - one) * correlation) + maps * maps +
                                         POINTS_SD_MIN * POINTS_SD_MIN);
         }
-        if (z2 > BEYOND * BEYOND)
-            *(u.mean < 0 ? &out->empty : &out->missing) +=
-                factor * contradicted(&u) * (double)(to - from) / volume;
+        if (!(z2 > BEYOND * BEYOND)) continue;
+        place_add(p, m + from, to - from, u.mean / sqrt(u.variance), &out->worst[side], sum[side]);
+        *(u.mean < 0 ? &out->empty : &out->missing) +=
+            factor * contradicted(&u) * (double)(to - from) / volume;
     }
     const double all_units = fmax((double)(out->n_units[0] + out->n_units[1]), 1);
     out->noise_chi_square /= all_units, out->scatter_chi_square /= all_units;
@@ -282,6 +296,8 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
         const double units = fmax((double)out->n_units[side], 1);
         out->chi_square[side] /= units;
         out->limit[side] = chi_square_limit(r, units);
+        const double all = sum[side][0] + sum[side][1];
+        out->worst[side].same = all > 0 ? sum[side][out->worst[side].more] / all : 0;
     }
     sdm_free(m);
     return s;

@@ -10,6 +10,15 @@
 
 #include "residuals.h"
 
+/* The neighbourhood that contradicts the shape most. */
+typedef struct fit_worst_place {
+    double world[3]; /* middle of its samples, mm */
+    double chi_square;
+    bool more;   /* true: the data hold more of the inside's material there than the shape */
+    double same; /* share of the contradiction (sum of the squared deviations of the units beyond
+                    three of them) that has this sign */
+} fit_worst_place;
+
 typedef struct fit_misfit {
     /* outside of the surface [0] and inside [1]; points count as inside */
     /* number of units; of points that are no strays (points alone) */
@@ -17,7 +26,9 @@ typedef struct fit_misfit {
     /* mean over the units of (mean residual)^2 / variance, where errors of the maps add to the
        variance. 1: the residuals are noise and these errors */
     double chi_square[2];
-    /* the same on both sides together, with the variance of the noise alone */
+    /* the unit of the largest deviation; chi_square 0: none deviates by three */
+    fit_worst_place worst[2];
+    /* chi_square of both sides together, with the variance of the noise alone */
     double noise_chi_square;
     /* points at their feet, else 0: the same, if they share no more of their errors than nearest
        neighbours do. (The chi_square takes the points of a unit to share all of them, as those of a

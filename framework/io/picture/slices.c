@@ -228,10 +228,13 @@ static void draw_column(sdm_canvas *c, const layout *l, size_t column)
 {
     const sdm_picture_map *map = &l->maps[column];
     const int x = LEFT + (int)column * (l->column + GAP), e = map->error;
-    const sdm_type title = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
+    sdm_type title = {.size = 13, .align = SDM_CENTRE, .bold = true, .colour = SDM_INK};
     const char *note = note_of(map);
     char first[160];
     snprintf(first, sizeof first, "%.*s", first_line(map->title), map->title ? map->title : "");
+    const double wide = sdm_canvas_text_width(c, title.size, title.bold, first),
+                 room = l->column + GAP;
+    if (wide > room) title.size *= room / wide; // a narrow column
     sdm_canvas_text(c, x + l->column / 2.0, TOP - SDM_SECTION_ABOVE - 16, title, first);
     const sdm_box under = {x, l->top - SDM_SECTION_ABOVE, l->column, 0};
     if (note) sdm_panel_title(c, under, false, note);

@@ -103,10 +103,13 @@ static sdm_status fit_shape(cli_fit *f, sdm_error *err)
     sdm_status s = f->args->fit.find ? cli_fit_find(f, err) : cli_fit_run(f, err);
     cli_progress_end(&w.bar, !s && (!f->doubt.status || f->doubt.status == SDM_E_QUALITY));
     f->found = f->result.objective && f->result.params;
+    cli_fit_doubt_changed_shape(f);
     for (size_t i = 0; i < f->result.verdict.n_findings; i++)
         cli_name_options(f->result.verdict.findings[i].text);
     if (s || !f->doubt.status || f->doubt.status == SDM_E_QUALITY) return s;
-    return sdm_fail(err, f->doubt.status, "%s: %s", f->path, f->doubt.text);
+    char astray[400] = "";
+    if (f->doubt.status == SDM_E_ARG) (void)cli_fit_astray(f, astray, sizeof astray, NULL);
+    return sdm_fail(err, f->doubt.status, "%s: %s%s", f->path, f->doubt.text, astray);
 }
 
 static void print_notices(const cli_fit *f)

@@ -41,6 +41,7 @@ typedef struct cli_fit {
     /* a fit with a network alone: its shape, where it is known, for the checks; else NULL */
     sdm_registry *judge_registry;
     sdm_instance *judge_shape;
+    bool shape_changed; /* it was changed after the training, and is none of the two */
     sdm_model *model;
     const char *shape_name;
     sdm_param *params; /* [n_params] */
@@ -247,14 +248,24 @@ void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX]);
  * stopped too early: prints the command that goes on with more iterations. */
 void cli_fit_print_next(const cli_fit *f);
 
+/* After the fit: a shape that was changed after the training of the network makes the check of the
+ * network doubtful. */
+void cli_fit_doubt_changed_shape(cli_fit *f);
+
 /* Prints the verdict as text; adds it to a JSON object. */
 void cli_fit_print_verdict(const cli_fit *f);
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);
 
 /* After a fit to an image that is not trustworthy: where the image at the start pose looks like the
- * inside around the shape, and clearly more like the outside within it, makes this the only reason
- * of f->doubt and of the verdict, and sets f->exchanged. Errors of making the map. */
+ * inside around the shape, and clearly more like the outside within it, or a fit with exchanged
+ * values finds the shape, makes this the only reason of f->doubt and of the verdict, and sets
+ * f->exchanged. Errors of making the map; SDM_E_CANCELLED. */
 sdm_status cli_fit_explain_contrast(cli_fit *f, sdm_error *err);
+
+/* After a fit to labels or points that is not trustworthy: text[size] = "; " and why its start is
+ * wrong: far from the data, or in another frame; "": no reason is seen. Errors of making the map.
+ */
+sdm_status cli_fit_astray(const cli_fit *f, char *text, size_t size, sdm_error *err);
 
 /* After a fit that is not trustworthy: text[size] = the end of its error, "; " and what to try; "":
  * nothing to add. Returns text. */

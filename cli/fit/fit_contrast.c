@@ -49,6 +49,58 @@ static sdm_status measure_start(const cli_fit *f, side_values *in, side_values *
     return s;
 }
 
+/* *fits = a fit from the same start with the exchanged values finds the shape. Its residuals, which
+ * coarse maps enlarge, and its last steps may be those of a fit that is not trustworthy. */
+static sdm_status fit_exchanged(const cli_fit *f, bool *fits, sdm_error *err)
+{
+    sdm_fit_opts opts = f->opts;
+    sdm_fit_law *in = &opts.appearance.inside[0], *out = &opts.appearance.outside[0];
+    sdm_fit_result r = {0};
+    const sdm_fit_law given = *in;
+    in->mean = out->mean, in->sd = out->sd;
+    out->mean = given.mean, out->sd = given.sd;
+    opts.max_restarts = 0;
+    opts.progress = NULL;
+    sdm_status s = sdm_fit(&f->source, &f->target, &opts, &r, err);
+    *fits = !s || (s == SDM_E_QUALITY && r.verdict.n_findings);
+    for (size_t i = 0; i < r.verdict.n_findings; i++) {
+        const sdm_fit_finding *x = &r.verdict.findings[i];
+        *fits = *fits && (x->grade != SDM_FIT_FAILED || x->kind == SDM_FIT_CHECK_RESIDUALS ||
+                          x->kind == SDM_FIT_CHECK_CONVERGED);
+    }
+    *fits = *fits && !(r.evidence <= f->result.evidence + SDM_FIT_PREFERRED);
+    sdm_fit_dispose(&r);
+    return s == SDM_E_NOMEM || s == SDM_E_CANCELLED ? s : SDM_OK;
+}
+
+/* Makes exchanged values the only reason of the refusal. a, b: the image within the start shape and
+ * around it; fitted: a fit with the exchanged values has shown it. */
+static void name_exchange(cli_fit *f, double a, double b, bool fitted)
+{
+    sdm_fit_verdict *v = &f->result.verdict;
+    const double inside = f->opts.appearance.inside[0].mean,
+                 outside = f->opts.appearance.outside[0].mean;
+    const bool given = !isnan(f->args->fit.inside[0]) || !isnan(f->args->fit.outside[0]);
+    sdm_fit_finding why = {
+        .kind = SDM_FIT_CHECK_CONTRAST, .grade = SDM_FIT_FAILED, .figure = a - b, .limit = 0};
+    char shown[120];
+    for (size_t i = 0; i < v->n_findings; i++) *v->findings[i].text = '\0';
+    if (fitted)
+        snprintf(shown, sizeof shown, "a fit that exchanges them finds the shape in this image");
+    else
+        snprintf(shown, sizeof shown,
+                 "at the start the image is %.4g within the shape and %.4g around it", a, b);
+    snprintf(why.text, sizeof why.text,
+             "the values of the inside and the outside are exchanged: %s, but the inside %s %.4g "
+             "and the outside %.4g: %s",
+             shown, given ? "was given as" : "has the default value", inside, outside,
+             given ? "exchange --inside and --outside"
+                   : "give the values of this image with --inside and --outside");
+    sdm_fit_verdict_add(v, &why);
+    snprintf(f->doubt.text, sizeof f->doubt.text, "%s", why.text);
+    f->exchanged = true;
+}
+
 sdm_status cli_fit_explain_contrast(cli_fit *f, sdm_error *err)
 {
     const double inside = f->opts.appearance.inside[0].mean,
@@ -57,25 +109,13 @@ sdm_status cli_fit_explain_contrast(cli_fit *f, sdm_error *err)
     // a whole image (--find) has no start
     if (f->target.kind != SDM_FIT_IMAGE || f->doubt.status != SDM_E_QUALITY || f->args->fit.find)
         return SDM_OK;
-    const sdm_status s = measure_start(f, &in, &around, err);
+    sdm_status s = measure_start(f, &in, &around, err);
     if (s || !(in.n > 0) || !(around.n > 0)) return s;
     const double a = in.sum / in.n, b = around.sum / around.n;
-    const bool around_like_inside = fabs(b - inside) < fabs(b - outside);
-    if (!around_like_inside || !((a - b) / (outside - inside) > CONTRAST_MIN)) return SDM_OK;
-    sdm_fit_verdict *v = &f->result.verdict;
-    for (size_t i = 0; i < v->n_findings; i++) *v->findings[i].text = '\0';
-    sdm_fit_finding why = {
-        .kind = SDM_FIT_CHECK_CONTRAST, .grade = SDM_FIT_FAILED, .figure = a - b, .limit = 0};
-    const bool given = !isnan(f->args->fit.inside[0]) || !isnan(f->args->fit.outside[0]);
-    snprintf(why.text, sizeof why.text,
-             "the values of the inside and the outside are exchanged: at the start the image is "
-             "%.4g within the shape and %.4g around it, but the inside %s %.4g and the outside "
-             "%.4g: %s",
-             a, b, given ? "was given as" : "has the default value", inside, outside,
-             given ? "exchange --inside and --outside"
-                   : "give the values of this image with --inside and --outside");
-    sdm_fit_verdict_add(v, &why);
-    snprintf(f->doubt.text, sizeof f->doubt.text, "%s", why.text);
-    f->exchanged = true;
-    return SDM_OK;
+    if (!(fabs(b - inside) < fabs(b - outside))) return SDM_OK;
+    bool exchanged = (a - b) / (outside - inside) > CONTRAST_MIN, fitted = false;
+    // a thin shape that begins beside its place holds as much of both tissues as its surroundings
+    if (!exchanged) s = fit_exchanged(f, &fitted, err);
+    if (!s && (exchanged || fitted)) name_exchange(f, a, b, fitted);
+    return s;
 }

@@ -59,15 +59,36 @@ static bool name_prior(const cli_fit *f, char *text, size_t size)
     return true;
 }
 
+/* Does the fit of points lie on them? */
+static bool lies_on_points(const cli_fit *f)
+{
+    return !found(f, SDM_FIT_CHECK_MISSING, SDM_FIT_FAILED, -INFINITY) &&
+           !found(f, SDM_FIT_CHECK_RESIDUALS, SDM_FIT_FAILED, -INFINITY);
+}
+
+/* Are the voxels of the maps, which are longer than the shape is thick, all that refuses the fit?
+ */
+static bool is_blind(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    size_t failed = 0;
+    for (size_t i = 0; i < v->n_findings; i++) failed += v->findings[i].grade == SDM_FIT_FAILED;
+    return failed == 1 && found(f, SDM_FIT_CHECK_VOXELS, SDM_FIT_FAILED, -INFINITY);
+}
+
 /* Writes into `text` that a wrong start may be the cause of the failure, and the options that
  * change the start; nothing where the start is kept. */
 static void name_start(const cli_fit *f, char *text, size_t size)
 {
     const bool turned = !isnan(f->args->pose.rotation[0]) && !f->opts.keep_pose,
+               placed = f->target.kind == SDM_FIT_IMAGE && !f->args->fit.find && !f->opts.keep_pose,
                values = !f->opts.keep_params;
-    if (!turned && !values) return;
-    snprintf(text, size, "; a wrong start ends like this, too: %s%s%s",
-             turned ? "without --rotation many are tried" : "", turned && values ? "; " : "",
+    if (!turned && !values && !placed) return;
+    snprintf(text, size, "; %s%s%s%s%s%s",
+             strstr(f->doubt.text, "a wrong start") ? "" : "a wrong start ends like this, too: ",
+             turned ? "without --rotation many are tried" : "", turned && placed ? "; " : "",
+             placed ? "--start-centre X,Y,Z gives the place, --find searches the image" : "",
+             (turned || placed) && values ? "; " : "",
              !values             ? ""
              : f->args->params.n ? "the values of -p may be wrong"
                                  : "-p NAME=VALUE gives start values of parameters");
@@ -75,6 +96,7 @@ static void name_start(const cli_fit *f, char *text, size_t size)
 
 const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
 {
+    char astray[400] = "";
     const cli_fit_args *a = &f->args->fit;
     const sdm_fit_result *r = &f->result;
     const bool network = f->model && f->shape && !a->exact && !a->polish;
@@ -88,17 +110,20 @@ const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
     else if (f->found && !f->opts.keep_params && f->opts.prior_sd > 0 && f->opts.prior_sd < 1 &&
              name_prior(f, text, size))
         return text;
+    else if (!cli_fit_astray(f, astray, sizeof astray, NULL) && *astray)
+        snprintf(text, size, "%s%s", astray, suspicion);
     else if (*suspicion)
         snprintf(text, size, "%s", suspicion);
     else if (f->found && !r->converged && network)
         snprintf(text, size, "; if the network is the limit, --exact fits with exact maps");
-    else if (f->found && began_at_points(f) &&
+    else if (f->found && began_at_points(f) && lies_on_points(f) &&
              found(f, SDM_FIT_CHECK_COVERED, SDM_FIT_DOUBTFUL, UNCOVERED))
         snprintf(text, size,
                  "; the points show a part of the shape, and the fit began at their middle: "
                  "--start-centre X,Y,Z says where the middle of the whole shape is, about");
     // tissues that are the wrong way round are no matter of the start
-    else if (!(f->found && found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY)))
+    else if (!(f->found && found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY)) &&
+             !is_blind(f))
         name_start(f, text, size);
     return text;
 }

@@ -15,9 +15,12 @@
 static void find_shape(cli_fit *f)
 {
     sdm_error why = {0};
-    if (!cli_open_registry(f->args, &f->judge_registry, &why) &&
-        sdm_runtime_instance(f->model, f->judge_registry, &f->judge_shape, &why) == SDM_E_PLUGIN)
-        cli_warn("%s", why.text);
+    if (cli_open_registry(f->args, &f->judge_registry, &why) ||
+        sdm_runtime_instance(f->model, f->judge_registry, &f->judge_shape, &why) != SDM_E_PLUGIN)
+        return;
+    cli_warn("%s", why.text);
+    const char *name = sdm_model_get_info(f->model)->shape;
+    f->shape_changed = sdm_registry_find(f->judge_registry, name, NULL) != NULL;
 }
 
 static sdm_status open_model(cli_fit *f, sdm_error *err)

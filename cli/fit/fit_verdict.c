@@ -97,14 +97,29 @@ void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX])
         snprintf(text, FIT_WORDS_MAX, "%s", cli_fit_grade_name(v->grade));
 }
 
+void cli_fit_doubt_changed_shape(cli_fit *f)
+{
+    if (!f->shape_changed || !f->result.verdict.n_findings) return;
+    sdm_fit_finding x = {.kind = SDM_FIT_CHECK_NETWORK_ERROR,
+                         .grade = SDM_FIT_DOUBTFUL,
+                         .figure = NAN,
+                         .limit = NAN};
+    snprintf(x.text, sizeof x.text,
+             "the shape '%s' was changed after the training of the network, which shows the shape "
+             "of that time: this may be another shape than you mean, and the error of the network "
+             "is not measured; load the shape of that time (--plugin FILE), or train again",
+             f->shape_name);
+    sdm_fit_verdict_add(&f->result.verdict, &x);
+}
+
 void cli_fit_print_verdict(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
     if (!v->n_findings) return;
     printf("verdict: %s\n", cli_fit_grade_name(v->grade));
-    if (f->source.model && !f->shape && !f->judge_shape)
-        printf("  %-12s not tested: the exact shape '%s' is not known here or has changed, so the "
-               "error of the network is not measured, and the standard deviations may be too "
+    if (f->source.model && !f->shape && !f->judge_shape && !f->shape_changed)
+        printf("  %-12s not tested: the exact shape '%s' is not known here, so the error of "
+               "the network is not measured, and the standard deviations may be too "
                "small; load its plug-in (--plugin FILE)\n",
                sdm_fit_check_name(SDM_FIT_CHECK_NETWORK_ERROR), f->shape_name);
     // the worst first

@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# sdmgen fit: a refused fit names its likely cause: a start away from the data, points in another frame, exchanged values.
+# Tests: fit_astray.c cause.c
+. "$(dirname "$0")/common.sh"
+export OMP_WAIT_POLICY=passive
+negate() { awk -F, 'NR == 1 { print; next } { printf "%g,%g,%s\n", -$1, -$2, $3 }' "$1"; }
+
+# A start away from the labels: how far it is, and where they are.
+capsule='sdmgen fit --shape capsule -O edge=0.5 --rotation 0,0,0 --quiet'
+expect 0 - sdmgen phantom --shape capsule -O edge=0.5 --translation 20,10,5 --spacing 0.5 -o c.nii --label c-label.nii --surface c.csv --surface-points 300 --quiet
+expect 2 'no voxel of the image lies near .*; the fit began [0-9.]* mm from the middle of the labels, which is at .* mm \(LPS\): without --start-centre it begins there$' \
+    $capsule c-label.nii --label 1 --start-centre 50,10,5
+# A start in another frame.
+expect 2 'with x and y of the other sign the start is near it: one of both is RAS, the other LPS: --ras converts --start-centre$' \
+    $capsule c-label.nii --label 1 --start-centre -20,-10,5
+negate c.csv >c-ras.csv
+expect 4 'the fit began 44\.[0-9]* mm from the middle of the points; with x and y of the other sign the start is near it: one of both is RAS, the other LPS$' \
+    $capsule c-ras.csv --start-centre 20,10,5
+grep -q 'start-centre X,Y,Z' err && bad "a second advice on the start: $(cat err)"
+
+# Points of another frame turn the shape by half a turn; the neighbourhood that is farthest off is named.
+expect 0 - sdmgen phantom --shape cochlea -O edge=0.6 --rotation 1.57,0,0 --spacing 0.5 -o ear.nii --surface ear.csv --surface-points 500 --quiet
+negate ear.csv >ear-ras.csv
+expect 4 '; with x and y of the other sign most points lie within 0\.[0-9]* mm of the shape at the start, not 0\.[0-9]* mm: are they RAS\? --ras converts them$' \
+    sdmgen fit --shape cochlea -O edge=0.6 ear-ras.csv --rotation 1.57,0,0 --mirror no --max-iterations 10 --quiet
+has "^  residuals    .*, most at \([-0-9., ]*\) mm, in the shape's frame \([-0-9., ]*\), where the data show (more|less) than the shape"
+
+# Exchanged values of a thin shape beside its place: as much of both tissues lies within the start as around it.
+expect 0 - sdmgen phantom --shape torus -O edge=0.5 --spacing 0.4 -o torus.nii --quiet
+torus='sdmgen fit --shape torus -O edge=0.5 torus.nii --rotation 0,0,0 --spacing 0.4 --eps 1e-3 --quiet --start-centre 1.5,1,0.5'
+expect 4 'the values of the inside and the outside are exchanged: a fit that exchanges them finds the shape in this image, .*: exchange --inside and --outside$' \
+    $torus --inside 1300,270 --outside 40,170
+finish

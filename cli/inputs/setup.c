@@ -13,6 +13,7 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/isolation.h"
 #include "sdm/internal/model_hash.h"
+#include "sdm/internal/skipped.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
@@ -47,7 +48,7 @@ sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error
     }
     const char *skipped;
     for (size_t i = 0; (skipped = sdm_registry_skipped(*out, i)); i++)
-        if (!strncmp(skipped, "plug-in folder ", 15))
+        if (sdm_registry_skipped_folder(*out, i))
             cli_warn("SDMGEN_PLUGIN_PATH: %s", skipped);
         else
             cli_notice("skipped a file in SDMGEN_PLUGIN_PATH: %s", skipped);

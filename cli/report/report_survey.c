@@ -95,6 +95,29 @@ static bool audit_worst(const teller *t, const sdm_survey_count *c, sdm_part_aud
     return made;
 }
 
+/* Meshes that are not the same when they are made again. Other findings may follow from it. */
+static void tell_repeat(teller *t)
+{
+    const sdm_repeat *r = &t->s->found.repeat;
+    const size_t n = t->s->found.n_params;
+    sdm_text text = {0};
+    // tell_failed() names the vertex that is not written
+    if (!r->unlike || (r->cause == SDM_REPEAT_UNSET && t->s->found.failed.shapes)) return;
+    if (r->cause == SDM_REPEAT_BEHIND)
+        sdm_text_add(&text, "mesh() reads p[%zu], but the last parameter is p[%zu], '%s'; ",
+                     r->param, n - 1, sdm_instance_params(t->s->shape, NULL)[n - 1].name);
+    else
+        sdm_text_add(&text, "meshes have other bits when they are made again%s, for example at ",
+                     r->cause == SDM_REPEAT_THREADS ? " by several threads at once" : "");
+    if (r->cause != SDM_REPEAT_BEHIND) {
+        add_params(t->s, r->first, SIZE_MAX, &text);
+        sdm_text_add(&text, "; ");
+    }
+    sdm_text_add(&text, "%s; mend this first: other lines may follow from it",
+                 sdm_repeat_advice(r->cause));
+    tell(t, SDM_E_QUALITY, &text);
+}
+
 static void tell_open(teller *t)
 {
     sdm_text text = {0};
@@ -508,14 +531,6 @@ static void tell_callbacks(teller *t)
         sdm_text_add(&text, "; compared with differences of meshes");
         tell(t, SDM_E_QUALITY, &text);
     }
-    if (f->unlike) {
-        sdm_text text = {0};
-        sdm_text_add(&text,
-                     "%zu meshes had other bits when they were made again or by several threads: "
-                     "mesh() must depend on its arguments alone (no static variables, no files)",
-                     f->unlike);
-        tell(t, SDM_E_QUALITY, &text);
-    }
 }
 
 /* Appends "; 12 of them within part 1 of 2 (...) alone" about the part of shape `c->worst` that
@@ -620,6 +635,7 @@ static void tell_untested(teller *t)
 sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user, sdm_error *err)
 {
     teller t = {.s = s, .tell = tell_line, .user = user};
+    tell_repeat(&t);
     tell_failed(&t);
     tell_open(&t);
     tell_inside_out(&t);

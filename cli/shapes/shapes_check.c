@@ -204,7 +204,7 @@ static sdm_status print_json(const check *c, sdm_error *err)
     }
     add_jumps(&j, c);
     if (f->has_velocity) sdm_json_real(&j, "velocity_error", f->velocity_error);
-    sdm_json_int(&j, "unlike", (int64_t)f->unlike);
+    sdm_json_int(&j, "unlike", (int64_t)f->repeat.unlike);
     sdm_json_open(&j, "findings", '[');
     const sdm_status s = cli_survey_tell(&c->survey, add_line, &j, err);
     sdm_json_close(&j, ']');

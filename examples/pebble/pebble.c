@@ -13,9 +13,9 @@
 
 /* ---- the parameters ---- */
 
-enum { LENGTH, WIDTH, TAPER, N_PARAMS };
+enum { LENGTH, WIDTH, TAPER };
 
-static const sdm_param PARAMS[N_PARAMS] = {
+static const sdm_param PARAMS[] = {
     [LENGTH] = {.name = "length",
                 .unit = "mm",
                 .min = 6,
@@ -111,8 +111,7 @@ static const sdm_shape SHAPE = {
     .size = sizeof(sdm_shape),
     .name = "pebble",
     .summary = "egg-shaped pebble along the z axis",
-    .params = PARAMS,
-    .n_params = N_PARAMS,
+    SDM_PARAMS(PARAMS), // .params, and .n_params = the number of rows
     .mesh = pebble_mesh,
 };
 

@@ -3,9 +3,9 @@
 
 #include <sdm/shape.h>
 
-enum { RADIUS, N_PARAMS };
+enum { RADIUS };
 
-static const sdm_param PARAMS[N_PARAMS] = {
+static const sdm_param PARAMS[] = {
     [RADIUS] = {.name = "radius",
                 .unit = "mm",
                 .min = 0.5,
@@ -86,12 +86,10 @@ static const sdm_shape OCTAHEDRON = {
     .size = sizeof(sdm_shape),
     .name = "octahedron",
     .summary = "regular octahedron about the origin; distance exact",
-    .params = PARAMS,
-    .n_params = N_PARAMS,
+    SDM_PARAMS(PARAMS),
     .mesh = octahedron_mesh,
     .distance = octahedron_distance,
-    .measures = MEASURES,
-    .n_measures = 1,
+    SDM_MEASURES(MEASURES),
     .measure = octahedron_measure,
 };
 

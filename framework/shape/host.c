@@ -46,8 +46,8 @@ static int host_reserve(const sdm_host *host, sdm_mesh_out *out, size_t n_vert, 
     const sdm_status s = sdm_mesh_reserve(m, n_vert, n_tri, &c->err);
     if (s) return (int)s;
     // NaN and vertices that do not exist: what the callback forgets to write is refused
-    memset(m->vert, 0xff, 3 * n_vert * sizeof *m->vert);
-    memset(m->tri, 0xff, 3 * n_tri * sizeof *m->tri);
+    memset(m->vert, c->fill, 3 * n_vert * sizeof *m->vert);
+    memset(m->tri, c->fill, 3 * n_tri * sizeof *m->tri);
     return mesh_out_set(m, out);
 }
 
@@ -117,6 +117,7 @@ void sdm_host_call_begin(host_call *c, sdm_mesh *mesh, bool files)
     c->shape = NULL;
     c->mesh = mesh;
     c->files = files;
+    c->fill = 0xff;
     c->blocks = NULL;
     c->err.status = SDM_OK;
     c->err.text[0] = '\0';

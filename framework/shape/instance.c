@@ -219,10 +219,17 @@ sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *o
 sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sdm_mesh *out,
                                       sdm_error *err)
 {
+    return sdm_instance_mesh_filled(s, p, 0xff, out, err);
+}
+
+sdm_status sdm_instance_mesh_filled(const sdm_instance *s, const double *p, int fill, sdm_mesh *out,
+                                    sdm_error *err)
+{
     out->n_vert = out->n_tri = 0;
     sdm_mesh_out filled = {0};
     host_call call;
     sdm_host_call_begin(&call, out, false);
+    call.fill = fill;
     sdm_callback_begin(s, "mesh", p);
     const int failed = s->shape->mesh(s->self, &call.host, s->options, p, &filled);
     sdm_callback_end();

@@ -346,7 +346,7 @@ size_t sdm_isolated_ends(const sdm_instance *s)
 }
 
 sdm_status sdm_isolated_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
-                               size_t *unlike, size_t *first, sdm_error *err)
+                               sdm_repeat *out, sdm_error *err)
 {
     pool *at = pool_of(s->self);
     isolated_worker *w = NULL;
@@ -360,8 +360,7 @@ sdm_status sdm_isolated_repeat(const sdm_instance *s, const double *p, size_t n,
     if (!status) status = ask(at, w, &q, text.data, &a, NULL, err);
     if (w) give_back(at, w);
     sdm_free(text.data);
-    *unlike = (size_t)a.n_vert;
-    *first = (size_t)a.n_tri;
+    *out = a.repeat;
     return status;
 }
 

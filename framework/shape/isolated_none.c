@@ -23,9 +23,9 @@ size_t sdm_isolated_ends(const sdm_instance *s)
 }
 
 sdm_status sdm_isolated_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
-                               size_t *unlike, size_t *first, sdm_error *err)
+                               sdm_repeat *out, sdm_error *err)
 {
-    (void)s, (void)p, (void)n, (void)n_threads, (void)unlike, (void)first;
+    (void)s, (void)p, (void)n, (void)n_threads, (void)out;
     return sdm_fail(err, SDM_E_UNSUPPORTED, "no shape is isolated");
 }
 

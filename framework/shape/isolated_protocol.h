@@ -38,7 +38,8 @@ typedef struct isolated_request {
 typedef struct isolated_answer {
     sdm_status status;      /* not SDM_OK: the text is the message */
     uint32_t length;        /* bytes of text */
-    uint64_t n_vert, n_tri; /* MESH; REPEAT: how many, and the first */
+    uint64_t n_vert, n_tri; /* MESH */
+    sdm_repeat repeat;      /* REPEAT */
     double value;           /* DISTANCE, MEASURE */
 } isolated_answer;
 

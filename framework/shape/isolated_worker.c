@@ -313,15 +313,17 @@ static sdm_status create(worker *w, isolated_bytes *text, isolated_bytes *answer
 
 static sdm_status repeat(worker *w, isolated_bytes *text, isolated_answer *a, sdm_error *err)
 {
-    size_t n, unlike = 0, first = 0;
-    const size_t n_threads = sdm_bytes_get_count(text, 1024);
+    size_t n;
+    const int n_threads = (int)sdm_bytes_get_count(text, 1024);
     double *p = sdm_bytes_get_reals(text, &n);
-    const sdm_status s = text->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for parameters")
-                                      : sdm_shape_repeat(w->instance, p, n / w->instance->n_params,
-                                                         (int)n_threads, &unlike, &first, err);
+    const size_t n_shapes = n / w->instance->n_params;
+    sdm_status s = text->failed ? sdm_fail(err, SDM_E_NOMEM, "no memory for parameters") : SDM_OK;
+    if (!s && n_threads > 1)
+        s = sdm_shape_repeat_at_once(w->instance, p, n_shapes, n_threads, SHAPE_REPEAT_SECONDS,
+                                     &a->repeat, err);
+    else if (!s)
+        s = sdm_shape_repeat(w->instance, p, n_shapes, &a->repeat, err);
     sdm_free(p);
-    a->n_vert = unlike;
-    a->n_tri = first;
     return s;
 }
 

@@ -165,7 +165,7 @@ static sdm_status file_load_or_skip(sdm_registry *r, const char *folder, const c
         return sdm_fail(err, SDM_E_PLUGIN, "plug-in folder %s: path too long", folder);
     sdm_error why = {0};
     const sdm_status s = sdm_registry_load(r, file, &why);
-    if (s == SDM_E_PLUGIN || s == SDM_E_IO) return sdm_registry_skip(r, why.text, err);
+    if (s == SDM_E_PLUGIN || s == SDM_E_IO) return sdm_registry_skip(r, why.text, false, err);
     return s ? sdm_fail(err, s, "%s", why.text) : SDM_OK;
 }
 
@@ -174,7 +174,7 @@ static sdm_status folder_skip(sdm_registry *r, const char *folder, int error, sd
 {
     char why[PATH_MAX + 200];
     snprintf(why, sizeof why, "plug-in folder %s: %s", folder, strerror(error));
-    return sdm_registry_skip(r, why, err);
+    return sdm_registry_skip(r, why, true, err);
 }
 
 /* Loads in alphabetical order, so that of two files with a shape of the same name the same one is

@@ -3,6 +3,7 @@
 
 #include "sdm/internal/heap.h"
 #include "sdm/internal/isolation.h"
+#include "sdm/internal/skipped.h"
 #include "sdm/internal/text.h"
 #include "shape_internal.h"
 
@@ -17,13 +18,18 @@ typedef struct loaded {
     char *path;
 } loaded;
 
+struct skipped {
+    char *message;
+    bool folder; /* a folder, not a file */
+};
+
 struct sdm_registry {
     /* pointers, because the address of a shape must not change when the array grows */
     entry **entries;
     size_t count, capacity;
     loaded *objects; /* shared objects that the shapes come from */
     size_t n_objects;
-    char **skipped; /* messages of files that could not be loaded */
+    struct skipped *skipped; /* what could not be loaded */
     size_t n_skipped;
     sdm_isolation *isolation; /* NULL: plug-ins run in this process */
 };
@@ -50,8 +56,8 @@ void sdm_registry_free(sdm_registry *r)
         r->objects[i].close(r->objects[i].object);
         sdm_free(r->objects[i].path);
     }
-    for (size_t i = 0; i < r->n_skipped; i++) sdm_free(r->skipped[i]);
-    sdm_free((void *)r->skipped);
+    for (size_t i = 0; i < r->n_skipped; i++) sdm_free(r->skipped[i].message);
+    sdm_free(r->skipped);
     sdm_free(r->isolation);
     sdm_free(r->objects);
     sdm_free(r->entries);
@@ -91,19 +97,24 @@ const char *sdm_registry_kept(const sdm_registry *r, size_t index)
     return index < r->n_objects ? r->objects[index].path : NULL;
 }
 
-sdm_status sdm_registry_skip(sdm_registry *r, const char *message, sdm_error *err)
+sdm_status sdm_registry_skip(sdm_registry *r, const char *message, bool folder, sdm_error *err)
 {
     char *copy = NULL;
     sdm_status s = sdm_grow((void **)&r->skipped, r->n_skipped, r->n_skipped + 1,
                             sizeof *r->skipped, "plug-ins", err);
     if (!s) s = copy_text(message, &copy, err);
-    if (!s) r->skipped[r->n_skipped++] = copy;
+    if (!s) r->skipped[r->n_skipped++] = (struct skipped){copy, folder};
     return s;
 }
 
 const char *sdm_registry_skipped(const sdm_registry *r, size_t index)
 {
-    return r && index < r->n_skipped ? r->skipped[index] : NULL;
+    return r && index < r->n_skipped ? r->skipped[index].message : NULL;
+}
+
+bool sdm_registry_skipped_folder(const sdm_registry *r, size_t index)
+{
+    return r && index < r->n_skipped && r->skipped[index].folder;
 }
 
 static sdm_status registry_make_room(sdm_registry *r, sdm_error *err)

@@ -38,9 +38,14 @@ static sdm_status add_mistake(sdm_status before, sdm_status s, const char *who,
 static sdm_status param_check(const char *who, const sdm_param *params, uint32_t i, sdm_error *err)
 {
     const sdm_param *p = &params[i];
+    if (!p->name)
+        return sdm_fail(err, SDM_E_PLUGIN,
+                        "%s: parameter %u has no name: a row of the table that is not set, or "
+                        ".n_params is larger than the table (SDM_PARAMS(TABLE) counts the rows)",
+                        who, (unsigned)i + 1);
     if (!sdm_is_name(p->name))
         return sdm_fail(err, SDM_E_PLUGIN, "%s: parameter %u has the name '%s': " SDM_NAME_RULE,
-                        who, (unsigned)i + 1, p->name ? p->name : "(none)");
+                        who, (unsigned)i + 1, p->name);
     for (uint32_t j = 0; j < i; j++)
         if (params[j].name && strcmp(params[j].name, p->name) == 0)
             return sdm_fail(err, SDM_E_PLUGIN, "%s: two parameters are named '%s'", who, p->name);

@@ -1,6 +1,7 @@
 /* Declarations shared by the source files of this folder. */
 #pragma once
 
+#include "sdm/internal/shape_repeat.h"
 #include "sdm/mesh.h"
 #include "sdm/registry.h"
 
@@ -31,8 +32,9 @@ sdm_status sdm_registry_keep(sdm_registry *r, const char *path, void *object,
 /* registry.c: path number `index` of those given to sdm_registry_keep(); NULL: there are fewer. */
 const char *sdm_registry_kept(const sdm_registry *r, size_t index);
 
-/* registry.c: adds a message to those of sdm_registry_skipped(). SDM_E_NOMEM. */
-sdm_status sdm_registry_skip(sdm_registry *r, const char *message, sdm_error *err);
+/* registry.c: adds a message, about a folder or a file, to those of sdm_registry_skipped().
+ * SDM_E_NOMEM. */
+sdm_status sdm_registry_skip(sdm_registry *r, const char *message, bool folder, sdm_error *err);
 
 /* registry.c: how plug-ins are isolated; NULL: they run in this process. */
 const struct sdm_isolation *sdm_registry_isolation(const sdm_registry *r);
@@ -56,6 +58,7 @@ typedef struct host_call {
     const sdm_shape *shape; /* in create(): the table as the instance has it */
     sdm_mesh *mesh;
     bool files;
+    int fill; /* the byte of which the arrays of reserve() are full; 0xff, NaN, at first */
     struct host_block *blocks;
     sdm_error err; /* SDM_OK until a function of the host fails */
 } host_call;
@@ -103,12 +106,23 @@ sdm_status sdm_instance_start(const sdm_shape *shape, sdm_option_value *options,
 sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sdm_mesh *out,
                                       sdm_error *err);
 
-/* shape_repeat.c: makes the meshes at p[n][n_params] one after the other, then again: backwards for
- * one thread, else all at once on n_threads for a quarter of a second. *unlike: how many of the n
- * had other bits; *first: the first of them. Runs in one worker process if the shape is isolated.
- * SDM_E_PLUGIN: a mesh cannot be made. */
-sdm_status sdm_shape_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
-                            size_t *unlike, size_t *first, sdm_error *err);
+/* instance.c: the same; the arrays that mesh() has to write are full of the byte `fill` before. */
+sdm_status sdm_instance_mesh_filled(const sdm_instance *s, const double *p, int fill, sdm_mesh *out,
+                                    sdm_error *err);
+
+/* shape_repeat.c: makes the meshes at p[n][n_params] one after the other and again: backwards, with
+ * other values behind the parameters, and with other bytes in the memory that mesh() has to write.
+ * A mesh that can be made at one time and not at another counts as unlike. Runs in one worker
+ * process if the shape is isolated. SDM_E_NOMEM; SDM_E_PLUGIN: a call has ended the worker. */
+sdm_status sdm_shape_repeat(const sdm_instance *s, const double *p, size_t n, sdm_repeat *out,
+                            sdm_error *err);
+
+/* shape_repeat.c: makes the meshes one after the other, then all of them again and again on
+ * n_threads at once, for `seconds` (a quarter of a second if the shape is isolated). Errors as
+ * above. */
+sdm_status sdm_shape_repeat_at_once(const sdm_instance *s, const double *p, size_t n, int n_threads,
+                                    double seconds, sdm_repeat *out, sdm_error *err);
+#define SHAPE_REPEAT_SECONDS 0.25
 
 /* isolated.c: the callbacks of the shape run in worker processes. */
 bool sdm_is_isolated(const sdm_instance *s);
@@ -116,9 +130,10 @@ bool sdm_is_isolated(const sdm_instance *s);
 /* isolated.c: how many calls have ended a worker of an isolated shape. */
 size_t sdm_isolated_ends(const sdm_instance *s);
 
-/* isolated.c: sdm_shape_repeat() in a worker of an isolated shape. */
+/* isolated.c: sdm_shape_repeat() (one thread) or sdm_shape_repeat_at_once() in a worker of an
+ * isolated shape. */
 sdm_status sdm_isolated_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
-                               size_t *unlike, size_t *first, sdm_error *err);
+                               sdm_repeat *out, sdm_error *err);
 
 /* instance.c: SDM_E_PLUGIN: `out` is not what reserve() has given to mesh(). */
 sdm_status sdm_mesh_out_check(const sdm_mesh_out *out, const sdm_mesh_out *given, sdm_error *err);

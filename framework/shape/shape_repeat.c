@@ -1,10 +1,29 @@
 /* Makes meshes again, one after the other or on many threads at once, and compares their bits. */
+#include <string.h>
+
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
 #include "sdm/memory.h"
 #include "shape_internal.h"
 
-#define SECONDS 0.25
+/* What mesh() finds where it must not read: in memory that it has not written, and behind the last
+ * parameter. As a double FILL is NaN, OTHER_FILL about 32.5. */
+enum { FILL = 0xff, OTHER_FILL = 0x40, STACK_BYTES = 1 << 16 };
+#define BEHIND 0.5
+#define OTHER_BEHIND 1.5
+
+/* Fills the stack where the following calls have their variables. */
+#if defined(__GNUC__)
+__attribute__((noinline))
+#endif
+static uint64_t
+fill_stack(int fill)
+{
+    volatile uint64_t area[STACK_BYTES / sizeof(uint64_t)];
+    for (size_t i = 0; i < STACK_BYTES / sizeof(uint64_t); i++)
+        area[i] = UINT64_C(0x0101010101010101) * (unsigned)fill;
+    return area[0];
+}
 
 static uint64_t checksum(const sdm_mesh *m)
 {
@@ -14,28 +33,84 @@ static uint64_t checksum(const sdm_mesh *m)
     return sdm_crc64(c, m->tri, 3 * m->n_tri * sizeof *m->tri);
 }
 
+/* A call of mesh() with other memory around it. */
+typedef struct trial {
+    const sdm_instance *shape;
+    sdm_mesh mesh;
+    double p[2 * SHAPE_PARAMS_MAX]; /* the parameters, then values that mesh() must not read */
+} trial;
+
+/* Checksum of the mesh at p[n_params]; 0: it cannot be made. */
+static uint64_t make(trial *t, const double *p, int fill)
+{
+    memcpy(t->p, p, t->shape->n_params * sizeof *p);
+    (void)fill_stack(fill);
+    const sdm_status s = sdm_instance_mesh_filled(t->shape, t->p, fill, &t->mesh, NULL);
+    return s ? 0 : checksum(&t->mesh);
+}
+
+static void set_behind(trial *t, double value)
+{
+    for (size_t i = t->shape->n_params; i < 2 * SHAPE_PARAMS_MAX; i++) t->p[i] = value;
+}
+
+static void count(sdm_repeat *out, sdm_repeat_cause cause, size_t shape)
+{
+    if (!out->unlike++) out->first = shape;
+    out->cause = cause;
+}
+
+/* Does mesh() read behind the last parameter? Then out->param is the index of the first value. */
+static void read_behind(trial *t, const double *p, size_t n, const uint64_t *first, sdm_repeat *out)
+{
+    set_behind(t, OTHER_BEHIND);
+    for (size_t i = 0; i < n; i++)
+        if (make(t, p + i * t->shape->n_params, FILL) != first[i]) count(out, SDM_REPEAT_BEHIND, i);
+    set_behind(t, BEHIND);
+    if (!out->unlike) return;
+    for (out->param = t->shape->n_params; out->param < 2 * SHAPE_PARAMS_MAX - 1; out->param++) {
+        t->p[out->param] = OTHER_BEHIND;
+        const uint64_t now = make(t, p + out->first * t->shape->n_params, FILL);
+        t->p[out->param] = BEHIND;
+        if (now != first[out->first]) return;
+    }
+}
+
+/* Does mesh() use memory that it has not written? */
+static void read_unset(trial *t, const double *p, size_t n, const uint64_t *first, sdm_repeat *out)
+{
+    for (size_t i = 0; i < n; i++)
+        if (make(t, p + i * t->shape->n_params, OTHER_FILL) != first[i])
+            count(out, SDM_REPEAT_UNSET, i);
+}
+
+/* Does the mesh depend on the calls before? */
+static void read_history(trial *t, const double *p, size_t n, const uint64_t *first,
+                         sdm_repeat *out)
+{
+    for (size_t i = n; i-- > 0;) {
+        const double *at = p + i * t->shape->n_params;
+        const bool after_other = make(t, at, FILL) != first[i],
+                   after_same = make(t, at, FILL) != first[i];
+        if (!after_other && !after_same) continue;
+        count(out, SDM_REPEAT_HISTORY, i);
+        out->first = i;
+    }
+}
+
 static void again(const sdm_instance *s, const double *p, uint64_t first, sdm_mesh *mesh,
                   bool *unlike)
 {
-    if (!sdm_instance_mesh(s, p, mesh, NULL) && checksum(mesh) == first) return;
+    if ((sdm_instance_mesh(s, p, mesh, NULL) ? 0 : checksum(mesh)) == first) return;
 #pragma omp atomic write
     *unlike = true;
 }
 
-static void repeat_backwards(const sdm_instance *s, const double *p, size_t n,
-                             const uint64_t *first, bool *unlike)
-{
-    sdm_mesh mesh = {0};
-    for (size_t i = n; i-- > 0;)
-        for (int k = 0; k < 2; k++) again(s, p + i * s->n_params, first[i], &mesh, &unlike[i]);
-    sdm_mesh_dispose(&mesh);
-}
-
 /* Every thread makes all meshes, each thread another one at first. */
 static void repeat_at_once(const sdm_instance *s, const double *p, size_t n, int n_threads,
-                           const uint64_t *first, bool *unlike)
+                           double seconds, const uint64_t *first, bool *unlike)
 {
-    const double until = sdm_clock() + SECONDS;
+    const double until = sdm_clock() + seconds;
 #pragma omp parallel for num_threads(n_threads) schedule(static, 1)
     for (int thread = 0; thread < n_threads; thread++) {
         sdm_mesh mesh = {0};
@@ -49,29 +124,62 @@ static void repeat_at_once(const sdm_instance *s, const double *p, size_t n, int
     }
 }
 
-sdm_status sdm_shape_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
-                            size_t *unlike, size_t *first, sdm_error *err)
+const char *sdm_repeat_advice(sdm_repeat_cause cause)
 {
-    if (sdm_is_isolated(s)) return sdm_isolated_repeat(s, p, n, n_threads, unlike, first, err);
-    uint64_t *sums = NULL;
-    bool *other = NULL;
-    sdm_mesh mesh = {0};
-    sdm_status status = SDM_ALLOC(&sums, n, "checksums of meshes", err);
-    if (!status) status = SDM_ALLOC(&other, n, "repeated meshes", err);
-    for (size_t i = 0; i < n && !status; i++) {
-        status = sdm_instance_mesh(s, p + i * s->n_params, &mesh, err);
-        if (!status) sums[i] = checksum(&mesh);
+    switch (cause) {
+    case SDM_REPEAT_HISTORY:
+        return "mesh() keeps something from one call to the next: no static or global variables "
+               "that it writes, no random numbers, no clock, no files";
+    case SDM_REPEAT_BEHIND:
+        return "mesh() reads more parameters than the shape has: is .n_params smaller than the "
+               "table? SDM_PARAMS(TABLE) in place of .params and .n_params counts the rows";
+    case SDM_REPEAT_UNSET:
+        return "mesh() reads memory that it has not written: set every variable, row and array "
+               "first (the compiler names many of them with -O2 -Wall, valgrind the rest)";
+    case SDM_REPEAT_THREADS:
+        return "mesh() writes a static or global variable or array, which threads share: make it "
+               "local to mesh(), or use --isolate, which gives every thread a process";
+    default:
+        return "mesh() must depend on its arguments alone";
     }
+}
+
+sdm_status sdm_shape_repeat(const sdm_instance *s, const double *p, size_t n, sdm_repeat *out,
+                            sdm_error *err)
+{
+    *out = (sdm_repeat){0};
+    if (sdm_is_isolated(s)) return sdm_isolated_repeat(s, p, n, 1, out, err);
+    uint64_t *first = NULL;
+    trial t = {.shape = s};
+    const sdm_status status = SDM_ALLOC(&first, n, "checksums of meshes", err);
+    set_behind(&t, BEHIND);
+    for (size_t i = 0; i < n && !status; i++) first[i] = make(&t, p + i * s->n_params, FILL);
+    // what depends on the calls before would count as a fault of the other kinds, too
+    if (!status) read_history(&t, p, n, first, out);
+    if (!status && !out->unlike) read_behind(&t, p, n, first, out);
+    if (!status && !out->unlike) read_unset(&t, p, n, first, out);
+    sdm_mesh_dispose(&t.mesh);
+    sdm_free(first);
+    return status;
+}
+
+sdm_status sdm_shape_repeat_at_once(const sdm_instance *s, const double *p, size_t n, int n_threads,
+                                    double seconds, sdm_repeat *out, sdm_error *err)
+{
+    *out = (sdm_repeat){0};
+    if (sdm_is_isolated(s)) return sdm_isolated_repeat(s, p, n, n_threads, out, err);
+    uint64_t *first = NULL;
+    bool *unlike = NULL;
+    sdm_mesh mesh = {0};
+    sdm_status status = SDM_ALLOC(&first, n, "checksums of meshes", err);
+    if (!status) status = SDM_ALLOC(&unlike, n, "repeated meshes", err);
+    for (size_t i = 0; i < n && !status; i++)
+        first[i] = sdm_instance_mesh(s, p + i * s->n_params, &mesh, NULL) ? 0 : checksum(&mesh);
     sdm_mesh_dispose(&mesh);
-    if (!status && n_threads > 1) repeat_at_once(s, p, n, n_threads, sums, other);
-    if (!status && n_threads <= 1) repeat_backwards(s, p, n, sums, other);
-    *unlike = *first = 0;
-    for (size_t i = n; i-- > 0 && !status;)
-        if (other[i]) {
-            *first = i;
-            ++*unlike;
-        }
-    sdm_free(sums);
-    sdm_free(other);
+    if (!status) repeat_at_once(s, p, n, n_threads, seconds, first, unlike);
+    for (size_t i = 0; i < n && !status; i++)
+        if (unlike[i]) count(out, SDM_REPEAT_THREADS, i);
+    sdm_free(first);
+    sdm_free(unlike);
     return status;
 }

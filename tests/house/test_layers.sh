@@ -45,7 +45,7 @@ check() {
         own("nn", "model")
         own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template")
         own("io", "glb image meshfile npy picture picture_child ssm volume")
-        own("shape", "callback conformance isolation mesh_measures registry shape_box shape_sums shape_survey")
+        own("shape", "callback conformance isolation mesh_measures registry shape_box shape_repeat shape_sums shape_survey skipped")
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit phantom runtime vdb")
         own("runtime", "model_mesh vdb_memory")

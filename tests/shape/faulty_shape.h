@@ -19,7 +19,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
-     "edge|centimetres|small|wall|step|apart|within|twins|changed|wound",
+     "edge|centimetres|small|wall|step|apart|within|twins|changed|wound|behind|unset",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -84,6 +84,14 @@ static inline void faulty_arrays(const char *fault, const double *p, sdm_mesh_ou
     if (!strcmp(fault, "write")) *(double *)p = 1;
 }
 
+/* Reads a variable that it has not written: 0.1 where it is about 32.5, else 0. */
+static inline double faulty_unset(void)
+{
+    double row[64];
+    double *volatile at = row; // so that the compiler does not know
+    return at[32] > 32 && at[32] < 33 ? 0.1 : 0;
+}
+
 static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                        const double *p, sdm_mesh_out *out)
 {
@@ -110,6 +118,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "jump")) shift = is_large ? 0.125 : 0;
     if (!strcmp(fault, "kink")) shift = fabs(p[0] - 2) / 4;
     if (!strcmp(fault, "unlike")) shift = 1e-6 * ++calls;
+    if (!strcmp(fault, "behind")) shift = 0.01 * p[3];
+    if (!strcmp(fault, "unset")) shift = faulty_unset();
     static volatile double shared; // for threads that call at once
     shared = p[0];
     for (int i = 0; i < 20000 && !strcmp(fault, "shared"); i++) shift += 0 * shared;

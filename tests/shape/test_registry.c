@@ -14,6 +14,7 @@
 
 #include "sdm/builtin_shapes.h"
 #include "sdm/internal/heap.h"
+#include "sdm/internal/skipped.h"
 
 static sdm_error err;
 
@@ -139,7 +140,8 @@ static void test_names_are_checked(void **state)
         params[1].name = BAD[i];
         s = GOOD;
         s.params = params;
-        registration_refused(&s, "there: shape 'tetra': parameter 2 has the name '");
+        registration_refused(&s, BAD[i] ? "there: shape 'tetra': parameter 2 has the name '"
+                                        : "there: shape 'tetra': parameter 2 has no name: a row");
         sdm_option options[N_OPTIONS];
         memcpy(options, OPTIONS, sizeof options);
         options[2].name = BAD[i];
@@ -299,6 +301,9 @@ static void test_registry_refuses_wrong_arguments(void **state)
     assert_int_equal(sdm_registry_load_path(registry, "/there/is/none", &err), SDM_OK);
     assert_string_equal(sdm_registry_skipped(registry, 0),
                         "plug-in folder /there/is/none: No such file or directory");
+    assert_true(sdm_registry_skipped_folder(registry, 0));
+    assert_false(sdm_registry_skipped_folder(registry, 1));
+    assert_false(sdm_registry_skipped_folder(NULL, 0));
     assert_null(sdm_registry_find(registry, "x", NULL));
     assert_null(sdm_registry_at(registry, 0));
     assert_null(sdm_registry_origin(registry, 0));

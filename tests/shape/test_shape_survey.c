@@ -1,6 +1,7 @@
 /* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
  * known from the source; shapes without faults pass.
- * Tests: shape_survey.c survey_fold.c survey_line.c survey_scale.c units.c */
+ * Tests: shape_survey.c survey_fold.c survey_line.c survey_repeat.c
+ * survey_scale.c units.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -68,7 +69,7 @@ static void without_faults(void **state)
     assert_int_equal(s.n_vert, 16);
     assert_int_equal(s.n_tri, 24);
     assert_true(s.failed.shapes + s.open.shapes + s.inside_out.shapes + s.turned.shapes == 0);
-    assert_true(s.resized.shapes + s.rewired.shapes + s.degenerate.shapes + s.unlike == 0);
+    assert_true(s.resized.shapes + s.rewired.shapes + s.degenerate.shapes + s.repeat.unlike == 0);
     assert_int_equal(s.overlaps.shapes, s.n);
     assert_true(s.has_velocity && s.velocity_error < 1e-6);
     // union: the body, and the handle outside of it, 0.5 x 0.5 x reach
@@ -270,10 +271,30 @@ static void callbacks(void **state)
     assert_int_equal(s.velocity_vertex, 9);
     assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
     sdm_shape_survey_dispose(&s);
-    s = survey_with("unlike", &(sdm_survey_opts){.samples = 4, .n_threads = 1});
-    assert_int_equal(s.unlike, 8);
-    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
-    sdm_shape_survey_dispose(&s);
+}
+
+// Why meshes differ when they are made again, in a brief survey, too.
+static void meshes_made_again(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *fault;
+        sdm_repeat_cause cause;
+    } cases[] = {{"none", SDM_REPEAT_UNKNOWN},
+                 {"unlike", SDM_REPEAT_HISTORY},
+                 {"behind", SDM_REPEAT_BEHIND},
+                 {"unset", SDM_REPEAT_UNSET},
+                 {"shared", SDM_REPEAT_THREADS}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        for (int brief = 0; brief < 2; brief++) {
+            sdm_shape_survey s =
+                survey_with(cases[i].fault, &(sdm_survey_opts){.samples = 4, .brief = brief});
+            assert_int_equal(s.repeat.cause, cases[i].cause);
+            assert_true((s.repeat.unlike == 0) == !i && s.repeat.unlike <= 8);
+            if (cases[i].cause == SDM_REPEAT_BEHIND) assert_int_equal(s.repeat.param, 3);
+            assert_int_equal(sdm_shape_survey_verdict(&s), i ? SDM_E_QUALITY : SDM_OK);
+            sdm_shape_survey_dispose(&s);
+        }
 }
 
 static void a_grid_that_cuts(void **state)
@@ -421,6 +442,7 @@ int main(void)
         cmocka_unit_test(walls_that_pass_through_each_other),
         cmocka_unit_test(time_is_short),
         cmocka_unit_test(callbacks),
+        cmocka_unit_test(meshes_made_again),
         cmocka_unit_test(a_grid_that_cuts),
         cmocka_unit_test(a_grid_that_is_too_coarse),
         cmocka_unit_test(a_grid_that_is_too_large),

@@ -165,6 +165,13 @@ typedef struct sdm_shape {
                    const double *p, uint32_t index, double depth, double *value);
 } sdm_shape;
 
+/* Members of a table and their numbers of rows (C, C++20): sdm_shape x = {..., SDM_PARAMS(PARAMS),
+ * ...} sets .params and .n_params. `table` is the name of an array, not a pointer. */
+#define SDM_ROWS(table) ((uint32_t)(sizeof(table) / sizeof((table)[0])))
+#define SDM_PARAMS(table) .params = (table), .n_params = SDM_ROWS(table)
+#define SDM_OPTIONS(table) .options = (table), .n_options = SDM_ROWS(table)
+#define SDM_MEASURES(table) .measures = (table), .n_measures = SDM_ROWS(table)
+
 /* The only symbol that the shared object of a plug-in exports: returns shape `index`, NULL beyond
  * the last. */
 typedef const sdm_shape *(*sdm_plugin_entry)(uint32_t index);

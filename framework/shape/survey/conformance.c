@@ -230,20 +230,23 @@ static sdm_status test_repeated(tests *t, int test, int n_threads, sdm_error *er
         result(t, test, SDM_TEST_SKIPPED, 0, "meshes cannot be made");
         return SDM_OK;
     }
-    size_t unlike = 0, first = 0;
-    const sdm_status s = sdm_shape_repeat(t->instance, f->p, n, n_threads, &unlike, &first, err);
+    sdm_repeat r;
+    const sdm_status s = n_threads > 1 ? sdm_shape_repeat_at_once(t->instance, f->p, n, n_threads,
+                                                                  SHAPE_REPEAT_SECONDS, &r, err)
+                                       : sdm_shape_repeat(t->instance, f->p, n, &r, err);
     if (s && s != SDM_E_PLUGIN) return s;
     const char *how = n_threads > 1 ? "made by several threads at once" : "made again";
     if (s)
         result(t, test, SDM_TEST_FAILED, NAN, "%s", err ? reason(err->text) : "a call fails");
-    else if (unlike)
+    else if (r.unlike)
         at_shape(t,
-                 result(t, test, SDM_TEST_FAILED, (double)unlike,
-                        "%zu of %zu meshes have other bits when they are %s", unlike, n, how),
-                 first);
-    else if (n_threads == 1 && f->unlike)
-        result(t, test, SDM_TEST_FAILED, (double)f->unlike,
-               "%zu meshes have other bits in another process", f->unlike);
+                 result(t, test, SDM_TEST_FAILED, (double)r.unlike,
+                        "%zu of %zu meshes have other bits when they are %s: %s", r.unlike, n, how,
+                        sdm_repeat_advice(r.cause)),
+                 r.first);
+    else if (n_threads == 1 && f->repeat.unlike)
+        result(t, test, SDM_TEST_FAILED, (double)f->repeat.unlike,
+               "%zu meshes have other bits in another process", f->repeat.unlike);
     else
         result(t, test, SDM_TEST_PASSED, 0, "the same bits, %s", how);
     return SDM_OK;

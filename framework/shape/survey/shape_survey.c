@@ -14,6 +14,7 @@
 #include "sdm/memory.h"
 #include "survey_fold.h"
 #include "survey_line.h"
+#include "survey_repeat.h"
 #include "survey_scale.h"
 
 enum {
@@ -55,7 +56,9 @@ static sdm_status choose(shape_family *f, const sdm_survey_opts *opts, sdm_shape
     s->n_samples = opts->samples;
     s->n_corners = f->n_corners;
     s->n = 1 + s->n_corners + s->n_samples;
-    const sdm_status status = SDM_ALLOC(&s->p, s->n * n, "parameters of shapes", err);
+    // with room behind, which a mesh() that expects more parameters reads
+    const sdm_status status =
+        SDM_ALLOC(&s->p, s->n * n + SHAPE_PARAMS_MAX, "parameters of shapes", err);
     if (status) return status;
     for (size_t i = 0; i < n; i++)
         s->p[i] = fmin(fmax(f->shape->params[i].def, f->min[i]), f->max[i]);
@@ -451,9 +454,10 @@ static sdm_status repeat(survey *v, int n_threads, sdm_error *err)
         ms[i] = 1e3 * (sdm_clock() - start);
     }
     sdm_mesh_dispose(&mesh);
-    if (!s) s = run(v->opts, n_threads > 1 ? n_threads : 2, NULL, n, repeat_one, v, err);
+    if (!s) s = run(v->opts, n_threads, NULL, n, repeat_one, v, err);
     if (s) return s;
-    for (size_t i = 0; i < n; i++) v->out->unlike += v->unlike[i];
+    // a cause is known already, or the meshes differ from one process to another
+    for (size_t i = 0; i < n && !v->out->repeat.cause; i++) v->out->repeat.unlike += v->unlike[i];
     qsort(ms, n, sizeof *ms, by_size);
     v->out->ms_mesh = ms[n / 2];
     return SDM_OK;
@@ -486,11 +490,14 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
     if (!opts) opts = &none;
     *out = (sdm_shape_survey){0};
     survey v = {.opts = opts, .out = out, .start = sdm_clock()};
-    const int n_threads = sdm_threads(opts->n_threads);
+    int n_threads = sdm_threads(opts->n_threads);
     sdm_status s = opts->grid ? sdm_grid_check(opts->grid, err) : SDM_OK;
     if (!s) s = sdm_family_set(&v.family, shape, opts->range, opts->distribution, opts->seed, err);
     if (!s) s = choose(&v.family, opts, out, err);
     if (!s) s = SDM_ALLOC(&v.found, out->n, "findings of a survey", err);
+    if (!s) s = sdm_survey_repeat(shape, out->p, out->n, opts->brief, &out->repeat, err);
+    // further findings are to be those of the shape
+    if (out->repeat.cause == SDM_REPEAT_THREADS) n_threads = 1;
     if (!s) s = run(opts, n_threads, "shapes", out->n, examine_one, &v, err);
     if (!s) sum_up(&v);
     if (!s && !opts->brief && out->failed.shapes < out->n - out->untested) {
@@ -547,7 +554,7 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
     bool bad = s->inside_out.shapes || s->crossing.shapes || sdm_survey_winds_wrongly(s) ||
                s->folded.shapes || s->turned.shapes || s->resized.shapes || s->rewired.shapes ||
-               s->cut.shapes || s->thin.shapes || s->flat.shapes || s->narrow || s->unlike ||
+               s->cut.shapes || s->thin.shapes || s->flat.shapes || s->narrow || s->repeat.unlike ||
                s->surplus > SDM_SURVEY_SURPLUS_MAX ||
                s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
                s->scale.odd_speed || s->scale.odd_angle;

@@ -5,6 +5,7 @@
 #include "sdm/grid.h"
 #include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
+#include "sdm/internal/shape_repeat.h"
 #include "sdm/registry.h"
 
 #ifdef __cplusplus
@@ -21,7 +22,7 @@ typedef struct sdm_survey_opts {
     size_t samples; /* random shapes: Sobol' points of the distributions */
     uint64_t seed;
     const sdm_grid *grid; /* NULL: nothing is compared with a grid */
-    bool brief;           /* only meshes and their audits: no lines, velocities and repetitions */
+    bool brief;           /* meshes, their audits, a few repetitions: no lines, no velocities */
     int n_threads;
     double seconds; /* what has not begun after this time is left out; 0: no limit */
     /* called by any thread; true: the survey ends with SDM_E_CANCELLED. May be NULL. */
@@ -137,6 +138,9 @@ typedef struct sdm_shape_survey {
        above SDM_SURVEY_SURPLUS_MAX the grid is far too large. 0: there is no grid; NaN: no mesh */
     double surplus, surplus_along[3];
 
+    /* some of the meshes made again, in a brief survey fewer of them */
+    sdm_repeat repeat;
+
     /* what a brief survey leaves out */
     /* corners and the first samples in which triangles have turned over within a sixteenth of the
      * straight way from shape 0: walls pass through each other; amount: the share of these
@@ -153,8 +157,6 @@ typedef struct sdm_shape_survey {
      * velocity by the same parameter, and where it is */
     double velocity_error;
     size_t velocity_param, velocity_shape, velocity_vertex;
-    size_t
-        unlike; /* shapes whose mesh had other bits when it was made again or by several threads */
     double ms_mesh;     /* median time of a mesh, ms */
     sdm_face_hits hits; /* of the grid, sdm_grid_family_hits(); zero without a grid */
 } sdm_shape_survey;

@@ -1,0 +1,30 @@
+/* Why a shape gives other meshes when they are made again. */
+#pragma once
+
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum sdm_repeat_cause {
+    SDM_REPEAT_UNKNOWN = 0,
+    SDM_REPEAT_HISTORY, /* the mesh depends on the calls before */
+    SDM_REPEAT_BEHIND,  /* mesh() reads values behind the last parameter */
+    SDM_REPEAT_UNSET,   /* mesh() reads memory that it has not written */
+    SDM_REPEAT_THREADS  /* the mesh changes when several threads call at once */
+} sdm_repeat_cause;
+
+typedef struct sdm_repeat {
+    size_t unlike; /* meshes with other bits */
+    size_t first;  /* the first of them */
+    sdm_repeat_cause cause;
+    size_t param; /* BEHIND: the index of the first value that mesh() must not read */
+} sdm_repeat;
+
+/* What the author of the shape has done, and what to do: a text without a full stop. */
+const char *sdm_repeat_advice(sdm_repeat_cause cause);
+
+#ifdef __cplusplus
+}
+#endif

@@ -48,6 +48,7 @@ static int host_reserve(const sdm_host *host, sdm_mesh_out *out, size_t n_vert, 
     // NaN and vertices that do not exist: what the callback forgets to write is refused
     memset(m->vert, c->fill, 3 * n_vert * sizeof *m->vert);
     memset(m->tri, c->fill, 3 * n_tri * sizeof *m->tri);
+    if (c->fill_stack) sdm_fill_stack(c->fill);
     return mesh_out_set(m, out);
 }
 
@@ -118,6 +119,7 @@ void sdm_host_call_begin(host_call *c, sdm_mesh *mesh, bool files)
     c->mesh = mesh;
     c->files = files;
     c->fill = 0xff;
+    c->fill_stack = false;
     c->blocks = NULL;
     c->err.status = SDM_OK;
     c->err.text[0] = '\0';

@@ -216,20 +216,19 @@ sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *o
     return sdm_instance_mesh_anywhere(s, p, out, err);
 }
 
-sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sdm_mesh *out,
-                                      sdm_error *err)
-{
-    return sdm_instance_mesh_filled(s, p, 0xff, out, err);
-}
-
-sdm_status sdm_instance_mesh_filled(const sdm_instance *s, const double *p, int fill, sdm_mesh *out,
-                                    sdm_error *err)
+/* The body of the two functions below; fill < 0: fills nothing but the arrays of reserve(). */
+static sdm_status make_mesh(const sdm_instance *s, const double *p, int fill, sdm_mesh *out,
+                            sdm_error *err)
 {
     out->n_vert = out->n_tri = 0;
     sdm_mesh_out filled = {0};
     host_call call;
     sdm_host_call_begin(&call, out, false);
-    call.fill = fill;
+    if (fill >= 0) {
+        call.fill = fill;
+        call.fill_stack = true;
+        sdm_fill_stack(fill);
+    }
     sdm_callback_begin(s, "mesh", p);
     const int failed = s->shape->mesh(s->self, &call.host, s->options, p, &filled);
     sdm_callback_end();
@@ -240,6 +239,18 @@ sdm_status sdm_instance_mesh_filled(const sdm_instance *s, const double *p, int 
     if (!status) return SDM_OK;
     out->n_vert = out->n_tri = 0;
     return sdm_instance_fail_at(s, p, status, err);
+}
+
+sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sdm_mesh *out,
+                                      sdm_error *err)
+{
+    return make_mesh(s, p, -1, out, err);
+}
+
+sdm_status sdm_instance_mesh_filled(const sdm_instance *s, const double *p, int fill, sdm_mesh *out,
+                                    sdm_error *err)
+{
+    return make_mesh(s, p, fill, out, err);
 }
 
 sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const double x[3],

@@ -58,7 +58,9 @@ typedef struct host_call {
     const sdm_shape *shape; /* in create(): the table as the instance has it */
     sdm_mesh *mesh;
     bool files;
-    int fill; /* the byte of which the arrays of reserve() are full; 0xff, NaN, at first */
+    /* the byte of which the arrays of reserve() are full: 0xff, which makes NaN, unless changed */
+    int fill;
+    bool fill_stack; /* reserve() also fills the stack with it, for sdm_shape_repeat() */
     struct host_block *blocks;
     sdm_error err; /* SDM_OK until a function of the host fails */
 } host_call;
@@ -106,9 +108,13 @@ sdm_status sdm_instance_start(const sdm_shape *shape, sdm_option_value *options,
 sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sdm_mesh *out,
                                       sdm_error *err);
 
-/* instance.c: the same; the arrays that mesh() has to write are full of the byte `fill` before. */
+/* instance.c: the same; the arrays that mesh() has to write, and the stack behind its variables,
+ * are full of the byte `fill`. */
 sdm_status sdm_instance_mesh_filled(const sdm_instance *s, const double *p, int fill, sdm_mesh *out,
                                     sdm_error *err);
+
+/* shape_repeat.c: fills the stack where the next calls of the caller have their variables. */
+void sdm_fill_stack(int fill);
 
 /* shape_repeat.c: makes the meshes at p[n][n_params] one after the other and again: backwards, with
  * other values behind the parameters, and with other bytes in the memory that mesh() has to write.

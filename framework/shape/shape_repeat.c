@@ -12,18 +12,19 @@ enum { FILL = 0xff, OTHER_FILL = 0x40, STACK_BYTES = 1 << 16 };
 #define BEHIND 0.5
 #define OTHER_BEHIND 1.5
 
-/* Fills the stack where the following calls have their variables. */
 #if defined(__GNUC__)
 __attribute__((noinline))
 #endif
 static uint64_t
-fill_stack(int fill)
+fill_own_stack(int fill)
 {
     volatile uint64_t area[STACK_BYTES / sizeof(uint64_t)];
     for (size_t i = 0; i < STACK_BYTES / sizeof(uint64_t); i++)
         area[i] = UINT64_C(0x0101010101010101) * (unsigned)fill;
     return area[0];
 }
+
+void sdm_fill_stack(int fill) { (void)fill_own_stack(fill); }
 
 static uint64_t checksum(const sdm_mesh *m)
 {
@@ -36,7 +37,7 @@ static uint64_t checksum(const sdm_mesh *m)
 /* A call of mesh() with other memory around it. */
 typedef struct trial {
     const sdm_instance *shape;
-    sdm_mesh mesh;
+    sdm_mesh mesh[2]; /* at two addresses, of which copies may be on the stack: FILL, OTHER_FILL */
     double p[2 * SHAPE_PARAMS_MAX]; /* the parameters, then values that mesh() must not read */
 } trial;
 
@@ -44,9 +45,8 @@ typedef struct trial {
 static uint64_t make(trial *t, const double *p, int fill)
 {
     memcpy(t->p, p, t->shape->n_params * sizeof *p);
-    (void)fill_stack(fill);
-    const sdm_status s = sdm_instance_mesh_filled(t->shape, t->p, fill, &t->mesh, NULL);
-    return s ? 0 : checksum(&t->mesh);
+    sdm_mesh *m = &t->mesh[fill == OTHER_FILL];
+    return sdm_instance_mesh_filled(t->shape, t->p, fill, m, NULL) ? 0 : checksum(m);
 }
 
 static void set_behind(trial *t, double value)
@@ -158,7 +158,7 @@ sdm_status sdm_shape_repeat(const sdm_instance *s, const double *p, size_t n, sd
     if (!status) read_history(&t, p, n, first, out);
     if (!status && !out->unlike) read_behind(&t, p, n, first, out);
     if (!status && !out->unlike) read_unset(&t, p, n, first, out);
-    sdm_mesh_dispose(&t.mesh);
+    for (int i = 0; i < 2; i++) sdm_mesh_dispose(&t.mesh[i]);
     sdm_free(first);
     return status;
 }

@@ -350,6 +350,29 @@ static void test_outline_that_crosses_itself(void **state)
     }
 }
 
+// The same rim, of which one side lies in a box: the loop is a hole in the box. In two boxes at the
+// same place it harms nothing there.
+static void test_loop_in_another_part(void **state)
+{
+    (void)state;
+    const double outline[8][2] = {{0, -1},   {2, -1},      {2.8, 0.12}, {3, 0.4},
+                                  {3, -0.4}, {2.8, -0.12}, {2, 1},      {0, 1}};
+    for (int boxes = 1; boxes < 3; boxes++) {
+        sdm_mesh rim = revolve(outline, 8), m = {0};
+        for (int i = 0; i < boxes; i++) add_box(&m, 0.01, 4, 4 + i, false);
+        const size_t v = m.n_vert, t = m.n_tri;
+        assert_int_equal(sdm_mesh_reserve(&m, v + rim.n_vert, t + rim.n_tri, &err), SDM_OK);
+        memcpy(m.vert + 3 * v, rim.vert, 3 * rim.n_vert * sizeof *m.vert);
+        for (size_t i = 0; i < 3 * rim.n_tri; i++) m.tri[3 * t + i] = rim.tri[i] + (uint32_t)v;
+        sdm_part_audit a;
+        if (sdm_part_audit_make(&m, true, &a, &err)) fail_msg("%s", err.text);
+        assert_int_equal(a.n, (size_t)boxes + 1);
+        assert_true(fabs(a.part[boxes].folded - (boxes == 1 ? 0.293 : 0.293 / 2)) < 0.02);
+        sdm_part_audit_dispose(&a);
+        sdm_mesh_dispose(&m);
+    }
+}
+
 /* The thickness of a body whose radius is radius(z) for -1 <= z <= 1. */
 static double thickness_of(double (*radius)(double z))
 {
@@ -402,6 +425,7 @@ int main(void)
         cmocka_unit_test(test_thickness),
         cmocka_unit_test(test_thickness_of_necks),
         cmocka_unit_test(test_outline_that_crosses_itself),
+        cmocka_unit_test(test_loop_in_another_part),
         cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

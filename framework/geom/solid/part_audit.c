@@ -267,7 +267,8 @@ static sdm_status measure_thickness(job *j, sdm_error *err)
     sdm_part_audit *a = j->out;
     const size_t n = a->n < MEASURED ? a->n : MEASURED;
     if (!a->mesh.closed) return SDM_OK;
-    sdm_part_folds(&j->turned, &j->survey.tree, j->part_of, a->part, n);
+    const sdm_status s = sdm_part_folds(&j->turned, &j->survey.tree, j->part_of, a->part, n, err);
+    if (s) return s;
     return sdm_part_thickness(&j->turned, &j->survey.tree, j->part_of, a->part, n, err);
 }
 

@@ -49,7 +49,8 @@ typedef struct sdm_part {
     double thick;
     /* share of the area, of a solid part that meets itself, that faces the wrong way: an outline
      * that crosses itself, or a wall thicker than the part is wide. What lies behind it counts as
-     * outside. 0 in an open mesh and for parts after the first 1000 */
+     * outside, also where another part is solid. 0 in an open mesh and for parts after the first
+     * 1000 */
     double folded;
 } sdm_part;
 

@@ -194,6 +194,22 @@ static void add_degrees(const cli_survey *s, sdm_text *text)
     if (told) sdm_text_add(text, " to cos() or sin()? These want rad (times 0.017453)");
 }
 
+/* An angle in degrees that goes to cos() or sin(). Other findings may follow from it. */
+static void tell_swings(teller *t)
+{
+    const sdm_survey_scale *c = &t->s->found.scale;
+    const sdm_param *p = &sdm_instance_params(t->s->shape, NULL)[c->angle];
+    sdm_text text = {0};
+    if (!c->swings) return;
+    sdm_text_add(
+        &text,
+        "the vertices turn back %zu times while the parameter '%s' goes from %g to %g%s%s, "
+        "as cos() and sin() of so many rad do; if these are degrees, multiply them by "
+        "0.017453 in mesh(); mend this first: other lines may follow from it",
+        c->swings, p->name, p->min, p->max, *p->unit ? " " : "", p->unit);
+    tell(t, SDM_E_QUALITY, &text);
+}
+
 /* A part that winds around its inside more than once, such as a ring whose angle is too large. */
 static void tell_wound(teller *t)
 {
@@ -218,7 +234,11 @@ static void tell_wound(teller *t)
         sdm_text_add(&text, "; parts wind more than once ");
         add_share(t->s, c, &text);
         sdm_text_add(&text, ")");
-        add_degrees(t->s, &text);
+        if (!t->s->found.scale.swings) add_degrees(t->s, &text);
+        // the mistake lies in mesh(), not in a parameter
+        if (!t->s->found.scale.degrees && !t->s->found.scale.swings && c->amount > 4)
+            sdm_text_add(&text, "; is an angle in degrees, such as 360 * j / n, given to cos() or "
+                                "sin()? These want rad");
         tell(t, sdm_survey_winds_wrongly(&t->s->found) ? SDM_E_QUALITY : SDM_OK, &text);
     }
     sdm_part_audit_dispose(&audit);
@@ -490,6 +510,8 @@ static void tell_params(teller *t)
                          f->speed[k] * (params[k].max - params[k].min));
             tell(t, SDM_E_QUALITY, &slow);
         }
+        // tell_swings() has named it
+        if (f->scale.swings && f->scale.angle == k) continue;
         if (sdm_survey_is_odd_angle(&params[k])) {
             sdm_text_add(&other,
                          "the parameter '%s' ranges from %g to %g rad: are these degrees (times "
@@ -560,7 +582,7 @@ static void tell_apart(teller *t)
     sdm_mesh mesh = {0};
     sdm_part_audit audit = {0};
     sdm_text text = {0};
-    if (!f->apart.shapes || (t->s->brief && f->apart.shapes == f->n)) return;
+    if (!f->apart.shapes) return;
     add_count(t->s, &f->apart, "parts that meet no other part", &text);
     sdm_text_add(&text, ": ");
     if (make(t->s, f->apart.worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL))
@@ -636,6 +658,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
 {
     teller t = {.s = s, .tell = tell_line, .user = user};
     tell_repeat(&t);
+    tell_swings(&t);
     tell_failed(&t);
     tell_open(&t);
     tell_inside_out(&t);

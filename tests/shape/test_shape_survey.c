@@ -1,7 +1,7 @@
 /* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
  * known from the source; shapes without faults pass.
  * Tests: shape_survey.c survey_fold.c survey_line.c survey_repeat.c
- * survey_scale.c units.c */
+ * survey_scale.c survey_swing.c units.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -297,6 +297,48 @@ static void meshes_made_again(void **state)
         }
 }
 
+/* A body and a handle that goes up and down with sin() of the parameter times the option. */
+static int swinging_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                         const double *p, sdm_mesh_out *out)
+{
+    (void)self;
+    const int failed = host->reserve(host, out, 16, 24);
+    if (failed) return failed;
+    const double z = sin(p[0] * options[0].number);
+    faulty_box(out, 0, (const double[3]){-2, -2, -2}, (const double[3]){2, 2, 2}, 0);
+    faulty_box(out, 1, (const double[3]){1, -1, z - 0.5}, (const double[3]){4, 1, z + 0.5}, 0);
+    return 0;
+}
+
+// An angle in degrees that goes to sin() as it is, and one that is converted.
+static void degrees_that_go_to_sin(void **state)
+{
+    (void)state;
+    static const char *const units[] = {"deg", "rad", ""};
+    for (size_t i = 0; i < 6; i++) {
+        const sdm_param params[] = {{"angle", units[i / 2], -30, 60, 10, "x"}};
+        const sdm_option options[] = {{"factor", SDM_OPTION_REAL, "", 0, 1, 1, NULL, "x"}};
+        const sdm_shape shape = {.abi = SDM_SHAPE_ABI,
+                                 .size = sizeof(sdm_shape),
+                                 .name = "swinging",
+                                 .summary = "test",
+                                 SDM_PARAMS(params),
+                                 SDM_OPTIONS(options),
+                                 .mesh = swinging_mesh};
+        const sdm_named_text factor = {"factor", i % 2 ? "0.017453" : "1"};
+        sdm_instance *instance = NULL;
+        sdm_shape_survey s;
+        if (sdm_instance_create(&shape, &factor, 1, NULL, &instance, &err) ||
+            sdm_shape_survey_make(instance, &(sdm_survey_opts){.brief = true}, &s, &err))
+            fail_msg("%s", err.text);
+        // from -30 to 60 rad sin() turns back at 28 or 29 multiples of pi
+        assert_true(i % 2 ? s.scale.swings == 0 : s.scale.swings >= 28 && s.scale.swings <= 29);
+        if (!(i % 2)) assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+        sdm_shape_survey_dispose(&s);
+        sdm_instance_free(instance);
+    }
+}
+
 static void a_grid_that_cuts(void **state)
 {
     (void)state;
@@ -441,6 +483,7 @@ int main(void)
         cmocka_unit_test(a_step_moves_vertices),
         cmocka_unit_test(walls_that_pass_through_each_other),
         cmocka_unit_test(time_is_short),
+        cmocka_unit_test(degrees_that_go_to_sin),
         cmocka_unit_test(callbacks),
         cmocka_unit_test(meshes_made_again),
         cmocka_unit_test(a_grid_that_cuts),

@@ -21,6 +21,7 @@ sdm_status sdm_survey_repeat(const sdm_instance *shape, const double *p, size_t 
 {
     n = choose(shape, p, n, brief);
     const sdm_status s = sdm_shape_repeat(shape, p, n, out, err);
+    if (s == SDM_E_PLUGIN) return SDM_OK;
     if (s || out->unlike || sdm_is_isolated(shape)) return s;
     return sdm_shape_repeat_at_once(shape, p, n, THREADS,
                                     brief ? SECONDS_BRIEF : SHAPE_REPEAT_SECONDS, out, err);

@@ -7,6 +7,7 @@
 
 #include "sdm/internal/units.h"
 #include "sdm/memory.h"
+#include "survey_swing.h"
 
 /* rad; larger angles are likely to be degrees. */
 static const double ANGLE_MAX = 30;
@@ -174,12 +175,16 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
     for (int a = 0; a < 3; a++) c->size = fmax(c->size, s->high[a] - s->low[a]);
     c->odd_size = c->size < SDM_SURVEY_SIZE_MIN || c->size > SDM_SURVEY_SIZE_MAX;
     status = find_speed(f, s, err);
+    for (size_t k = 0; k < s->n_params && !status && !c->swings; k++) {
+        status = sdm_survey_swings(f, s->p, k, &c->swings, err);
+        c->angle = k;
+    }
     if (status) return status;
     c->odd_speed =
         c->speed > 0 && (c->speed < SDM_SURVEY_SPEED_MIN || c->speed > SDM_SURVEY_SPEED_MAX);
     if (c->odd_speed)
         c->unit = sdm_unit_near(1 / c->speed, &c->unit_mm);
-    else if (c->odd_size)
+    else if (c->odd_size && isnan(c->speed))
         c->unit = sdm_unit_near(c->size < SDM_SURVEY_SIZE_MIN ? 1e3 : 1e-3, &c->unit_mm);
     return SDM_OK;
 }

@@ -67,6 +67,9 @@ typedef struct sdm_survey_scale {
     bool odd_speed; /* it is below SDM_SURVEY_SPEED_MIN or above SDM_SURVEY_SPEED_MAX */
     bool odd_angle; /* of a parameter: sdm_survey_is_odd_angle() or sdm_survey_is_radian() */
     bool degrees;   /* of a parameter: sdm_survey_is_degree() */
+    /* how often vertices of the first shape turn back along the parameter `angle`, which mesh() is
+     * likely to give to cos() or sin() in degrees; 0: there is none such */
+    size_t swings, angle;
     /* the unit that would explain both, and its length in mm; NULL: none would */
     const char *unit;
     double unit_mm;

@@ -2,7 +2,7 @@
 #include "survey_repeat.h"
 
 enum { THREADS = 4, SHAPES = 8, SHAPES_BRIEF = 4, TRIANGLES = 200000 };
-static const double SECONDS_BRIEF = 0.05;
+static const double SECONDS_BRIEF = 0.1;
 
 /* Number of shapes: fewer if the mesh at p has many triangles. */
 static size_t choose(const sdm_instance *shape, const double *p, size_t n, bool brief)

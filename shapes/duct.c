@@ -20,9 +20,19 @@
  * slant_up y) further along the centreline. Half-ellipsoids over the end sections close the tube;
  * they are as long as the geometric mean of W and H, at the base times `cap`.
  *
+ * With the option `detail` exp(-0.3 theta) (surge cos(theta) + sway sin(theta)) is added to z,
+ * flare_high exp(-theta / 0.35) to H, and twist u^(2/3) to the tilt; from a detail of 2 on the
+ * outline is multiplied by
+ *
+ *     exp(size + outer cos(v) + upper sin(v) + oval cos(2 v) + oblique sin(2 v))
+ *
+ * where each of the five is a cubic spline of f with `detail` control values. Then the area is no
+ * longer the above.
+ *
  * Sections are cut off at the centre of curvature as those of the cochlea. */
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -83,7 +93,15 @@ static const sdm_param PARAMS[DUCT_UNKNOWNS] = {
                 PARAM(DUCT_PHI, "phi", "rad", -LATHE_PI / 4, LATHE_PI / 4, 0.4,
                       "phase of the longitudinal wave") FIXABLE(PARAM)};
 
-enum { EDGE, EAR, SECTION, FREE, CONSTANTS, N_OPTIONS = CONSTANTS + DUCT_UNKNOWNS - DUCT_C };
+enum {
+    EDGE,
+    EAR,
+    SECTION,
+    FREE,
+    DETAIL,
+    CONSTANTS,
+    N_OPTIONS = CONSTANTS + DUCT_UNKNOWNS - DUCT_C
+};
 enum { FREE_ALL, FREE_PAPER, FREE_CENTRELINE, FREE_SECTION };
 
 #define OPTION(index, name, unit, min, max, def, help)                                             \
@@ -100,15 +118,44 @@ static const sdm_option OPTIONS[N_OPTIONS] = {
               "which parameters there are: all, the four published ones, or these and those of "
               "the centreline (c .. dip) or of the section (width_base ..); the others are "
               "constants, and the options of their names are their values"},
+    [DETAIL] = {"detail", SDM_OPTION_INT, "", 0, DUCT_VALUES_MAX, 0, NULL,
+                "further parameters, for fits to labels: 1: surge, sway, flare_high, twist; 2 to "
+                "7: also so "
+                "many values along the turns for each of five ways in which the outline grows "
+                "(size_1 .. oblique_7)"},
     FIXABLE(OPTION)};
+
+static const sdm_param DETAILS[] = {
+    {"surge", "mm", -1.2, 1.2, 0.0, "amplitude of a second longitudinal wave: of its cosine"},
+    {"sway", "mm", -1.2, 1.2, 0.0, "the same of its sine"},
+    {"flare_high", "mm", -0.4, 0.6, 0.0, "how much more the height flares than the width"},
+    {"twist", "rad", -1.2, 1.5, 0.0,
+     "further tilt of the basal end, which fades in a quarter turn"},
+};
+
+/* Name and help of the control values of each harmonic. Their range is wide; their distribution is
+ * normal with this deviation. */
+#define GROWTH_LIMIT 0.35
+#define GROWTH_DEVIATION 0.1
+static const struct harmonic {
+    const char *name, *help;
+} HARMONICS[DUCT_HARMONICS] = {
+    [DUCT_GROWTH_SIZE] = {"size", "growth of the outline (logarithm)"},
+    [DUCT_GROWTH_OUTER] = {"outer", "growth outward along the width; the inner side shrinks"},
+    [DUCT_GROWTH_UPPER] = {"upper", "growth upward along the height; the lower side shrinks"},
+    [DUCT_GROWTH_OVAL] = {"oval", "growth along the width; the height shrinks"},
+    [DUCT_GROWTH_OBLIQUE] = {"oblique", "growth up and outward, and down and inward; the other two "
+                                        "corners shrink"}};
 
 typedef struct duct {
     duct_form form;
     bool left;
-    sdm_param params[DUCT_UNKNOWNS];
-    size_t unknown[DUCT_UNKNOWNS]; /* [n_params] index of each parameter among the unknowns */
+    size_t n_values;
+    sdm_param params[DUCT_ALL];
+    char names[DUCT_ALL - DUCT_VALUES][32]; /* of the control values, which come last */
+    size_t unknown[DUCT_ALL]; /* [n_params] index of each parameter among the unknowns */
     uint32_t n_params;
-    double constant[DUCT_UNKNOWNS]; /* values of the unknowns that are not parameters */
+    double constant[DUCT_ALL]; /* values of the unknowns that are not parameters */
     cochlea_rings rings;
 } duct;
 
@@ -124,14 +171,34 @@ static bool is_free(int free, int unknown)
     return free == (unknown < DUCT_WIDTH_BASE ? FREE_CENTRELINE : FREE_SECTION);
 }
 
+static void param_add(duct *d, size_t unknown, sdm_param param)
+{
+    d->unknown[d->n_params] = unknown;
+    d->params[d->n_params++] = param;
+}
+
 static void params_choose(duct *d, const sdm_option_value *o)
 {
     for (int k = 0; k < DUCT_UNKNOWNS; k++) {
         d->constant[k] = k < DUCT_C ? PARAMS[k].def : o[CONSTANTS + k - DUCT_C].number;
         if (!is_of_form(d->form, k) || !is_free((int)o[FREE].number, k)) continue;
-        d->params[d->n_params] = PARAMS[k];
-        d->params[d->n_params].def = d->constant[k];
-        d->unknown[d->n_params++] = (size_t)k;
+        param_add(d, (size_t)k, PARAMS[k]);
+        d->params[d->n_params - 1].def = d->constant[k];
+    }
+}
+
+static void details_add(duct *d, int detail)
+{
+    if (detail == 0) return;
+    for (size_t k = DUCT_SURGE; k < DUCT_VALUES; k++)
+        if (k <= DUCT_SWAY || d->form != DUCT_CIRCLE) param_add(d, k, DETAILS[k - DUCT_SURGE]);
+    if (detail == 1) return; // widths, heights and tilts do the same as one value
+    d->n_values = (size_t)detail;
+    for (size_t i = 0; i < DUCT_HARMONICS * d->n_values; i++) {
+        const struct harmonic *h = &HARMONICS[i / d->n_values];
+        snprintf(d->names[i], sizeof d->names[i], "%s_%zu", h->name, i % d->n_values + 1);
+        param_add(d, DUCT_VALUES + i,
+                  (sdm_param){d->names[i], "", -GROWTH_LIMIT, GROWTH_LIMIT, 0, h->help});
     }
 }
 
@@ -156,6 +223,7 @@ static int duct_create(const sdm_host *host, const sdm_option_value *options, vo
     d->form = (duct_form)options[SECTION].number;
     d->left = options[EAR].number > 0;
     params_choose(d, options);
+    details_add(d, (int)options[DETAIL].number);
     if (rings_make(d, options[EDGE].number)) {
         free(d);
         return host->fail(host, "out of memory");
@@ -178,6 +246,15 @@ static void duct_describe(const void *self, const sdm_param **params, uint32_t *
     *n_params = d->n_params;
 }
 
+static void duct_distributions(const void *self, sdm_distribution *out)
+{
+    const duct *d = self;
+    for (uint32_t i = 0; i < d->n_params; i++)
+        if (d->unknown[i] >= DUCT_VALUES)
+            out[i] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 0, GROWTH_DEVIATION};
+}
+
+/* x[DUCT_ALL] = the unknowns of the parameters p[n_params]. */
 static void unknowns_at(const duct *d, const double *p, double *x)
 {
     memcpy(x, d->constant, sizeof d->constant);
@@ -199,7 +276,7 @@ static double *ring_write(const duct *d, const double *x, const cochlea_ring *r,
                           const double *direction, double *vert)
 {
     duct_section s;
-    sdm_duct_section_at(d->form, x, r->fraction, &s);
+    sdm_duct_section_at(d->form, d->n_values, x, r->fraction, &s);
     const double ahead = r->ahead * sdm_duct_mean_radius(&s) * (r->ahead < 0 ? x[DUCT_CAP] : 1);
     double slant[2]; // per mm along e1 and e2
     sdm_duct_slant_at(x, r->fraction, slant);
@@ -229,7 +306,7 @@ static int duct_mesh(const void *self, const sdm_host *host, const sdm_option_va
     const int failed =
         host->reserve(host, out, sdm_lathe_n_vert(d->rings.n, n), sdm_lathe_n_tri(d->rings.n, n));
     if (failed) return failed;
-    double x[DUCT_UNKNOWNS];
+    double x[DUCT_ALL];
     unknowns_at(d, p, x);
     double *vert = ring_write(d, x, &base, 1, none, out->vert);
     for (size_t i = 0; i < d->rings.n; i++)
@@ -242,6 +319,7 @@ static int duct_mesh(const void *self, const sdm_host *host, const sdm_option_va
 /* The owner of the path that is measured. */
 typedef struct measured {
     duct_form form;
+    size_t n_values;
     const double *x;
 } measured;
 
@@ -249,7 +327,7 @@ static void centre_at(const void *owner, double fraction, double out[3])
 {
     const measured *o = owner;
     duct_section s;
-    sdm_duct_section_at(o->form, o->x, fraction, &s);
+    sdm_duct_section_at(o->form, o->n_values, o->x, fraction, &s);
     memcpy(out, s.centre, sizeof s.centre);
 }
 
@@ -258,7 +336,7 @@ static void wall_at(const void *owner, double fraction, double out[3])
 {
     const measured *o = owner;
     duct_section s;
-    sdm_duct_section_at(o->form, o->x, fraction, &s);
+    sdm_duct_section_at(o->form, o->n_values, o->x, fraction, &s);
     const double outward[2] = {1, 0}, reach = sdm_duct_reach(&s, outward);
     for (int k = 0; k < 3; k++) out[k] = s.centre[k] + reach * s.e1[k];
 }
@@ -267,7 +345,7 @@ static double height_at(const void *owner, double fraction, double up, int end)
 {
     const measured *o = owner;
     duct_section s;
-    sdm_duct_section_at(o->form, o->x, fraction, &s);
+    sdm_duct_section_at(o->form, o->n_values, o->x, fraction, &s);
     double slant[2];
     sdm_duct_slant_at(o->x, fraction, slant);
     // the heights of a mm along e1, which is horizontal, and along e2
@@ -284,9 +362,9 @@ static int duct_measure(const void *self, const sdm_host *host, const sdm_option
 {
     (void)host, (void)options;
     const duct *d = self;
-    double x[DUCT_UNKNOWNS];
+    double x[DUCT_ALL];
     unknowns_at(d, p, x);
-    const measured owner = {d->form, x};
+    const measured owner = {d->form, d->n_values, x};
     const cochlea_path path = {&owner, x[DUCT_THETA], centre_at, wall_at, height_at};
     *value = sdm_cochlea_path_measure(&path, index, depth);
     return 0;
@@ -306,6 +384,7 @@ const sdm_shape sdm_shape_duct = {
     .destroy = duct_destroy,
     .describe = duct_describe,
     .mesh = duct_mesh,
+    .distributions = duct_distributions,
     .mirror = "ear",
     .measures = sdm_cochlea_measures,
     .n_measures = COCHLEA_MEASURES,

@@ -37,12 +37,15 @@ static void radius_at(const double *x, double theta, double r[3])
 /* z[3] = z, dz/dtheta, d2z/dtheta2. */
 static void height_at(const double *x, double theta, double z[3])
 {
-    const double k = DUCT_KAPPA, wave = x[DUCT_ALPHA] * exp(-k * theta),
-                 c = cos(theta - x[DUCT_PHI]), s = sin(theta - x[DUCT_PHI]);
+    // both waves as one, amplitude a and phase 0 and amplitude b and phase pi / 2
+    const double k = DUCT_KAPPA, decay = exp(-k * theta),
+                 a = decay * (x[DUCT_ALPHA] * cos(x[DUCT_PHI]) + x[DUCT_SURGE]),
+                 b = decay * (x[DUCT_ALPHA] * sin(x[DUCT_PHI]) + x[DUCT_SWAY]),
+                 c = a * cos(theta) + b * sin(theta), s = a * sin(theta) - b * cos(theta);
     const double end = x[DUCT_THETA], f = theta / end, dome = 4 * x[DUCT_DOME];
-    z[0] = x[DUCT_C] * theta + wave * c + dome * f * (1 - f);
-    z[1] = x[DUCT_C] - wave * (k * c + s) + dome * (1 - 2 * f) / end;
-    z[2] = wave * ((k * k - 1) * c + 2 * k * s) - 2 * dome / (end * end);
+    z[0] = x[DUCT_C] * theta + c + dome * f * (1 - f);
+    z[1] = x[DUCT_C] - (k * c + s) + dome * (1 - 2 * f) / end;
+    z[2] = (k * k - 1) * c + 2 * k * s - 2 * dome / (end * end);
     hook_add(x[DUCT_DIP], theta, z);
 }
 
@@ -76,7 +79,37 @@ static double parabola(const double v[3], double f)
     return v[0] * (1 - f) * (1 - 2 * f) + 4 * v[1] * f * (1 - f) + v[2] * f * (2 * f - 1);
 }
 
-void sdm_duct_section_at(duct_form form, const double *x, double fraction, duct_section *out)
+/* The spline with the control values v[n] at f, 0 <= f <= 1: a B-spline of the degree 3 (n - 1
+ * below 4 values) with evenly spaced knots, the outer ones repeated so that it begins at v[0] and
+ * ends at v[n - 1]. Algorithm of de Boor (1972). */
+static double spline_at(size_t n, const double *v, double f)
+{
+    enum { DEGREE = 3 };
+    const int degree = n > DEGREE ? DEGREE : (int)n - 1, pieces = (int)n - degree,
+              piece = f < 1 ? (int)(f * pieces) : pieces - 1;
+    double d[DEGREE + 1];
+    for (int i = 0; i <= degree; i++) d[i] = v[piece + i];
+    for (int level = 1; level <= degree; level++)
+        for (int i = degree; i >= level; i--) {
+            const double low = fmax(0, piece + i - degree) / pieces,
+                         high = fmin(pieces, piece + i + 1 - level) / (double)pieces,
+                         part = (f - low) / (high - low);
+            d[i] = (1 - part) * d[i - 1] + part * d[i];
+        }
+    return d[degree];
+}
+
+/* growth[DUCT_HARMONICS] at a fraction. e2 points down, the parameters count upward. */
+static void growth_at(size_t n_values, const double *values, double fraction, double *growth)
+{
+    for (size_t k = 0; k < DUCT_HARMONICS; k++)
+        growth[k] = n_values ? spline_at(n_values, values + k * n_values, fraction) : 0;
+    growth[DUCT_GROWTH_UPPER] = -growth[DUCT_GROWTH_UPPER];
+    growth[DUCT_GROWTH_OBLIQUE] = -growth[DUCT_GROWTH_OBLIQUE];
+}
+
+void sdm_duct_section_at(duct_form form, size_t n_values, const double *x, double fraction,
+                         duct_section *out)
 {
     const double theta = fraction * x[DUCT_THETA];
     frame_at(x, theta, out);
@@ -87,9 +120,12 @@ void sdm_duct_section_at(duct_form form, const double *x, double fraction, duct_
     out->high = out->wide;
     out->tilt[0] = 1, out->tilt[1] = 0;
     out->waist = out->egg = 0;
+    growth_at(n_values, x + DUCT_VALUES, fraction, out->growth);
     if (form == DUCT_CIRCLE) return;
-    const double tilt = parabola(x + DUCT_TILT_BASE, fraction);
-    out->high = taper * (0.5 * parabola(x + DUCT_HEIGHT_BASE, fraction) + flare);
+    const double early = fmax(0, 1 - theta / HOOK_END),
+                 tilt = parabola(x + DUCT_TILT_BASE, fraction) + x[DUCT_TWIST] * early * early,
+                 flare_high = flare + x[DUCT_FLARE_HIGH] * exp(-theta / DUCT_FLARE_ANGLE);
+    out->high = taper * (0.5 * parabola(x + DUCT_HEIGHT_BASE, fraction) + flare_high);
     out->tilt[0] = cos(tilt), out->tilt[1] = -sin(tilt); // e2 points down
     if (form == DUCT_LOBES) out->waist = x[DUCT_WAIST], out->egg = -x[DUCT_EGG];
 }
@@ -104,8 +140,13 @@ void sdm_duct_slant_at(const double *x, double fraction, double slant[2])
 
 void sdm_duct_outline_at(const duct_section *s, double co, double si, double at[2])
 {
-    const double across = s->wide * co * (1 - s->waist * co * co) * (1 + s->egg * si),
-                 up = s->high * si;
+    const double *g = s->growth,
+                 growth =
+                     exp(g[DUCT_GROWTH_SIZE] + g[DUCT_GROWTH_OUTER] * co +
+                         g[DUCT_GROWTH_UPPER] * si + g[DUCT_GROWTH_OVAL] * (co * co - si * si) +
+                         g[DUCT_GROWTH_OBLIQUE] * 2 * si * co),
+                 across = growth * s->wide * co * (1 - s->waist * co * co) * (1 + s->egg * si),
+                 up = growth * s->high * si;
     at[0] = s->tilt[0] * across - s->tilt[1] * up;
     at[1] = s->tilt[1] * across + s->tilt[0] * up;
 }
@@ -128,4 +169,7 @@ double sdm_duct_reach(const duct_section *s, const double along[2])
     return best;
 }
 
-double sdm_duct_mean_radius(const duct_section *s) { return sqrt(s->wide * s->high); }
+double sdm_duct_mean_radius(const duct_section *s)
+{
+    return exp(s->growth[DUCT_GROWTH_SIZE]) * sqrt(s->wide * s->high);
+}

@@ -55,7 +55,7 @@ static void test_is_the_cochlea(void **state)
         sdm_instance *cochlea = shape_make("cochlea", text);
         snprintf(text, sizeof text, "edge=0.4 ear=%s section=%s", ear, FORMS[round / 2]);
         sdm_instance *duct = shape_make("duct", text);
-        double p[DUCT_UNKNOWNS], q[4];
+        double p[DUCT_ALL], q[4];
         defaults_of(duct, p);
         random_params(cochlea, q);
         memcpy(p, q, sizeof q);
@@ -117,9 +117,9 @@ static void test_volume(void **state)
     const double a = 5, b = 0.06, c = 0.3, end = 12.3, dome = 0.2, hook = 0.7, dip = -0.4;
     const double W[3] = {1.5, 1.2, 0.8}, H[3] = {1.7, 1.1, 0.9}, flare = 0.1, cap = 1.5, tip = 0.7,
                  waist = 0.4;
-    const double p[DUCT_UNKNOWNS] = {a,    0,    b,    0,     c,   end, dome, hook, dip,
-                                     W[0], W[1], W[2], flare, cap, tip, H[0], H[1], H[2],
-                                     -0.6, 0.1,  0.3,  waist, 0,   0.8, -0.7};
+    const double p[DUCT_ALL] = {a,    0,    b,    0,     c,   end, dome, hook, dip,
+                                W[0], W[1], W[2], flare, cap, tip, H[0], H[1], H[2],
+                                -0.6, 0.1,  0.3,  waist, 0,   0.8, -0.7};
     enum { STEPS = 20000 };
     double volume = 0, area[2] = {0}, mean[2] = {0};
     for (int i = 0; i <= STEPS; i++) {
@@ -158,7 +158,10 @@ static void test_parameters(void **state)
                  {"section=lobes free=paper", "phi", 4},
                  {"section=lobes free=centreline", "dip", 9},
                  {"section=lobes free=section", "slant_up", 20},
-                 {"section=circle free=section", "tip", 10}};
+                 {"section=circle free=section", "tip", 10},
+                 {"section=circle detail=1", "sway", 17},
+                 {"detail=1", "twist", 25},
+                 {"section=lobes detail=7", "oblique_7", 64}};
     for (size_t i = 0; i < sizeof CASES / sizeof *CASES; i++) {
         sdm_instance *s = shape_make("duct", CASES[i].options);
         size_t n;
@@ -171,7 +174,7 @@ static void test_parameters(void **state)
     // an option is the constant, or the default of a parameter
     sdm_instance *all = shape_make("duct", "edge=0.5 hook=0.6 height_base=1.6"),
                  *fixed = shape_make("duct", "edge=0.5 hook=0.6 height_base=1.6 free=paper");
-    double p[DUCT_UNKNOWNS];
+    double p[DUCT_ALL];
     defaults_of(all, p);
     near_to("the hook", p[DUCT_HOOK], 0.6, 0);
     sdm_mesh a = {0}, b = {0};
@@ -195,13 +198,13 @@ static void test_slant(void **state)
 {
     (void)state;
     sdm_instance *s = shape_make("duct", "edge=0.3 section=lobes");
-    double p[DUCT_UNKNOWNS] = {0};
+    double p[DUCT_ALL] = {0};
     sdm_mesh plain = {0}, slanted = {0};
     duct_section base, quarter;
     defaults_of(s, p);
     mesh_at(s, p, &plain);
-    sdm_duct_section_at(DUCT_LOBES, p, 0, &base);
-    sdm_duct_section_at(DUCT_LOBES, p, 0.5 * PI / p[DUCT_THETA], &quarter);
+    sdm_duct_section_at(DUCT_LOBES, 0, p, 0, &base);
+    sdm_duct_section_at(DUCT_LOBES, 0, p, 0.5 * PI / p[DUCT_THETA], &quarter);
     p[DUCT_SLANT_OUT] = 0.5, p[DUCT_SLANT_UP] = -0.8;
     mesh_at(s, p, &slanted);
     assert_int_equal(plain.n_vert, slanted.n_vert);
@@ -235,12 +238,117 @@ static void test_height(void **state)
     (void)state;
     sdm_instance *s = shape_make("duct", "edge=0.1 section=lobes");
     for (int i = 0; i < 3; i++) {
-        double p[DUCT_UNKNOWNS];
+        double p[DUCT_ALL];
         random_params(s, p);
         const double height = measure_of(s, p, "height"), found = measure_of(s, p, "extent_z");
         if (!(found <= height * (1 + 1e-6) && found > height * 0.99))
             fail_msg("the mesh is %.6g mm high, the duct %.6g", found, height);
     }
+    sdm_instance_free(s);
+}
+
+static size_t index_of(const sdm_instance *s, const char *name)
+{
+    size_t n;
+    const sdm_param *params = sdm_instance_params(s, &n);
+    for (size_t i = 0; i < n; i++)
+        if (!strcmp(params[i].name, name)) return i;
+    fail_msg("no parameter '%s'", name);
+    return 0;
+}
+
+/* Growth that is the same at all control values is the same along all turns: the outline is that of
+ * the shape without details times the factor in duct.c. Four control values: a cubic polynomial,
+ * here in Bernstein's form. */
+static void test_growth(void **state)
+{
+    (void)state;
+    double x[DUCT_ALL] = {4.4, 0.5, 0.145, 0.4, 0.2, 14.5, 0,   0, 0, 2.2, 1.9,
+                          1.6, 0.2, 1,     1,   2.1, 1.8,  1.5, 0, 0, 0,   0.2};
+    duct_section plain, grown;
+    for (size_t n = 1; n <= DUCT_VALUES_MAX; n++) {
+        for (size_t i = 0; i < n; i++) {
+            const double log_growth[DUCT_HARMONICS] = {0.1, 0.05, -0.2, 0.15, 0.3};
+            for (size_t k = 0; k < DUCT_HARMONICS; k++) x[DUCT_VALUES + k * n + i] = log_growth[k];
+        }
+        for (int round = 0; round <= 10; round++) {
+            const double v = random_in(0, 2 * PI), co = cos(v), up = sin(v);
+            double a[2], b[2];
+            sdm_duct_section_at(DUCT_LOBES, 0, x, round / 10., &plain);
+            sdm_duct_section_at(DUCT_LOBES, n, x, round / 10., &grown);
+            sdm_duct_outline_at(&plain, co, -up, a); // e2 points down
+            sdm_duct_outline_at(&grown, co, -up, b);
+            const double want =
+                exp(0.1 + 0.05 * co - 0.2 * up + 0.15 * cos(2 * v) + 0.3 * sin(2 * v));
+            near_to("the width", b[0], want * a[0], 1e-12);
+            near_to("the height", b[1], want * a[1], 1e-12);
+            near_to("the mean radius", sdm_duct_mean_radius(&grown),
+                    exp(0.1) * sdm_duct_mean_radius(&plain), 1e-12);
+        }
+    }
+    const double v[4] = {0.1, -0.2, 0.3, 0.05};
+    memcpy(x + DUCT_VALUES, v, sizeof v);
+    for (int i = 0; i <= 10; i++) {
+        const double f = i / 10., g = 1 - f;
+        sdm_duct_section_at(DUCT_LOBES, 4, x, f, &grown);
+        near_to("the spline", grown.growth[DUCT_GROWTH_SIZE],
+                v[0] * g * g * g + 3 * v[1] * f * g * g + 3 * v[2] * f * f * g + v[3] * f * f * f,
+                1e-15);
+    }
+    // two pieces: continuous with two derivatives at their border
+    double at[7];
+    const double h = 1e-3, w[5] = {0.1, -0.2, 0.3, 0.05, -0.3};
+    memcpy(x + DUCT_VALUES, w, sizeof w);
+    for (int i = 0; i < 7; i++) {
+        sdm_duct_section_at(DUCT_LOBES, 5, x, 0.5 + (i - 3) * h, &grown);
+        at[i] = grown.growth[DUCT_GROWTH_SIZE];
+    }
+    near_to("the spline in the middle", at[3], (w[1] + 2 * w[2] + w[3]) / 4, 1e-15);
+    near_to("its slope", (at[3] - at[2]) / h, (at[4] - at[3]) / h, 50 * h);
+    near_to("its curvature", (at[3] - 2 * at[2] + at[1]) / (h * h),
+            (at[5] - 2 * at[4] + at[3]) / (h * h), 500 * h);
+}
+
+/* The second wave, the higher flare and the twist, against the formulas in duct.c; the control
+ * values have a normal distribution, all else a uniform one. */
+static void test_details(void **state)
+{
+    (void)state;
+    sdm_instance *s = shape_make("duct", "section=lobes detail=2");
+    double p[DUCT_ALL];
+    defaults_of(s, p);
+    const size_t n_values = 2;
+    duct_section a, b;
+    sdm_duct_section_at(DUCT_LOBES, n_values, p, 0.03, &a);
+    p[index_of(s, "surge")] = 0.3, p[index_of(s, "sway")] = -0.5;
+    p[index_of(s, "flare_high")] = 0.2, p[index_of(s, "twist")] = 0.7;
+    sdm_duct_section_at(DUCT_LOBES, n_values, p, 0.03, &b);
+    const double t = 0.03 * p[DUCT_THETA], u = 1 - 2 * t / PI;
+    near_to("the wave", b.centre[2] - a.centre[2], exp(-0.3 * t) * (0.3 * cos(t) - 0.5 * sin(t)),
+            1e-12);
+    near_to("the height", b.high - a.high, 0.2 * exp(-t / 0.35), 1e-12);
+    near_to("the width", b.wide, a.wide, 0);
+    near_to("the tilt", atan2(-b.tilt[1], b.tilt[0]) - atan2(-a.tilt[1], a.tilt[0]), 0.7 * u * u,
+            1e-12);
+    const double h = 1e-5; // the frame follows the derivatives of the centreline
+    duct_section before, after;
+    sdm_duct_section_at(DUCT_LOBES, n_values, p, 0.03 - h, &before);
+    sdm_duct_section_at(DUCT_LOBES, n_values, p, 0.03 + h, &after);
+    double way[3], length = 0;
+    for (int k = 0; k < 3; k++) way[k] = after.centre[k] - before.centre[k];
+    length = sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2]);
+    double turn = 0, step = length / 2;
+    for (int k = 0; k < 3; k++) {
+        near_to("the tangent", b.tangent[k], way[k] / length, 1e-8);
+        turn += (after.tangent[k] - before.tangent[k]) / (2 * step) * b.e2[k];
+    }
+    near_to("the curvature", b.bend[1], turn, 1e-6);
+    size_t n, normal = 0;
+    sdm_instance_params(s, &n);
+    const sdm_distribution *d = sdm_instance_distributions(s);
+    for (size_t i = 0; i < n; i++) normal += d[i].kind == SDM_DISTRIBUTION_NORMAL;
+    assert_int_equal(normal, n_values * DUCT_HARMONICS);
+    assert_int_equal(d[n - 1].kind, SDM_DISTRIBUTION_NORMAL);
     sdm_instance_free(s);
 }
 
@@ -250,6 +358,7 @@ int main(void)
         cmocka_unit_test(test_is_the_cochlea), cmocka_unit_test(test_sections),
         cmocka_unit_test(test_volume),         cmocka_unit_test(test_parameters),
         cmocka_unit_test(test_slant),          cmocka_unit_test(test_height),
+        cmocka_unit_test(test_growth),         cmocka_unit_test(test_details),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

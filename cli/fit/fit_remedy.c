@@ -116,11 +116,15 @@ const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
         snprintf(text, size, "%s", suspicion);
     else if (f->found && !r->converged && network)
         snprintf(text, size, "; if the network is the limit, --exact fits with exact maps");
-    else if (f->found && began_at_points(f) && lies_on_points(f) &&
-             found(f, SDM_FIT_CHECK_COVERED, SDM_FIT_DOUBTFUL, UNCOVERED))
-        snprintf(text, size,
-                 "; the points show a part of the shape, and the fit began at their middle: "
-                 "--start-centre X,Y,Z says where the middle of the whole shape is, about");
+    else if (f->found && began_at_points(f) &&
+             found(f, SDM_FIT_CHECK_COVERED, SDM_FIT_DOUBTFUL, UNCOVERED)) {
+        const size_t used = (size_t)snprintf(
+            text, size,
+            "%s the points show only a part of the shape, their middle, where the fit began, is "
+            "not its own: --start-centre X,Y,Z says where the middle of the whole shape is, about",
+            lies_on_points(f) ? "; if, as it seems," : "; if");
+        if (!lies_on_points(f) && used < size) name_start(f, text + used, size - used);
+    }
     // tissues that are the wrong way round are no matter of the start
     else if (!(f->found && found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY)) &&
              !is_blind(f))

@@ -216,7 +216,7 @@ grep -q 'warning: --truth truth.json: its pose is 37.[0-9]* mm off the fitted on
 expect 4 'points.csv: .*; --prior-sd 0.01 holds rx, ry, rz near the middle of the range, whatever the data show: a wider one \(default 1\) lets them decide$' \
     sdmgen fit $fit points.csv --rotation 0,0,0 --prior-sd 0.01 -q
 awk -F, 'NR == 1 || $1 > 1' points.csv >cap.csv
-expect 4 'cap.csv: .*; the points show a part of the shape, and the fit began at their middle: --start-centre X,Y,Z says where' \
+expect 4 'cap.csv: .*; if the points show only a part of the shape, their middle, where the fit began, is not its own: --start-centre X,Y,Z says where the middle of the whole shape is, about; a wrong start ends like this' \
     sdmgen fit --shape torus -O edge=1 cap.csv --rotation 0,0,0 -q
 awk -F, '{ print $3 "," $1 "," $2 }' points.csv >zxy.csv # the header names the columns
 expect 0 - sdmgen fit $fit zxy.csv --rotation 0,0,0 -p rx=3.2 -p ry=3.2 --spacing 0.35 --json

@@ -46,7 +46,9 @@ static void show_progress(void *user, const sdm_fit_progress *p)
 {
     progress_state *w = user;
     const sdm_fit_opts *o = &w->f->opts;
-    if (p->phase != w->phase) w->phase = p->phase, w->before = p->iteration - 1;
+    // a further candidate counts from 1 again
+    if (p->phase != w->phase || p->iteration <= w->before)
+        w->phase = p->phase, w->before = p->iteration - 1;
     if (p->phase == SDM_FIT_SEARCH && p->n_starts) {
         show_search(w, p);
         return;

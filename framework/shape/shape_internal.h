@@ -113,7 +113,7 @@ sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sd
 sdm_status sdm_instance_mesh_filled(const sdm_instance *s, const double *p, int fill, sdm_mesh *out,
                                     sdm_error *err);
 
-/* shape_repeat.c: fills the stack where the next calls of the caller have their variables. */
+/* stack_fill.c: fills the stack where the next calls of the caller have their variables. */
 void sdm_fill_stack(int fill);
 
 /* shape_repeat.c: makes the meshes at p[n][n_params] one after the other and again: backwards, with

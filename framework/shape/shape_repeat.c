@@ -8,23 +8,9 @@
 
 /* What mesh() finds where it must not read: in memory that it has not written, and behind the last
  * parameter. As a double FILL is NaN, OTHER_FILL about 32.5. */
-enum { FILL = 0xff, OTHER_FILL = 0x40, STACK_BYTES = 1 << 16 };
+enum { FILL = 0xff, OTHER_FILL = 0x40 };
 #define BEHIND 0.5
 #define OTHER_BEHIND 1.5
-
-#if defined(__GNUC__)
-__attribute__((noinline))
-#endif
-static uint64_t
-fill_own_stack(int fill)
-{
-    volatile uint64_t area[STACK_BYTES / sizeof(uint64_t)];
-    for (size_t i = 0; i < STACK_BYTES / sizeof(uint64_t); i++)
-        area[i] = UINT64_C(0x0101010101010101) * (unsigned)fill;
-    return area[0];
-}
-
-void sdm_fill_stack(int fill) { (void)fill_own_stack(fill); }
 
 static uint64_t checksum(const sdm_mesh *m)
 {

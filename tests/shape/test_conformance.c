@@ -1,6 +1,6 @@
 /* The tests of shapes: each finds the fault that is made for it, and none finds a fault in a sound
  * shape. The test itself is the program of the workers.
- * Tests: conformance.c shape_repeat.c isolated.c */
+ * Tests: conformance.c shape_repeat.c stack_fill.c isolated.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

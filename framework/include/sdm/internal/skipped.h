@@ -1,4 +1,4 @@
-/* What sdm_registry_load_path() has skipped, beside the message of sdm_registry_skipped(). */
+/* What the loading of a path of plug-ins has skipped, beside the messages (registry.h). */
 #pragma once
 
 #include "sdm/registry.h"

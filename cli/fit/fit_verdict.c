@@ -40,6 +40,7 @@ static const char *const MEANINGS[SDM_FIT_N_CHECKS] = {
     [SDM_FIT_CHECK_PATCH] = "share of the points that form another surface",
     [SDM_FIT_CHECK_COVERED] = "share of the surface without points",
     [SDM_FIT_CHECK_NETWORK_ERROR] = "move of a parameter by exact maps, in sd",
+    [SDM_FIT_CHECK_KEPT_PARAMS] = "gain of free parameters",
 };
 
 /* The side of the limit on which the figure of a finding must lie. */

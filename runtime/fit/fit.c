@@ -25,6 +25,7 @@
 #include "fit/trust/convergence.h"
 #include "fit/trust/evidence.h"
 #include "fit/trust/flat_params.h"
+#include "fit/trust/kept_params.h"
 #include "fit/trust/kept_pose.h"
 #include "fit/trust/pose_params.h"
 #include "fit/trust/posterior.h"
@@ -503,6 +504,15 @@ static void report_work(const fit_problem *p, double from, sdm_fit_result *out)
     out->seconds = sdm_clock() - from;
 }
 
+// are single parameters kept?
+static bool keeps_some(const fit_problem *p)
+{
+    if (p->opts->keep_params) return false;
+    for (size_t k = 0; k < p->n_params; k++)
+        if (fit_param_is_kept(p, k)) return true;
+    return false;
+}
+
 // the verdict; leaves *p at a rival, with a kept pose at the state of a free one
 static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
 {
@@ -511,6 +521,10 @@ static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
     if (!s) s = sdm_fit_judge(p, r, &factor, err);
     if (s && s != SDM_E_QUALITY) return s;
     sdm_fit_name_restless(p, r, s ? err : NULL);
+    if (!p->opts->keep_pose && keeps_some(p)) {
+        const sdm_status kept = sdm_fit_judge_kept_params(p, r, err);
+        if (kept) return kept;
+    }
     if (!s && !p->is_rival) s = sdm_fit_judge_next_pose(p, factor, &r->verdict, err);
     const sdm_status kept = p->opts->keep_pose ? sdm_fit_judge_kept_pose(p, r, err) : SDM_OK;
     return kept ? kept : s;

@@ -1,6 +1,6 @@
-/* The pose of a fit: motions that the data leave open, a pose that is kept but wrong, and one that
- * still moves.
- * Tests: convergence.c kept_pose.c open_motions.c pose_params.c source_params.c */
+/* The pose of a fit: motions that the data leave open, a pose or parameter that is kept but wrong,
+ * and one that still moves. Tests: convergence.c kept_params.c kept_pose.c open_motions.c
+ * pose_params.c source_params.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -195,6 +195,37 @@ static void test_kept_pose(void **state)
     free(v);
 }
 
+// A parameter that is kept at its true value passes; one that is off by 0.3 mm does not, and the
+// check names it.
+static void test_kept_param(void **state)
+{
+    (void)state;
+    float *v = phantom(TRUTH, &POSE, 1, 4);
+    const sdm_fit_target t = image_of(v);
+    const sdm_fit_source source = exact_source();
+    for (int off = 0; off < 2; off++) {
+        const double start[3] = {TRUTH[0], TRUTH[1] + 0.3 * off, TRUTH[2]};
+        sdm_fit_opts o = near_start();
+        o.start_params = start;
+        o.kept = (const bool[3]){false, true, false};
+        sdm_fit_result r;
+        sdm_error err = {0};
+        const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);
+        assert_true(s == SDM_OK || (off && s == SDM_E_QUALITY));
+        assert_true(r.params[1] == start[1]);
+        const sdm_fit_finding *kept = NULL;
+        for (size_t i = 0; i < r.verdict.n_findings; i++)
+            if (r.verdict.findings[i].kind == SDM_FIT_CHECK_KEPT_PARAMS)
+                kept = &r.verdict.findings[i];
+        assert_int_equal(kept != NULL, off);
+        assert_int_equal(r.verdict.grade > SDM_FIT_PASSED, off);
+        if (kept) assert_non_null(strstr(kept->text, "at which ry is kept: free, it goes to "));
+        if (kept) assert_true(kept->figure > kept->limit);
+        sdm_fit_dispose(&r);
+    }
+    free(v);
+}
+
 // The steps of the test of the pose say nothing about the convergence of the fit.
 static void test_kept_pose_not_converged(void **state)
 {
@@ -262,10 +293,15 @@ static void test_restless_unknown(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_eigenvectors),        cmocka_unit_test(test_axis_of_symmetry),
-        cmocka_unit_test(test_sphere_has_any_axis), cmocka_unit_test(test_determined_pose),
-        cmocka_unit_test(test_kept_pose),           cmocka_unit_test(test_kept_pose_not_converged),
-        cmocka_unit_test(test_restless_unknown),    cmocka_unit_test(test_joint_that_is_a_pose),
+        cmocka_unit_test(test_eigenvectors),
+        cmocka_unit_test(test_axis_of_symmetry),
+        cmocka_unit_test(test_sphere_has_any_axis),
+        cmocka_unit_test(test_determined_pose),
+        cmocka_unit_test(test_kept_param),
+        cmocka_unit_test(test_kept_pose),
+        cmocka_unit_test(test_kept_pose_not_converged),
+        cmocka_unit_test(test_restless_unknown),
+        cmocka_unit_test(test_joint_that_is_a_pose),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -31,7 +31,8 @@ const char *sdm_fit_check_name(sdm_fit_check_kind kind)
                                                         [SDM_FIT_CHECK_PATCH] = "patch",
                                                         [SDM_FIT_CHECK_COVERED] = "covered",
                                                         [SDM_FIT_CHECK_NETWORK_ERROR] =
-                                                            "network bias"};
+                                                            "network bias",
+                                                        [SDM_FIT_CHECK_KEPT_PARAMS] = "kept value"};
     return kind >= 0 && kind < SDM_FIT_N_CHECKS ? names[kind] : NULL;
 }
 

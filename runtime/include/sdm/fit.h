@@ -351,6 +351,10 @@ typedef enum sdm_fit_check_kind {
     SDM_FIT_CHECK_COVERED,
     /* network: sdm_fit_result.network_error_sd, at most 1; doubtful above */
     SDM_FIT_CHECK_NETWORK_ERROR,
+    /* with `kept`, not beside keep_pose: gain of free parameters in log-likelihood, as of
+       independent samples; doubtful above 8; failed above 20 where the surface moves by more than
+       half a voxel of the maps */
+    SDM_FIT_CHECK_KEPT_PARAMS,
     SDM_FIT_N_CHECKS
 } sdm_fit_check_kind;
 

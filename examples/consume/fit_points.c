@@ -5,6 +5,7 @@
  * POINTS.csv: a header, then x,y,z in each line (mm). Exit code 4: the fit is not to be trusted. */
 #include <stdio.h>
 
+#include "sdm/builtin_shapes.h"
 #include "sdm/fit.h"
 #include "sdm/memory.h"
 
@@ -82,8 +83,9 @@ int main(int argc, char **argv)
     }
     sdm_status s = sdm_model_open(argv[1], &model, &err);
     if (!s) s = sdm_registry_create(&registry, &err);
+    if (!s) s = sdm_builtin_shapes_add(registry, &err);
     if (!s && argc == 4) s = sdm_registry_load(registry, argv[3], &err);
-    // with the shape itself the fit measures the error of the network
+    // with the shape itself, built in or of the plug-in, the fit measures the error of the network
     if (!s) s = sdm_runtime_instance(model, registry, &shape, &err);
     if (!s) s = fit_points(model, shape, argv[2], &err);
     if (s) fprintf(stderr, "fit_points: %s\n", err.text);

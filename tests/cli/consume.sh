@@ -20,7 +20,7 @@ expect 0 - by-cmake/consume $model
 has '^cochlea: -?[0-9.]+ mm in the middle voxel'
 expect 1 '^consume: .*missing\.sdm' by-cmake/consume missing.sdm
 # a fit to points from the start that the example chooses finds the values of the command line's fit
-expect 0 - sdmgen phantom --shape cochlea -p a=4.2 -p b=0.13 -p alpha=0.6 -p phi=0.2 --size 8,8,8 --spacing 1.5 --surface points.csv -o image.nii.gz -q
+expect 0 - sdmgen phantom --shape cochlea -p a=4.2 -p b=0.13 -p alpha=0.6 -p phi=0.2 --spacing 0.5 --surface points.csv -o image.nii.gz -q
 by-cmake/fit_points $model points.csv >fitted 2>err
 status=$?
 { [ $status = 0 ] || [ $status = 4 ]; } || bad "fit_points ends with $status: $(cat err)"

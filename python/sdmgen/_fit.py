@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 from ctypes import byref
 from dataclasses import dataclass
 from typing import Any, Callable, Mapping, Optional, Sequence, Union
@@ -20,6 +21,7 @@ from ._map import Image, Map, MapInfo
 from ._mesh import Mesh, Surface
 from ._model import POLICIES, Model
 from ._shape import Measure, Shape, measures_by
+from ._tables import read_points_table
 
 Label = Union[int, str]
 Target = Union[Image, Mesh, ArrayLike, Any]
@@ -27,6 +29,8 @@ _KEEP = ("parameters", "pose", "blur", "appearance")
 _GRADES = ("passed", "doubtful", "failed")
 _POSE = ("rotation_x", "rotation_y", "rotation_z", "translation_x", "translation_y", "translation_z")
 _TURNS_ABOUT_AXIS, _TURNS_ALL, _SURFACE_POINTS = 12, 60, 20000
+#: largest number of a rotation vector, rad: more are degrees
+_TURN = 2 * np.pi
 
 
 @dataclass(frozen=True)
@@ -246,6 +250,17 @@ def _surface_points(mesh: Mesh, threads: int) -> Float64:
     return points
 
 
+def _read_points(path: Any) -> Union[Mesh, Float64]:
+    if _ends(path, MESHES):
+        return Mesh.read(path)
+    if _ends(path, (".csv",)):
+        return read_points_table(path)
+    if _ends(path, (".npy",)):
+        return read_array(path)
+    known = " ".join((*IMAGES, *MESHES))
+    raise argument_error(f"fit {os.fspath(path)!r}: the name must end in {known} .csv (points x,y,z) or .npy (points [n, 3])")
+
+
 def _open_target(target: Target, threads: int) -> Union[Image, Float64]:
     """An image, or points [n, 3]."""
     if isinstance(target, Image):
@@ -253,7 +268,7 @@ def _open_target(target: Target, threads: int) -> Union[Image, Float64]:
     if isinstance(target, (str, bytes)) or hasattr(target, "__fspath__"):
         if _ends(target, IMAGES):
             return read_image(target)
-        target = Mesh.read(target) if _ends(target, MESHES) else read_array(target)
+        target = _read_points(target)
     if isinstance(target, Mesh):
         target = _surface_points(target, threads) if len(target.triangles) else target.vertices
     points = finite(float64(target, (None, 3), "points"), "points")
@@ -355,6 +370,13 @@ class _Start:
             raise argument_error("fit: start_axis goes with start_centre, rotation with translation")
         if self.turns is not None and self.turns_sphere is not None:
             raise argument_error("fit: give one of turns and turns_sphere")
+        rotation = [] if self.rotation is None else triple(self.rotation, "rotation")
+        if any(abs(x) > _TURN for x in rotation):
+            told = ", ".join(f"{x:g}" for x in rotation)
+            raise argument_error(
+                f"rotation ({told}): it is a rotation vector in rad, each number at most a turn of 6.2832 "
+                "(90 degrees are 1.5708)"
+            )
 
     def set_turns(self, opts: Any) -> None:
         """Without a start rotation many are tried, about all axes or about the given one."""
@@ -457,7 +479,7 @@ def fit(
     of a model or, for a Shape or with exact=True, with the exact engine.
 
     target: an Image (or the path of one), with `label` (a value, the name of a segment, or several) a
-    label map; points [n, 3] in LPS mm; a Mesh. params: where the parameters start (default: those of
+    label map; points [n, 3] in LPS mm, or a .csv file of lines x,y,z; a Mesh. params: where the parameters start (default: those of
     the shape). The other arguments are the options of `sdmgen fit`, with its defaults; places and
     directions are LPS, mm. start_points: pairs of points (in the frame of the shape [n, 3], in the
     image [n, 3]). region: two corners of a box. reference: labels to compare with (FitResult.dice).

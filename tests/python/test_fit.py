@@ -81,15 +81,38 @@ def test_labels_and_points(run, ct, tmp_path):
     mesh = sdmgen.Shape("torus", edge=0.5).mesh(major=2.4)
     mesh.write(tmp_path / "torus.ply")
     np.save(tmp_path / "points.npy", mesh.vertices)
+    lines = [f"{i},{z!r}, {x!r},{y!r}" for i, (x, y, z) in enumerate(mesh.vertices.tolist())]
+    (tmp_path / "points.csv").write_text("\n".join(["\ufeff# points", "name,Z,x,y", "", *lines, ""]), encoding="utf-8")
     words = ["--rotation", "0.1,0,0", "--spacing", "0.8", "--threads", "1", "--keep", "appearance", "--json"]
     told = run("fit", "--shape", "torus", tmp_path / "torus.ply", *words)
     for target in (mesh, tmp_path / "torus.ply"):
         compare(sdmgen.fit(shape, target, rotation=(0.1, 0, 0), spacing=0.8, threads=1, keep="appearance"), told)
     told = run("fit", "--shape", "torus", tmp_path / "points.npy", *words)
-    for target in (mesh.vertices, tmp_path / "points.npy"):
+    for target in (mesh.vertices, tmp_path / "points.npy", tmp_path / "points.csv"):
         compare(sdmgen.fit(shape, target, rotation=(0.1, 0, 0), spacing=0.8, threads=1, keep="appearance"), told)
     kept = sdmgen.fit(shape, mesh, params={"major": 2.4}, rotation=(0.1, 0, 0), keep=["major"], threads=1)
     assert kept.params[0] == 2.4 and kept.sd[0] == 0 < kept.sd[1]
+
+
+def test_mistakes_of_tables(tmp_path):
+    file, shape = tmp_path / "points.csv", sdmgen.Shape("torus")
+    for text, told in (
+        ("a,b,c\n1,2,3\n", "points.csv:1: the header (a,b,c) must name one column each x, y and z, in mm"),
+        ("x,y,z,x\n1,2,3,4\n", "points.csv:1: the header (x,y,z,...) must name"),
+        ("x;y;z\n1;2;3\n", "a decimal number has a point: 0.5,1,2"),
+        ("x,y,z\n1,2,3\n1,2\n", "points.csv:3: 2 values, a line needs three: x,y,z (mm)"),
+        ("x,y,z,w\n1,2,3\n", "points.csv:2: 3 values, the header names 4 columns"),
+        ("1,2,3\n\n1,nan,2\n", "points.csv:3: 'nan' is not a finite number; a line is x,y,z"),
+        ("x,y,z\n", "points.csv: no points"),
+    ):
+        file.write_text(text)
+        with pytest.raises(sdmgen.FormatError) as caught:
+            sdmgen.fit(shape, file)
+        assert told in str(caught.value), caught.value
+    with pytest.raises(sdmgen.FileError, match="no such|No such"):
+        sdmgen.fit(shape, tmp_path / "none.csv")
+    with pytest.raises(sdmgen.ArgumentError, match="must end in .* .csv"):
+        sdmgen.fit(shape, tmp_path / "points.txt")
 
 
 def test_a_network(run, model, model_file, tmp_path):
@@ -117,6 +140,7 @@ def test_mistakes(model, ct):
         ("a model has its own grid", (model, ct["ct.nii.gz"]), {"spacing": 0.3}),
         ("exact from the start", (shape, ct["ct.nii.gz"]), {"polish": True}),
         ("one of rotation", (shape, ct["ct.nii.gz"]), {"rotation": (0, 0, 0), "start_axis": (0, 0, 1)}),
+        ("a rotation vector in rad", (shape, ct["ct.nii.gz"]), {"rotation": (0, 0, 180)}),
         ("one of turns", (shape, ct["ct.nii.gz"]), {"turns": 3, "turns_sphere": 4}),
         ("leave nothing to fit", (shape, ct["ct.nii.gz"]), {"keep": ["pose", "parameters"]}),
         ("keep: need one of", (shape, ct["ct.nii.gz"]), {"keep": "poses"}),

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from . import _abi
 from ._arrays import Float32, Float64, Triple, address, choice, copied, finite, flag, float32, float64, instance, number, triple, whole, words
-from ._errors import Error, FormatError, QualityError, argument_error, with_arguments
+from ._errors import Error, FormatError, QualityError, argument_error, warn, with_arguments
 from ._files import IMAGES, MESHES, _ends, read_array, read_image
 from ._grid import Grid, Pose, grid_around
 from ._library import Callbacks, call, function, make
@@ -29,6 +29,8 @@ _KEEP = ("parameters", "pose", "blur", "appearance")
 _GRADES = ("passed", "doubtful", "failed")
 _POSE = ("rotation_x", "rotation_y", "rotation_z", "translation_x", "translation_y", "translation_z")
 _TURNS_ABOUT_AXIS, _TURNS_ALL, _SURFACE_POINTS = 12, 60, 20000
+#: an image with as few different values looks like labels; voxels that are looked at together
+_FEW_VALUES, _CHUNK = 16, 1 << 16
 #: largest number of a rotation vector, rad: more are degrees
 _TURN = 2 * np.pi
 
@@ -240,6 +242,21 @@ def _labels(value: Union[None, Label, Sequence[Label]]) -> list[Label]:
     if not isinstance(value, (list, tuple)) or not all(isinstance(v, (int, str, np.integer)) for v in value):
         raise argument_error(f"label: need a whole number, the name of a segment, or a list of them, not {value!r}")
     return list(value)
+
+
+def _warn_few_values(image: Image) -> None:
+    """Warns where an image looks like labels: few different values, all of them whole numbers from 0 on."""
+    values, found = image.values.ravel(), np.empty(0)
+    for start in range(0, values.size, _CHUNK):
+        part = values[start : start + _CHUNK].astype(np.float64)
+        found = np.union1d(found, part[~np.isnan(part)])
+        if found.size > _FEW_VALUES or (found < 0).any() or (found != np.rint(found)).any():
+            return
+    if found.size > 1:
+        warn(
+            f"the image holds only {found.size} different values, {found[0]:g} to {found[-1]:g}: if it is a label map, "
+            f"give label= with the value of the shape, e.g. label={found[-1]:g}"
+        )
 
 
 def _surface_points(mesh: Mesh, threads: int) -> Float64:
@@ -508,6 +525,8 @@ def fit(
     if isinstance(opened, Image):
         if opened.values.ndim != 3 or (opened.segments and mask is None):
             raise argument_error("fit: the image is a segmentation: select segments by label=")
+        if mask is None:
+            _warn_few_values(opened)
         values = float32(opened.values, opened.grid.shape, "image") if mask is None else mask
         c_target.kind = _abi.constants["SDM_FIT_IMAGE" if mask is None else "SDM_FIT_LABEL"]
         c_target.grid, c_target.values = opened.grid._c, address(values)

@@ -1,6 +1,7 @@
 """Fits and training: the numbers are those of the program."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
@@ -92,6 +93,20 @@ def test_labels_and_points(run, ct, tmp_path):
         compare(sdmgen.fit(shape, target, rotation=(0.1, 0, 0), spacing=0.8, threads=1, keep="appearance"), told)
     kept = sdmgen.fit(shape, mesh, params={"major": 2.4}, rotation=(0.1, 0, 0), keep=["major"], threads=1)
     assert kept.params[0] == 2.4 and kept.sd[0] == 0 < kept.sd[1]
+
+
+def test_labels_without_label(ct):
+    shape, label = sdmgen.Shape("torus"), sdmgen.read(ct["label.nii.gz"])
+    named = {"rotation": (0, 0, 0), "spacing": 0.8, "max_iterations": 1}
+    for values in (label.values, label.values.astype(np.uint8)):
+        with pytest.warns(UserWarning, match="only 2 different values, 0 to 1: if it is a label map, give label="):
+            with pytest.raises(sdmgen.QualityError):
+                sdmgen.fit(shape, sdmgen.Image(values, label.grid), **named)
+    for target, more in ((ct["ct.nii.gz"], {}), (label, {"label": 1})):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with pytest.raises(sdmgen.QualityError):
+                sdmgen.fit(shape, target, **named, **more)
 
 
 def test_mistakes_of_tables(tmp_path):

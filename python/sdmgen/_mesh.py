@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import Float32, Float64, Triple, address, choice, copied, finite, flag, float64, indices, instance, number, path_bytes, whole, words
-from ._errors import argument_error
+from ._errors import argument_error, warn
 from ._grid import Grid, grid_around
 from ._library import Callbacks, Handle, call, function, make
 from ._map import Band, Map, MapInfo, band_of
@@ -80,8 +80,11 @@ class Report:
     sign: str
     #: the whole mesh was inside out and was turned
     turned: bool
-    #: number of parts that were inside out and were turned
+    #: number of parts that were inside out and were turned, apart from `turned`
     parts_turned: int
+    #: volume outside, mm^3, that parts enclose which are inside out and meet others: they are subtracted
+    #: from these; by counting voxels, 64 along the longest edge, so smaller parts may be missed
+    subtracted: float
     #: surface inside the union was removed
     unioned: bool
     triangles_used: int
@@ -133,6 +136,7 @@ class _Engine(Handle):
             SIGNS[report.sign],
             report.turned,
             report.parts_turned,
+            self._subtracted(_audit_of(report.audit)),
             report.unioned,
             report.n_tri_used,
             report.union_error_mm,
@@ -141,12 +145,46 @@ class _Engine(Handle):
     def call(self, name: str, *arguments: Any) -> None:
         self._callbacks.call(name, *arguments)
 
+    def _subtracted(self, audit: Audit) -> float:
+        """Report.subtracted. The engine turns parts that meet no others; open meshes have no such parts."""
+        several = audit.components > 1 or audit.nonmanifold_edges > 0
+        meeting = audit.self_intersections > 0 or audit.nonmanifold_edges > 0
+        if not (audit.closed and several and meeting):
+            return 0.0
+        grid = grid_around(audit.low, audit.high, None, None)
+        far = np.full(grid.shape, np.inf, np.float32)  # nearer voxels may count as on the surface
+        signs = make("sdm_sign_certificate")
+        self.call("sdm_exact_certify", self, grid, address(far), byref(signs))
+        return float(signs.below_zero * grid.spacing.prod())
+
     def original(self, triangle: NDArray[np.uint32]) -> NDArray[np.uint32]:
         """Numbers of triangles of the given mesh; 2^32 - 1 stays."""
         result = triangle.copy()
         known = triangle < len(self.source)
         result[known] = self.source[triangle[known]]
         return result
+
+
+def _doubts(report: Report) -> list[str]:
+    """Why signs of distances may surprise; nothing for a mesh as it should be."""
+    audit, texts = report.audit, []
+    if not audit.closed:
+        texts.append(
+            f"the mesh is not closed ({audit.boundary_edges} boundary edges, {audit.misoriented_edges} edges whose "
+            "two triangles run along them in the same direction): inside is where the winding number exceeds 1/2"
+        )
+    if report.turned:
+        texts.append("the mesh is inside out; distances are those of the turned mesh")
+    if report.parts_turned:
+        n = report.parts_turned
+        texts.append(f"{n} {'part is' if n == 1 else 'parts are'} inside out; distances are those of the turned parts")
+    if report.subtracted:
+        texts.append(
+            "a part of the mesh is inside out, or passes through itself, and meets another one: it is subtracted from "
+            f"what it overlaps and is not solid itself (about {report.subtracted:.2g} mm^3); reverse the vertices of "
+            "its triangles (sdmgen mesh --audit lists the parts, --turn-parts mends them)"
+        )
+    return texts
 
 
 def _pointed(name: str, at: int) -> Any:
@@ -173,6 +211,7 @@ class Mesh:
         )
         self._engines: dict[tuple[int, bool, int], _Engine] = {}
         self._lock = threading.Lock()
+        self._judged = False
 
     @classmethod
     def read(cls, path: Any) -> Mesh:
@@ -186,7 +225,7 @@ class Mesh:
         call("sdm_mesh_write", path_bytes(path), byref(self._c))
 
     def audit(self) -> Audit:
-        """What the mesh is like: closed, overlapping, inside out ..."""
+        """What the mesh is like: closed, overlapping, inside out as a whole; report() tells of its parts."""
         result = make("sdm_audit")
         call("sdm_mesh_audit", byref(self._c), byref(result))
         return _audit_of(result)
@@ -205,6 +244,15 @@ class Mesh:
             if key not in self._engines:
                 self._engines[key] = _Engine(self, *key)
             return self._engines[key]
+
+    def _prepared(self, sign: str, keep_overlap: bool, threads: int) -> _Engine:
+        """The engine for distances; the first one warns of a mesh that is open or inside out."""
+        engine = self._engine(sign, keep_overlap, threads)
+        with self._lock:
+            first, self._judged = not self._judged, True
+        for text in _doubts(engine.report) if first else ():
+            warn(text)
+        return engine
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {len(self.vertices)} vertices, {len(self.triangles)} triangles>"
@@ -278,7 +326,7 @@ def exact(
     if "jacobian" in layers and shape is None:
         raise argument_error("layers: 'jacobian' needs a shape: a mesh has no parameters")
     mesh = mesh_of(source, params)
-    engine = mesh._engine(sign, keep_overlap, threads)
+    engine = mesh._prepared(sign, keep_overlap, threads)
     if grid is None:
         grid = grid_around(engine.report.audit.low, engine.report.audit.high, size, spacing, origin)
     elif size is not None or spacing is not None or origin is not None:
@@ -339,7 +387,7 @@ def exact_band(
     """The narrow band of half width `width` (mm) of an exact map in blocks of 8 x 8 x 8 voxels, for
     closed meshes; distances NEGATIVE INSIDE."""
     instance(grid, Grid, "grid")
-    engine = mesh_of(source, params)._engine("auto", keep_overlap, threads)
+    engine = mesh_of(source, params)._prepared("auto", keep_overlap, threads)
     blocks = make("sdm_blocks")
     engine.call("sdm_exact_map_blocks", engine, grid, number(width, "width"), byref(blocks))
     return band_of(blocks)
@@ -357,7 +405,7 @@ def exact_points(
     """Exact distances (mm, NEGATIVE INSIDE), nearest points, gradients and nearest triangles at
     points [n, 3], LPS mm, in any order."""
     x = finite(float64(points, (None, 3), "points"), "points")
-    engine = mesh_of(source, params)._engine(sign, keep_overlap, threads)
+    engine = mesh_of(source, params)._prepared(sign, keep_overlap, threads)
     n = len(x)
     result = Points(np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n, np.uint32))
     at = make(

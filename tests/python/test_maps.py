@@ -253,6 +253,39 @@ def test_exact_points(run, tmp_path):
     assert mesh.audit().closed and mesh.report().sign == "crossings" and mesh.audit().volume > 0
 
 
+def two_balls(shift, flip, radius=1.0):
+    """Two balls, the second moved along x; flip: it is inside out."""
+    (v, t), (w, u) = ball(), ball(radius)
+    return sdmgen.Mesh(np.concatenate([v, w + [shift, 0.01, 0.02]]), np.concatenate([t, u[:, :: -1 if flip else 1] + len(v)]))
+
+
+def test_warnings_of_meshes():
+    vertices, triangles = ball()
+    open_ball, turned = sdmgen.Mesh(vertices, triangles[1:]), sdmgen.Mesh(vertices, triangles[:, ::-1])
+    for mesh, text in (
+        (open_ball, "the mesh is not closed \\(3 boundary edges"),
+        (turned, "the mesh is inside out; distances are those of the turned mesh"),
+        (two_balls(3, True), "1 part is inside out; distances are those of the turned parts"),
+        (two_balls(1, True), "a part of the mesh is inside out.*about 2.8 mm"),
+    ):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            mesh.report()
+        with pytest.warns(UserWarning, match=text) as told:
+            mesh.distance([[0, 0, 0]])
+            sdmgen.exact(mesh, spacing=0.5)
+            mesh.distance([[0, 0, 0]], threads=1)
+        assert len(told) == 1 and told[0].filename == __file__
+    apart, report = two_balls(3, True), two_balls(1, True).report()
+    assert apart.report().parts_turned == 1 and apart.report().subtracted == 0 and not apart.audit().inverted
+    volume = -turned.audit().volume
+    assert report.parts_turned == 0 and 0.5 * volume < report.subtracted < volume
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for mesh in (two_balls(1, False), two_balls(0.1, True, 0.5), sdmgen.Shape("linkage").mesh()):
+            assert mesh.report().subtracted == 0 and mesh.distance([[99, 0, 0]]) > 0
+
+
 def test_surfaces():
     mesh = sdmgen.Mesh(*ball(2.0, n=30))
     map = sdmgen.exact(mesh, spacing=0.1)

@@ -35,8 +35,8 @@ static void print_fit(const sdm_model_info *info, const sdm_fit_result *r)
         printf("%s = %.5g +- %.2g %s\n", info->params[i].name, r->params[i], r->sd[i],
                info->params[i].unit);
     printf("rotation %.5g %.5g %.5g rad, translation %.5g %.5g %.5g mm\n", r->pose.rotation[0],
-           r->pose.rotation[1], r->pose.rotation[2], r->pose.translation[0],
-           r->pose.translation[1], r->pose.translation[2]);
+           r->pose.rotation[1], r->pose.rotation[2], r->pose.translation[0], r->pose.translation[1],
+           r->pose.translation[2]);
     printf("verdict: %s\n", GRADES[r->verdict.grade]);
     for (size_t i = 0; i < r->verdict.n_findings; i++) {
         const sdm_fit_finding *f = &r->verdict.findings[i];

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from ctypes import byref
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Mapping, Optional, Sequence, Union
 
 import numpy as np
@@ -136,7 +136,7 @@ class _Engine(Handle):
             SIGNS[report.sign],
             report.turned,
             report.parts_turned,
-            self._subtracted(_audit_of(report.audit)),
+            0.0,
             report.unioned,
             report.n_tri_used,
             report.union_error_mm,
@@ -145,8 +145,9 @@ class _Engine(Handle):
     def call(self, name: str, *arguments: Any) -> None:
         self._callbacks.call(name, *arguments)
 
-    def _subtracted(self, audit: Audit) -> float:
+    def subtracted(self) -> float:
         """Report.subtracted. The engine turns parts that meet no others; open meshes have no such parts."""
+        audit = self.report.audit
         several = audit.components > 1 or audit.nonmanifold_edges > 0
         meeting = audit.self_intersections > 0 or audit.nonmanifold_edges > 0
         if not (audit.closed and several and meeting):
@@ -236,7 +237,8 @@ class Mesh:
 
     def report(self, sign: str = "auto", keep_overlap: bool = False, threads: int = 0) -> Report:
         """How the exact engine understands the mesh."""
-        return self._engine(sign, keep_overlap, threads).report
+        engine = self._engine(sign, keep_overlap, threads)
+        return replace(engine.report, subtracted=engine.subtracted())
 
     def _engine(self, sign: str, keep_overlap: bool, threads: int) -> _Engine:
         key = (choice(sign, SIGNS, "sign"), flag(keep_overlap, "keep_overlap"), whole(threads, "threads", 0))
@@ -250,7 +252,7 @@ class Mesh:
         engine = self._engine(sign, keep_overlap, threads)
         with self._lock:
             first, self._judged = not self._judged, True
-        for text in _doubts(engine.report) if first else ():
+        for text in _doubts(replace(engine.report, subtracted=engine.subtracted())) if first else ():
             warn(text)
         return engine
 

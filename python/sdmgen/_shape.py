@@ -183,7 +183,9 @@ class Shape:
         p = self.values(params, **named)
         mesh = make("sdm_mesh")
         self.call("sdm_instance_mesh", self, address(p), byref(mesh))
-        return Mesh(*taken_mesh(mesh))
+        result = Mesh(*taken_mesh(mesh))
+        result._judged = True  # `sdmgen shapes check` judges all meshes of a shape
+        return result
 
     def velocity(self, params: Params = None, **named: float) -> Float64:
         """The derivatives of the vertices by the parameters, [parameters, vertices, 3], mm per unit."""

@@ -200,8 +200,8 @@ static const char *decide(const entrant *carried, const entrant *pod, training_t
     if (ratio > HOPELESS && !pod->cut) return "training does not make up for such a difference";
     if (ratio <= 1) {
         out->kind[0] = SDM_NETWORK_POD;
-        return "the better one, if a tenth of the error everywhere counts, too, and training "
-               "improves it most";
+        return "its error (at the surface, and a tenth of that everywhere) is the smaller one, and "
+               "training improves pod more than template";
     }
     out->n = 2, out->kind[1] = SDM_NETWORK_POD;
     out->share = carried->ready ? 1 : TEMPLATE_SHARE;

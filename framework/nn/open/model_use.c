@@ -28,10 +28,11 @@ static sdm_status check_distances(const sdm_model_info *m, sdm_error *err)
         return sdm_fail(err, SDM_E_UNSUPPORTED,
                         "the training did not measure distances far from the surface");
     if (error <= voxel) return SDM_OK;
-    return sdm_fail(err, SDM_E_QUALITY,
-                    "distances of its maps farther than %.3g mm from the surface are wrong by up "
-                    "to %.2g mm; nearer ones are right, and so are all of exact maps",
-                    m->accuracy.near_mm, error);
+    return sdm_fail(
+        err, SDM_E_QUALITY,
+        "distances of its maps farther than %.3g mm from the surface are wrong by up "
+        "to %.2g mm; nearer ones have an RMS error of %.2g mm; all of exact maps are right",
+        m->accuracy.near_mm, error, m->accuracy.rmse_near_mm);
 }
 
 sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error *err)

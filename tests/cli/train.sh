@@ -86,6 +86,13 @@ sdmgen fit trained/model.sdm torus.nii --rotation 0,0,0 --max-iterations 1 --plu
 grep -q "warning: shape 'faulty' was changed after the training: at the default parameters .* (sums over all triangles: overlaps count twice); load the shape of that time, or train again$" err ||
     bad "no warning of a changed shape: $(cat err)"
 rm -r trained
+# its handle was only moved: volume and area are the same
+expect 0 - sdmgen train "$tiny" "${faulty[@]}" 'shape={name: faulty, options: {fault: moved}}' --out trained --quiet
+sdmgen verify trained/model.sdm --plugin ../../plugins/faulty/faulty.so --quiet >out 2>err
+[ $? -eq 3 ] || bad 'a shape with a moved part: no exit code 3'
+grep -q "error: shape 'faulty' was changed after the training: at the default parameters its mesh has the same volume and area, but at least a part of it lies elsewhere; load the shape of that time, or train again$" err ||
+    bad "no error about a moved part: $(cat err)"
+rm -r trained
 
 # A model that cannot be written, because a folder has its name: the error names the checkpoint, and --quiet does not hide that.
 "$program" train "$tiny" train.steps=2000 --out unwritten --quiet >out 2>err &

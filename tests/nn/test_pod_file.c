@@ -279,6 +279,8 @@ static void quality_is_kept(void **state)
                                          .far_error_mm = 7,
                                          .probe_volume_mm3 = {1, 2, NAN},
                                          .probe_area_mm2 = {3, 4, NAN},
+                                         .mesh_moment_mm3 = -5,
+                                         .probe_moment_mm3 = {6, 0, NAN},
                                          .unfit = "volumes: off by 3 %\nits tips\n"};
     m = toy_open(&t);
     q = &sdm_model_get_info(m)->quality;
@@ -290,6 +292,8 @@ static void quality_is_kept(void **state)
     assert_true(q->surface_volume_error == 0.0202 && q->far_error_mm == 7);
     assert_true(q->probe_volume_mm3[1] == 2 && q->probe_area_mm2[1] == 4);
     assert_true(isnan(q->probe_volume_mm3[2]) && isnan(q->probe_area_mm2[2]));
+    assert_true(q->mesh_moment_mm3 == -5 && q->probe_moment_mm3[0] == 6);
+    assert_true(q->probe_moment_mm3[1] == 0 && isnan(q->probe_moment_mm3[2]));
     assert_string_equal(q->unfit, "volumes: off by 3 %\nits tips\n");
     assert_true(sdm_model_get_info(m)->file_bytes > without);
     // uses: a poor grade, a good volume, derivatives not measured, bad derivatives of volumes; the
@@ -307,7 +311,8 @@ static void quality_is_kept(void **state)
     assert_string_equal(err.text, "volumes inside the surfaces of its maps are off by 2.02 %, more "
                                   "than 2 %: they cut edges and thin walls between the voxels");
     assert_int_equal(sdm_model_check_use(m, SDM_USE_DISTANCE, &err), SDM_E_QUALITY);
-    assert_non_null(strstr(err.text, "from the surface are wrong by up to 7 mm; nearer ones"));
+    assert_non_null(strstr(err.text, "from the surface are wrong by up to 7 mm; nearer ones "
+                                     "have an RMS error of "));
     assert_int_equal(sdm_model_check_use(m, (sdm_model_use)6, &err), SDM_E_ARG);
     assert_int_equal(sdm_model_check_use(NULL, SDM_USE_VOLUME, &err), SDM_E_ARG);
     sdm_model_free(m);

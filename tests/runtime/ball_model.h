@@ -72,10 +72,10 @@ static const sdm_shape ball_shape = {.abi = SDM_SHAPE_ABI,
 
 enum { BALL_VOXELS = 17 * 17 * 17 };
 
-// Volume and area of the mesh at the default parameters that the model states; NaN: none.
-static double ball_mesh_volume = NAN, ball_mesh_area = NAN;
+// Volume, area and moment of the mesh at the default parameters that the model states; NaN: none.
+static double ball_mesh_volume = NAN, ball_mesh_area = NAN, ball_mesh_moment = NAN;
 // The same at its first probe.
-static double ball_probe_volume = NAN, ball_probe_area = NAN;
+static double ball_probe_volume = NAN, ball_probe_area = NAN, ball_probe_moment = NAN;
 
 static void ball_model_bytes(const char *second_name, const sdm_grid *grid,
                              double (*mode)(const double x[3]), uint8_t **bytes, size_t *size)
@@ -100,7 +100,9 @@ static void ball_model_bytes(const char *second_name, const sdm_grid *grid,
     info.quality.mesh_area_mm2 = ball_mesh_area;
     info.quality.probe_volume_mm3[0] = ball_probe_volume;
     info.quality.probe_area_mm2[0] = ball_probe_area;
-    info.quality.probe_volume_mm3[1] = NAN;
+    info.quality.mesh_moment_mm3 = ball_mesh_moment;
+    info.quality.probe_moment_mm3[0] = ball_probe_moment;
+    info.quality.probe_volume_mm3[1] = info.quality.probe_moment_mm3[1] = NAN;
     static sdm_pod_block blocks[BALL_VOXELS];
     sdm_pod_spec spec = {.info = &info, .blocks = blocks};
     spec.arch = (sdm_pod_arch){.n_params = 2,

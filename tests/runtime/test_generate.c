@@ -509,27 +509,37 @@ static void test_changed_shape_is_refused(void **state)
     const scene *s = *state;
     const double p[] = {1.2, 0};
     sdm_error err;
-    double volume, area;
-    assert_int_equal(sdm_shape_sums(s->shape, p, &volume, &area, &err), SDM_OK);
-    assert_true(fabs(area / (16 * atan(1) * 1.44) - 1) < 0.2);
+    sdm_shape_figures mesh, probe;
+    assert_int_equal(sdm_shape_sums(s->shape, p, &mesh, &err), SDM_OK);
+    assert_true(fabs(mesh.area / (16 * atan(1) * 1.44) - 1) < 0.2);
+    // of a sphere: its squares, area r^2 / 3, seven times
+    assert_true(fabs(mesh.moment / (mesh.area * 1.44 * 7 / 3 / sqrt(mesh.area)) - 1) < 0.01);
     // the first probe, inside the ranges of the model
     const double q[] = {sdm_probe_param(0, 0, 1, 1.5), sdm_probe_param(0, 1, -1, 1)};
-    double probe_volume, probe_area;
     assert_true(q[0] > 1 && q[0] < 1.5 && q[1] > -1 && q[1] < 1);
-    assert_int_equal(sdm_shape_sums(s->shape, q, &probe_volume, &probe_area, &err), SDM_OK);
-    for (int k = 0; k < 5; k++) {
+    assert_int_equal(sdm_shape_sums(s->shape, q, &probe, &err), SDM_OK);
+    const double cube = mesh.area * sqrt(mesh.area), cube_at = probe.area * sqrt(probe.area);
+    for (int k = 0; k < 8; k++) { // 0, 7: not changed; 7: of an earlier version
         sdm_instance *made = NULL;
-        ball_mesh_volume = volume * (k == 1 ? 1 + 1.5e-6 : 1 + 7e-7);
-        ball_mesh_area = area * (k == 2 ? 1 + 1.5e-6 : 1 - 7e-7);
-        ball_probe_volume = probe_volume * (k == 3 ? 1 + 1.5e-6 : 1 - 7e-7);
-        ball_probe_area = probe_area * (k == 4 ? 1 + 1.5e-6 : 1 - 7e-7);
+        ball_mesh_volume = mesh.volume * (k == 1 ? 1 + 1.5e-6 : 1 + 7e-7);
+        ball_mesh_area = mesh.area * (k == 2 ? 1 + 1.5e-6 : 1 - 7e-7);
+        ball_probe_volume = probe.volume * (k == 3 ? 1 + 1.5e-6 : 1 - 7e-7);
+        ball_probe_area = probe.area * (k == 4 ? 1 + 1.5e-6 : 1 - 7e-7);
+        ball_mesh_moment = k == 7 ? NAN : mesh.moment + cube * (k == 5 ? 1.5e-6 : 7e-7);
+        ball_probe_moment = k == 7 ? NAN : probe.moment - cube_at * (k == 6 ? 1.5e-6 : 7e-7);
         sdm_model *m = model_of("bulge");
         ball_mesh_volume = ball_mesh_area = ball_probe_volume = ball_probe_area = NAN;
+        ball_mesh_moment = ball_probe_moment = NAN;
         const sdm_status status = sdm_runtime_instance(m, s->registry, &made, &err);
-        assert_int_equal(status, k ? SDM_E_PLUGIN : SDM_OK);
-        if (k) assert_non_null(strstr(err.text, "shape 'ball' was changed after the training"));
-        if (k) assert_non_null(strstr(err.text, "(sums over all triangles: overlaps count twice)"));
-        if (k) assert_non_null(strstr(err.text, k < 3 ? "at the default" : "at other parameters"));
+        const bool changed = k % 7, moved = k >= 5, at_probe = k == 3 || k == 4 || k == 6;
+        assert_int_equal(status, changed ? SDM_E_PLUGIN : SDM_OK);
+        if (changed) {
+            assert_non_null(strstr(err.text, "shape 'ball' was changed after the training"));
+            assert_non_null(strstr(err.text, moved ? "a part of it lies elsewhere;"
+                                                   : "(sums over all triangles: overlaps count "
+                                                     "twice)"));
+            assert_non_null(strstr(err.text, at_probe ? "at other parameters" : "at the default"));
+        }
         sdm_instance_free(made);
         sdm_model_free(m);
     }

@@ -1,6 +1,6 @@
 /* A shape for tests: a body and a handle, two boxes that overlap; the option `fault` selects what
- * is wrong with them. Some faults begin where size exceeds 2; `trained` and `changed` begin when
- * the file trained/model.sdm is there. */
+ * is wrong with them. Some faults begin where size exceeds 2; `trained`, `changed` and `moved`
+ * begin when the file trained/model.sdm is there. */
 #ifndef SDM_TEST_FAULTY_SHAPE_H
 #define SDM_TEST_FAULTY_SHAPE_H
 
@@ -19,7 +19,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
-     "edge|centimetres|small|wall|step|apart|within|twins|changed|wound|behind|unset",
+     "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -120,6 +120,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "unlike")) shift = 1e-6 * ++calls;
     if (!strcmp(fault, "behind")) shift = 0.01 * p[3];
     if (!strcmp(fault, "unset")) shift = faulty_unset();
+    if (!strcmp(fault, "moved") && !access("trained/model.sdm", F_OK)) shift = 0.125;
     static volatile double shared; // for threads that call at once
     shared = p[0];
     for (int i = 0; i < 20000 && !strcmp(fault, "shared"); i++) shift += 0 * shared;

@@ -346,15 +346,18 @@ static sdm_status set_quality(const sdm_verdict *v, const trainer *t, const sdm_
     snprintf(q->grade, sizeof q->grade, "%s", sdm_grade_name(v->grade));
     sdm_verdict_unfit(v, q->unfit);
     for (size_t i = 0; i < info->n_params; i++) p[i] = info->params[i].def;
-    sdm_status s = sdm_shape_sums(t->data.shape, p, &q->mesh_volume_mm3, &q->mesh_area_mm2, err);
+    sdm_shape_figures f;
+    sdm_status s = sdm_shape_sums(t->data.shape, p, &f, err);
+    q->mesh_volume_mm3 = f.volume, q->mesh_area_mm2 = f.area, q->mesh_moment_mm3 = f.moment;
     for (size_t k = 0; k < SDM_MODEL_PROBES && !s; k++) {
         for (size_t i = 0; i < info->n_params; i++)
             p[i] = sdm_probe_param(k, i, info->params[i].min, info->params[i].max);
         // a place where mesh() fails tells nothing
-        const sdm_status one =
-            sdm_shape_sums(t->data.shape, p, &q->probe_volume_mm3[k], &q->probe_area_mm2[k], err);
+        const sdm_status one = sdm_shape_sums(t->data.shape, p, &f, err);
         if (one == SDM_E_NOMEM) s = one;
-        if (one) q->probe_volume_mm3[k] = q->probe_area_mm2[k] = NAN;
+        q->probe_volume_mm3[k] = one ? NAN : f.volume;
+        q->probe_area_mm2[k] = one ? NAN : f.area;
+        q->probe_moment_mm3[k] = one ? NAN : f.moment;
     }
     return s;
 }

@@ -51,6 +51,9 @@ typedef struct sdm_model_quality {
     /* of the mesh at the default parameters, the sum over its triangles; NaN: not known. A shape
        with others is not the one of the training (sdm_runtime_instance()). */
     double mesh_volume_mm3, mesh_area_mm2;
+    /* the same for the place of its parts: an integral over its surface, which no other place of a
+       part has; NaN: not known, as in models of earlier versions */
+    double mesh_moment_mm3;
     /* Root mean square over that of the right values; NaN: not known. On up to 20 held-out shapes:
        of the volume of a map (sdm_map_volume()). On up to 32 (of more than twelve parameters, or in
        a short training, fewer), and for the parameter for which they are largest: of the
@@ -64,8 +67,10 @@ typedef struct sdm_model_quality {
     /* largest error of a distance farther than sdm_accuracy.near_mm from the surface, mm; NaN: not
        known */
     double far_error_mm;
-    /* as mesh_volume_mm3 and mesh_area_mm2, at three other parameter vectors; NaN: not known */
+    /* as mesh_volume_mm3, mesh_area_mm2 and mesh_moment_mm3, at three other parameter vectors; NaN:
+       not known */
     double probe_volume_mm3[SDM_MODEL_PROBES], probe_area_mm2[SDM_MODEL_PROBES];
+    double probe_moment_mm3[SDM_MODEL_PROBES];
     /* what the training found the model not good for, in words, with the parameters: lines that end
        with '\n'; "": nothing, or not known */
     char unfit[SDM_MODEL_UNFIT];

@@ -31,6 +31,11 @@ void sdm_quality_describe(const sdm_model_quality *q, sdm_text *t)
     }
     for (const char *at = q->unfit; *at; at += strcspn(at, "\n") + 1)
         sdm_text_add(t, "unfit=%.*s\n", (int)strcspn(at, "\n"), at);
+    // last, since programs of earlier versions read no further
+    if (isnan(q->mesh_moment_mm3)) return;
+    sdm_text_add_real(t, "mesh_moment_mm3", q->mesh_moment_mm3);
+    for (int i = 0; i < SDM_MODEL_PROBES && !isnan(q->probe_moment_mm3[i]); i++)
+        sdm_text_add_real(t, "probe_moment_mm3", q->probe_moment_mm3[i]);
 }
 
 /* Reads the lines of the uses for which the model is not good. */
@@ -60,7 +65,9 @@ sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sd
                              .surface_volume_error = NAN,
                              .far_error_mm = NAN,
                              .probe_volume_mm3 = {NAN, NAN, NAN},
-                             .probe_area_mm2 = {NAN, NAN, NAN}};
+                             .probe_area_mm2 = {NAN, NAN, NAN},
+                             .mesh_moment_mm3 = NAN,
+                             .probe_moment_mm3 = {NAN, NAN, NAN}};
     if (!section) return SDM_OK;
     sdm_lines r = {.at = section->data};
     r.end = r.at + section->size;
@@ -85,6 +92,10 @@ sdm_status sdm_quality_read(const sdm_section *section, sdm_model_quality *q, sd
         q->probe_area_mm2[i] = sdm_lines_real(&r, "probe_area_mm2");
     }
     read_unfit(&r, q->unfit);
+    if (sdm_lines_next_is(&r, "mesh_moment_mm3"))
+        q->mesh_moment_mm3 = sdm_lines_real(&r, "mesh_moment_mm3");
+    for (int i = 0; i < SDM_MODEL_PROBES && sdm_lines_next_is(&r, "probe_moment_mm3"); i++)
+        q->probe_moment_mm3[i] = sdm_lines_real(&r, "probe_moment_mm3");
     bool known = false;
     for (size_t i = 0; i < sizeof grades / sizeof *grades; i++)
         known = known || !strcmp(q->grade, grades[i]);

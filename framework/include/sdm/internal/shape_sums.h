@@ -1,4 +1,4 @@
-/* Two figures by which a shape that was changed is told from the one of a training. */
+/* Figures by which a shape that was changed is told from the one of a training. */
 #pragma once
 
 #include "sdm/registry.h"
@@ -7,9 +7,17 @@
 extern "C" {
 #endif
 
-/* The sums of sdm_mesh_sums() of the mesh at p; 0 after an error, which is one of
- * sdm_instance_mesh(). [any thread] */
-sdm_status sdm_shape_sums(const sdm_instance *shape, const double *p, double *volume, double *area,
+typedef struct sdm_shape_figures {
+    double volume, area; /* of sdm_mesh_sums(), mm^3 and mm^2 */
+    /* integral of x + 2 y + 4 z + (x (x + y) + 2 y (y + z) + 4 z (z + x)) / sqrt(area) over the
+     * surface, mm^3. Another place of a part, or its mirror image, has another one, except by
+     * chance; other triangles of the same faces have the same. */
+    double moment;
+} sdm_shape_figures;
+
+/* *out = the figures of the mesh at p; 0 after an error, which is one of sdm_instance_mesh(). [any
+ * thread] */
+sdm_status sdm_shape_sums(const sdm_instance *shape, const double *p, sdm_shape_figures *out,
                           sdm_error *err);
 
 /* Value of parameter k at the probe `i` of a model, 0 .. SDM_MODEL_PROBES - 1: a fixed place inside

@@ -51,7 +51,7 @@ static const char *stage_text(sdm_plan_stage stage)
     return texts[stage];
 }
 
-static void print_stages(const sdm_train_work *w, const sdm_train_plan *p)
+static void print_stages(const sdm_config *config, const sdm_train_work *w, const sdm_train_plan *p)
 {
     char time[32], bytes[32], count[64];
     printf("  %-8s %-16s %10s  %-18s  %s\n", "stage", "work", "time", "received by a node",
@@ -71,8 +71,11 @@ static void print_stages(const sdm_train_work *w, const sdm_train_plan *p)
                format_seconds(p->seconds[i], time), format_bytes(p->received[i], bytes),
                stage_text((sdm_plan_stage)i));
     }
-    printf("  %-8s %-16s %10s  %-18s  %s\n", "total", "", format_seconds(p->all_seconds, time),
-           format_bytes(p->all_received, bytes), "the sum of these lines");
+    const bool longer =
+        config->train.minutes > 0 && p->all_seconds > 1.01 * 60 * config->train.minutes;
+    printf("  %-8s %-16s %10s  %-18s  the sum of these lines%s\n", "total", "",
+           format_seconds(p->all_seconds, time), format_bytes(p->all_received, bytes),
+           longer ? ", longer than train.minutes" : "");
 }
 
 /* Says what a budget of time is for, or, if half of it is too short for the maps that the
@@ -110,7 +113,7 @@ static void print_text(const sdm_config *config, const sdm_train_work *w, const 
            1 / w->map);
     if (w->fit_step > 0) printf(", %.3g steps a second on a core", 1 / w->fit_step);
     printf("\n");
-    print_stages(w, p);
+    print_stages(config, w, p);
     if (w->only_pod)
         printf("  auto     planned as pod: a template does not suit the shape\n");
     else if (config->network.kind == SDM_NETWORK_AUTO)

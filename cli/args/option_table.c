@@ -104,7 +104,7 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
     {"verify", "FILE", "check a model, level set or image file",
      "A model: checks all checksums and, if the shape is known, measures the accuracy again\n"
      "on random shapes; exit code 4 if the RMSE is more than 25 % above the stated one, and\n"
-     "the mean square error by two standard errors more than that.\n"
+     "by more than the scatter between the shapes (two standard errors of the mean square).\n"
      "A .vdb: checks the hash of its values and runs OpenVDB's checkLevelSet.\n"
      "An image (.nii .nrrd .mha ...): checks that it is complete and, if it is compressed,\n"
      "the checksum of gzip or zlib.",

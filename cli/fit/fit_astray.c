@@ -117,11 +117,37 @@ static sdm_status start_distance(const cli_fit *f, const cloud *c, bool negated,
     return s;
 }
 
-/* Points without a search over rotations: half a turn about z, from RAS to LPS, may be missing. */
-static sdm_status check_frame(const cli_fit *f, const cloud *c, bool placed, char *text,
-                              size_t size, sdm_error *err)
+/* *passes = the fit from the same start is trustworthy with half a turn of the points about it,
+ * which changes the signs of x and y. */
+static sdm_status fit_turned(const cli_fit *f, const double start[3], bool *passes, sdm_error *err)
 {
+    const size_t n = f->target.n_points;
+    sdm_fit_target turned = f->target;
+    sdm_fit_opts opts = f->opts;
+    sdm_fit_result r = {0};
+    double *x = NULL;
+    opts.progress = NULL;
+    sdm_status s = SDM_ALLOC(&x, 3 * n, "points", err);
+    for (size_t i = 0; i < 3 * n && !s; i++)
+        x[i] = i % 3 < 2 ? 2 * start[i % 3] - f->target.points[i] : f->target.points[i];
+    turned.points = x;
+    if (!s) s = sdm_fit(&f->source, &turned, &opts, &r, err);
+    *passes = !s;
+    sdm_fit_dispose(&r);
+    sdm_free(x);
+    return s == SDM_E_NOMEM || s == SDM_E_CANCELLED ? s : SDM_OK;
+}
+
+/* Points without a search over rotations: half a turn about z, from RAS to LPS, may be missing. The
+ * start shape shows it where its parameters are about right; else a second fit does. --ras does not
+ * change a start from --translation or --start-points. */
+static sdm_status check_frame(const cli_fit *f, const cloud *c, const double start[3], bool placed,
+                              char *text, size_t size, sdm_error *err)
+{
+    const char *advice =
+        f->args->fit.ras ? "are they LPS? Leave --ras out" : "are they RAS? --ras converts them";
     double given = 0, negated = 0;
+    bool passes = false;
     if (f->target.kind != SDM_FIT_POINTS || f->opts.turns != SDM_FIT_TURNS_NONE) return SDM_OK;
     sdm_status s = start_distance(f, c, false, !placed, &given, err);
     if (!s) s = start_distance(f, c, true, !placed, &negated, err);
@@ -129,9 +155,11 @@ static sdm_status check_frame(const cli_fit *f, const cloud *c, bool placed, cha
         snprintf(text, size,
                  "; with x and y of the other sign most points lie within %.2g mm of the shape at "
                  "the start, not %.2g mm: %s",
-                 negated, given,
-                 f->args->fit.ras ? "are they LPS? Leave --ras out"
-                                  : "are they RAS? --ras converts them");
+                 negated, given, advice);
+    else if (!s && f->doubt.status == SDM_E_QUALITY && isnan(f->args->pose.translation[0]) &&
+             !f->args->fit.start_points)
+        s = fit_turned(f, start, &passes, err);
+    if (passes) snprintf(text, size, "; with x and y of the other sign the fit passes: %s", advice);
     return s;
 }
 
@@ -167,7 +195,7 @@ sdm_status cli_fit_astray(const cli_fit *f, char *text, size_t size, sdm_error *
                  : isnan(a->start_centre[0]) ? "--translation"
                                              : "--start-centre");
     else if (!s)
-        s = check_frame(f, &c, placed, text, size, err);
+        s = check_frame(f, &c, start, placed, text, size, err);
     sdm_free(c.x);
     return s;
 }

@@ -24,6 +24,12 @@ negate ear.csv >ear-ras.csv
 expect 4 '; with x and y of the other sign most points lie within 0\.[0-9]* mm of the shape at the start, not 0\.[0-9]* mm: are they RAS\? --ras converts them$' \
     sdmgen fit --shape cochlea -O edge=0.6 ear-ras.csv --rotation 1.57,0,0 --mirror no --max-iterations 10 --quiet
 has "^  residuals    .*, most at \([-0-9., ]*\) mm, in the shape's frame \([-0-9., ]*\), where the data show (more|less) than the shape"
+# Where the parameters at the start are far off, a second fit tells it.
+expect 0 - sdmgen phantom --shape cochlea -O edge=1 -p a=3 -p b=0.1 --spacing 1 -o small.nii --surface small.csv --surface-points 400 --quiet
+negate small.csv >small-ras.csv
+expect 4 '; with x and y of the other sign the fit passes: are they RAS\? --ras converts them$' \
+    sdmgen fit --shape cochlea -O edge=1 small-ras.csv --rotation 0,0,0 --mirror no --quiet
+expect 0 - sdmgen fit --shape cochlea -O edge=1 small-ras.csv --rotation 0,0,0 --mirror no --quiet --ras
 
 # Exchanged values of a thin shape beside its place: as much of both tissues lies within the start as around it.
 expect 0 - sdmgen phantom --shape torus -O edge=0.5 --spacing 0.4 -o torus.nii --quiet

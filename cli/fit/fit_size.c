@@ -166,7 +166,9 @@ static sdm_status check_surface(const cli_fit *f, const shape_sizes *shape, sdm_
     if (ratio <= RATIO_MAX && ratio >= 1 / RATIO_MAX) return SDM_OK;
     const char *unit = sdm_unit_near(ratio, NULL);
     char advice[80] = "lengths are mm", text[512];
-    if (unit) snprintf(advice, sizeof advice, "are they in %s? lengths are mm", unit);
+    if (unit)
+        snprintf(advice, sizeof advice, "are they in %s? or is it another shape? lengths are mm",
+                 unit);
     snprintf(text, sizeof text, "%s: the %s measure %.3g mm across, the start shape %.3g mm: %s",
              f->path, cli_fit_kind(f), target, shape->start, advice);
     // half of the points may lie closer together than the whole shape

@@ -28,18 +28,27 @@ void cli_fit_negate_xy(double *points, size_t n)
 
 /* ---- images ---- */
 
-/* A notice where an image looks like labels. */
-static void notice_few_values(cli_fit *f)
+/* An image looks like labels: refuses one of 0 and 1 alone, unless values of tissues say that it is
+ * meant as an image; else a notice. */
+static sdm_status check_few_values(cli_fit *f, sdm_error *err)
 {
+    const cli_fit_args *a = &f->args->fit;
     float found[FEW_VALUES];
     const size_t n = f->image.stored > SDM_VOXEL_INT64
                          ? FEW_VALUES + 1
                          : cli_fit_distinct(&f->image, FEW_VALUES, found);
-    if (n > FEW_VALUES || n < 2 || found[0] < 0) return;
+    if (n > FEW_VALUES || n < 2 || found[0] < 0) return SDM_OK;
+    const bool binary = n == 2 && !(found[0] > 0) && !(found[1] > 1);
+    if (binary && isnan(a->inside[0]) && isnan(a->outside[0]))
+        return sdm_fail(err, SDM_E_ARG,
+                        "%s holds only the values 0 and 1, as labels do: --label 1 fits to them; "
+                        "--inside and --outside fit to them as to an image",
+                        f->path);
     cli_notice("%s holds only %zu different values, %g to %g: if it is a label map, give --label "
                "with the value of the shape, e.g. --label %g",
                f->path, n, (double)found[0], (double)found[n - 1], (double)found[n - 1]);
     f->suspicion = "; if the file is a label map, give --label";
+    return SDM_OK;
 }
 
 sdm_status cli_fit_many_values(const sdm_volume *v, bool *many, sdm_error *err)
@@ -73,10 +82,9 @@ static sdm_status use_image(cli_fit *f, sdm_error *err)
                         "(written with -o FILE.stl in place of this file); --force fits to the "
                         "distances as grey values",
                         f->path);
-    notice_few_values(f);
     f->target.kind = SDM_FIT_IMAGE;
     f->target.values = v->values;
-    return SDM_OK;
+    return check_few_values(f, err);
 }
 
 /* Do most voxels of the mask lie alone, without another one beside them? No label of an organ is

@@ -55,7 +55,10 @@ sdmgen fit $shape image.nii --rotation 0,0,0 --max-iterations 1 --inside 40,170 
 grep -q -- '--outside is not given' err || bad "one tissue: $(cat err)"
 sdmgen fit $shape image.nii --rotation 0,0,0 --max-iterations 1 --inside 40,170 --outside 1300,200 >out 2>err
 grep -q 'not given: the fit' err && bad "given tissues: $(cat err)"
-sdmgen fit $shape labels.nii --rotation 0,0,0 --max-iterations 1 >out 2>err
+# labels of 0 and 1 are no image, unless values of tissues say so
+expect 2 'labels.nii holds only the values 0 and 1, as labels do: --label 1 fits to them; --inside and --outside fit to them as to an image$' \
+    sdmgen fit $shape labels.nii --rotation 0,0,0
+sdmgen fit $shape labels.nii --rotation 0,0,0 --max-iterations 1 --inside 1,0.1 --outside 0,0.1 >out 2>err
 grep -q 'labels.nii holds only 2 different values, 0 to 1: if it is a label map, give --label with the value of the shape, e.g. --label 1$' err ||
     bad "labels as an image: $(cat err)"
 grep -q '^sdmgen: error: labels.nii: .*; if the file is a label map, give --label$' err || bad "labels as an image, at the end: $(cat err)"
@@ -68,7 +71,7 @@ expect 2 'fine.nii: the voxels with this label lie scattered, and the file holds
 sed 's/\([0-9.-]\{1,\}\)/\1e-3/g; 1s/.*/x,y,z/' points.csv >metres.csv
 sed 's/\([0-9.-]\{1,\}\)/\1e3/g; 1s/.*/x,y,z/' points.csv >micro.csv
 sdmgen fit $shape metres.csv --rotation 0,0,0 --max-iterations 1 --quiet >out 2>err && bad 'points in metres are accepted'
-grep -q 'error: metres.csv: the points measure 0.00[0-9]* mm across, the start shape [0-9.]* mm: are they in m? lengths are mm; --force fits nevertheless' err || bad "metres: $(cat err)"
+grep -q 'error: metres.csv: the points measure 0.00[0-9]* mm across, the start shape [0-9.]* mm: are they in m? or is it another shape? lengths are mm; --force fits nevertheless' err || bad "metres: $(cat err)"
 sdmgen fit $shape metres.csv --rotation 0,0,0 --max-iterations 1 --quiet --force >out 2>err
 grep -q 'warning: metres.csv: the points measure' err || bad "metres with --force: $(cat err)"
 expect 2 'error: micro.csv: .* are they in um\?' sdmgen fit $shape micro.csv --rotation 0,0,0 --quiet

@@ -244,8 +244,9 @@ enum { FIT_WORDS_MAX = 80 };
 void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX]);
 
 /* After a trustworthy fit whose maps are doubtful, coarse or a network's: prints the command that
- * goes on from its result with exact maps of the voxels that are needed. After a fit that only
- * stopped too early: prints the command that goes on with more iterations. */
+ * goes on from its result with exact maps of the voxels that are needed, or with a polish; nothing
+ * where the exact shape is not known. After a fit that only stopped too early: prints the command
+ * that goes on with more iterations. */
 void cli_fit_print_next(const cli_fit *f);
 
 /* After the fit: a shape that was changed after the training of the network makes the check of the
@@ -270,6 +271,11 @@ sdm_status cli_fit_astray(const cli_fit *f, char *text, size_t size, sdm_error *
 /* After a fit that is not trustworthy: text[size] = the end of its error, "; " and what to try; "":
  * nothing to add. Returns text. */
 const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size);
+
+/* After a fit that is not trustworthy: is a wrong start a likely cause? It is not where tissues are
+ * the wrong way round, where the voxels of the maps are the reason, nor where only checks failed
+ * that do not depend on the start. */
+bool cli_fit_start_is_suspect(const cli_fit *f);
 
 /* Computes f->map and f->surface of the estimate. */
 sdm_status cli_fit_make_map(cli_fit *f, sdm_error *err);

@@ -76,6 +76,21 @@ static bool is_blind(const cli_fit *f)
     return failed == 1 && found(f, SDM_FIT_CHECK_VOXELS, SDM_FIT_FAILED, -INFINITY);
 }
 
+bool cli_fit_start_is_suspect(const cli_fit *f)
+{
+    static const sdm_fit_check_kind kinds[] = {
+        SDM_FIT_CHECK_CONVERGED, SDM_FIT_CHECK_NO_SHAPE,  SDM_FIT_CHECK_IN_IMAGE,
+        SDM_FIT_CHECK_RESIDUALS, SDM_FIT_CHECK_EMPTY,     SDM_FIT_CHECK_MISSING,
+        SDM_FIT_CHECK_BOUNDS,    SDM_FIT_CHECK_NEXT_POSE, SDM_FIT_CHECK_BLOB,
+        SDM_FIT_CHECK_PATCH,     SDM_FIT_CHECK_COVERED};
+    bool suspect = false;
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        suspect = suspect || found(f, kinds[i], SDM_FIT_FAILED, -INFINITY);
+    return suspect && !f->exchanged &&
+           !found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY) &&
+           !strstr(f->doubt.text, ": the voxels of the maps, ");
+}
+
 /* Writes into `text` that a wrong start may be the cause of the failure, and the options that
  * change the start; nothing where the start is kept. */
 static void name_start(const cli_fit *f, char *text, size_t size)

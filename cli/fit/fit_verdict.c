@@ -43,6 +43,19 @@ static const char *const MEANINGS[SDM_FIT_N_CHECKS] = {
     [SDM_FIT_CHECK_KEPT_PARAMS] = "gain of free parameters",
 };
 
+/* What the figure of this check is in this fit; points have no material. */
+static const char *meaning_of(const cli_fit *f, sdm_fit_check_kind kind)
+{
+    const bool points = f->target.kind == SDM_FIT_POINTS;
+    if (kind == SDM_FIT_CHECK_DATA)
+        return points ? "points on the surface" : "longest edge of a voxel of the labels, mm";
+    if (points && kind == SDM_FIT_CHECK_EMPTY)
+        return "space between the surface and points inside of it, over the volume";
+    if (points && kind == SDM_FIT_CHECK_MISSING)
+        return "space between the surface and points outside of it, over the volume";
+    return MEANINGS[kind];
+}
+
 /* The side of the limit on which the figure of a finding must lie. */
 static const char *bound_name(const sdm_fit_finding *x)
 {
@@ -66,10 +79,6 @@ static const char *bound_name(const sdm_fit_finding *x)
 /* Prints one check: its name, grade and figure, and why it did not pass or what the figure is. */
 static void print_finding(const cli_fit *f, const sdm_fit_finding *x)
 {
-    const bool points = f->target.kind == SDM_FIT_POINTS;
-    const char *meaning = x->kind != SDM_FIT_CHECK_DATA ? MEANINGS[x->kind]
-                          : points                      ? "points on the surface"
-                                   : "longest edge of a voxel of the labels, mm";
     char figure[64] = "";
     int n = 0;
     // + 0: no negative zero
@@ -80,7 +89,7 @@ static void print_finding(const cli_fit *f, const sdm_fit_finding *x)
     if (*x->text)
         printf(" %s%s%s\n", figure, *figure ? ": " : "", x->text);
     else
-        printf(" %-28s %s\n", figure, meaning);
+        printf(" %-28s %s\n", figure, meaning_of(f, x->kind));
 }
 
 void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX])
@@ -127,7 +136,7 @@ void cli_fit_print_verdict(const cli_fit *f)
     for (int grade = SDM_FIT_FAILED; grade >= SDM_FIT_PASSED; grade--)
         for (size_t i = 0; i < v->n_findings; i++)
             if ((int)v->findings[i].grade == grade) print_finding(f, &v->findings[i]);
-    if (v->grade == SDM_FIT_FAILED && !f->exchanged && f->opts.turns == SDM_FIT_TURNS_NONE &&
+    if (cli_fit_start_is_suspect(f) && f->opts.turns == SDM_FIT_TURNS_NONE &&
         !isnan(f->args->pose.rotation[0]))
         printf("  --rotation gives one start: without it the fit tries 60 rotations\n");
 }

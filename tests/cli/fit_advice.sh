@@ -31,6 +31,20 @@ expect 4 '; with x and y of the other sign the fit passes: are they RAS\? --ras 
     sdmgen fit --shape cochlea -O edge=1 small-ras.csv --rotation 0,0,0 --mirror no --quiet
 expect 0 - sdmgen fit --shape cochlea -O edge=1 small-ras.csv --rotation 0,0,0 --mirror no --quiet --ras
 
+# A parameter at the end of its range is a cause, too; the texts say what is counted, and points have no material.
+awk 'BEGIN { print "x,y,z"; for (i = 0; i < 40; i++) for (j = 0; j < 20; j++) { a = i * 0.15708; b = j * 0.314159; r = 3 + 1.65 * cos(b); print r * cos(a) "," r * sin(a) "," 1.65 * sin(b) } }' >thick.csv
+expect 4 'where the data show more than the shape, as in nearly all places that deviate: another shape lies there.*; the data may want minor to be more than 1\.5, the largest value of its range; a wrong start' \
+    sdmgen fit --shape torus thick.csv --rotation 0,0,0 --quiet
+has '^  bounds       doubtful .* \(minor\): the data may want minor to be more than 1\.5, the largest value of its range$'
+has '^  missing      FAILED .*: points lie outside of the shape: the space between them and its surface is as large as 1[0-9.]* % of its volume, allowed 5 %'
+has '^  empty        passed .* space between the surface and points inside of it, over the volume$'
+
+# Maps that are too coarse for the shape are the reason: no advice on the start.
+expect 0 - sdmgen phantom --shape torus -p minor=0.6 --spacing 0.3 -o thin.nii --label thin-label.nii --quiet
+expect 4 'error: thin-label.nii: the voxels of the maps are coarse beside ' \
+    sdmgen fit --shape torus thin-label.nii --label 1 --rotation 0,0,0 --spacing 1 --quiet
+grep -q -- '--rotation gives one start' out && bad 'advice on the start beside coarse maps'
+
 # Exchanged values of a thin shape beside its place: as much of both tissues lies within the start as around it.
 expect 0 - sdmgen phantom --shape torus -O edge=0.5 --spacing 0.4 -o torus.nii --quiet
 torus='sdmgen fit --shape torus -O edge=0.5 torus.nii --rotation 0,0,0 --spacing 0.4 --eps 1e-3 --quiet --start-centre 1.5,1,0.5'

@@ -41,7 +41,7 @@ static double gain_beyond(const fit_problem *p, size_t k, bool upper)
 fit_at_bounds sdm_fit_at_bounds(const fit_problem *p, const sdm_fit_result *r, double factor)
 {
     fit_at_bounds b = {.n = 0};
-    double most = SDM_FIT_PREFERRED;
+    double most = SDM_FIT_PREFERRED, hinted = 0;
     for (size_t k = 0; k < p->n_params && !p->opts->keep_params; k++) {
         const bool upper = p->state.params[k] >= p->high[k];
         if (!r->at_bound[k]) continue;
@@ -53,6 +53,12 @@ fit_at_bounds sdm_fit_at_bounds(const fit_problem *p, const sdm_fit_result *r, d
         if (length + strlen(name) + 3 < sizeof b.names)
             snprintf(b.names + length, sizeof b.names - length, "%s%s", length ? ", " : "", name);
         const double gain = gain_beyond(p, k, upper) / factor;
+        if (gain > hinted)
+            snprintf(b.hint, sizeof b.hint,
+                     "the data may want %.60s to be %s than %.6g, the %s value of its range", name,
+                     upper ? "more" : "less", upper ? p->high[k] : p->low[k],
+                     upper ? "largest" : "smallest");
+        hinted = fmax(hinted, gain);
         if (!(gain > SDM_FIT_PREFERRED)) continue;
         b.n_wanted++;
         if (!(gain > most)) continue;

@@ -12,6 +12,10 @@ typedef struct fit_at_bounds {
     /* "base ends at its bound: the data want more than 60, the largest value of its range", of
        the parameter that the data want farthest beyond; else "" */
     char text[320];
+    /* where they want none clearly: "the data may want base to be more than 60, the largest value
+       of its range", of the parameter that the likelihood pushes hardest against its bound; else ""
+     */
+    char hint[160];
     /* the data are longer or shorter than the shape by a length that this parameter would explain:
        `text` says how large it would have to be */
     bool measured;

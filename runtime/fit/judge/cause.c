@@ -65,7 +65,7 @@ static void name_place(const fit_problem *p, const fit_worst_place *worst, char 
              ", most at (%.3g, %.3g, %.3g) mm, in the shape's frame (%.3g, %.3g, %.3g), where the "
              "data show %s than the shape%s",
              x[0], x[1], x[2], y[0], y[1], y[2], worst->more ? "more" : "less",
-             worst->same > NEARLY_ALL ? ", as nearly everywhere" : "");
+             worst->same > NEARLY_ALL ? ", as in nearly all places that deviate" : "");
 }
 
 // the causes of residuals inside the shape, the most probable one first

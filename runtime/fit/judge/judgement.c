@@ -133,6 +133,7 @@ static void check_bounds(const fit_problem *p, const fit_misfit *m, const fit_at
                    (has_passed(v, SDM_FIT_CHECK_BESIDE) || has_passed(v, SDM_FIT_CHECK_OUTSIDE)),
                refused = b->n_wanted && (!matched || b->far) && !(p->opts->tolerance > 0);
     const sdm_fit_grade grade = refused ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL;
+    const char *hint = b->n_wanted ? b->text : b->hint;
     if (b->measured)
         sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, false, grade, (double)b->n, 0,
                           "%s; widen the range in the table of the shape and in shape.ranges, or "
@@ -141,7 +142,7 @@ static void check_bounds(const fit_problem *p, const fit_misfit *m, const fit_at
     else
         sdm_fit_judge_add(v, SDM_FIT_CHECK_BOUNDS, !b->n, grade, (double)b->n, 0,
                           "%zu of %zu parameters at an end of their range (%s)%s%s%s", b->n,
-                          p->n_params, b->names, b->n_wanted ? ": " : "", b->text,
+                          p->n_params, b->names, *hint ? ": " : "", hint,
                           !refused ? ""
                           : b->n > 1
                               ? ", and do not match the shape as it is: the fit is likely to "
@@ -213,20 +214,33 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
                           sdm_fit_verdict *v)
 {
     const bool points = p->target->kind == SDM_FIT_POINTS;
-    const char *what = points ? "points" : sdm_fit_is_image(p) ? "image" : "labels";
+    const char *what = sdm_fit_is_image(p) ? "image" : "labels";
     const bool biased = sdm_fit_is_image(p) && !p->maps.share;
     const double most = fmax(p->opts->tolerance, biased ? VOLUME_MIN_BIASED : VOLUME_MIN),
                  beside = sdm_fit_is_image(p) ? fmax(p->opts->beside, most) : most;
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
-                      "%.3g %% of the volume of the shape is empty in the %s, allowed %.0f %% "
-                      "(sdm_fit_opts.tolerance)",
-                      100 * m->empty, what, 100 * most);
+    if (points)
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
+                          "points lie inside the shape: the space between them and its surface is "
+                          "%.3g %% of its volume, allowed %.0f %% (sdm_fit_opts.tolerance)",
+                          100 * m->empty, 100 * most);
+    else
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
+                          "%.3g %% of the volume of the shape is empty in the %s, allowed %.0f %% "
+                          "(sdm_fit_opts.tolerance)",
+                          100 * m->empty, what, 100 * most);
     const double stray = fmax(p->opts->tolerance, STRAY_MAX);
     if (points && r->outliers > stray)
         sdm_fit_judge_add(v, SDM_FIT_CHECK_MISSING, false, SDM_FIT_FAILED, r->outliers, stray,
                           "%.3g %% of the points lie on no surface of the shape, allowed %.0f %% "
                           "(sdm_fit_opts.tolerance)",
                           100 * r->outliers, 100 * stray);
+    else if (points)
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED,
+                          m->missing, beside,
+                          "points lie outside of the shape: the space between them and its surface "
+                          "is as large as %.3g %% of its volume, allowed %.0f %% "
+                          "(sdm_fit_opts.tolerance)",
+                          100 * m->missing, 100 * beside);
     else
         sdm_fit_judge_add(
             v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED, m->missing, beside,
@@ -421,9 +435,12 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     if (!s) s = sdm_fit_check_blob(p, *factor, v, err);
     const sdm_fit_finding *why = s ? NULL : reason(v, &bounds);
     if (s || !why) return s;
-    const bool more = bounds.n_wanted && !strstr(why->text, bounds.text);
-    return sdm_fail(err, SDM_E_QUALITY, "%s%s%s", why->text, more ? "; " : "",
-                    more ? bounds.text : "");
+    // the shape of the data may lie beyond the range of a parameter
+    const bool other = why->kind == SDM_FIT_CHECK_RESIDUALS || why->kind == SDM_FIT_CHECK_EMPTY ||
+                       why->kind == SDM_FIT_CHECK_MISSING;
+    const char *hint = bounds.n_wanted ? bounds.text : other ? bounds.hint : "";
+    const bool more = *hint && !strstr(why->text, hint);
+    return sdm_fail(err, SDM_E_QUALITY, "%s%s%s", why->text, more ? "; " : "", more ? hint : "");
 }
 
 double sdm_fit_compare(const sdm_fit_result *fit, const sdm_fit_result *rival)

@@ -65,9 +65,10 @@ void cli_fit_print_next(const cli_fit *f)
     const cli_args *a = f->args;
     const sdm_fit_result *r = &f->result;
     const sdm_fit_finding *voxels = doubtful(f, SDM_FIT_CHECK_VOXELS);
-    const bool more = is_unfinished(f);
-    if ((f->doubt.status && !more) || f->other_side || f->n_candidates || a->cohort.cases ||
-        (!voxels && !more && !doubtful(f, SDM_FIT_CHECK_NETWORK_ERROR)))
+    // --exact and --polish need the exact shape
+    const bool more = is_unfinished(f), exact = !f->source.model || f->shape || f->judge_shape;
+    if ((!exact && !more) || (f->doubt.status && !more) || f->other_side || f->n_candidates ||
+        a->cohort.cases || (!voxels && !more && !doubtful(f, SDM_FIT_CHECK_NETWORK_ERROR)))
         return;
     sdm_text t = {0};
     char text[96];
@@ -82,7 +83,7 @@ void cli_fit_print_next(const cli_fit *f)
             add_option(&t, o->name, a->given[i].value);
         }
     }
-    if (f->model_path && !more) sdm_text_add(&t, " --exact");
+    if (f->model_path && !more) sdm_text_add(&t, voxels ? " --exact" : " --polish");
     const size_t iterations = 4 * f->opts.max_iterations, usual = sdm_fit_defaults().max_iterations;
     if (more) sdm_text_add(&t, " --max-iterations=%zu", iterations > usual ? iterations : usual);
     if (voxels && !more) {
@@ -97,7 +98,10 @@ void cli_fit_print_next(const cli_fit *f)
     add_three(&t, "rotation", r->pose.rotation);
     add_three(&t, "translation", r->pose.translation);
     if (!t.failed)
-        printf("%s from here, without a search:\n  %s\n", more ? "more iterations" : "finer maps",
+        printf("%s from here, without a search:\n  %s\n",
+               more     ? "more iterations"
+               : voxels ? "finer maps"
+                        : "a polish with exact maps",
                t.data);
     sdm_text_dispose(&t);
 }

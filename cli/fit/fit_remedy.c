@@ -86,8 +86,7 @@ bool cli_fit_start_is_suspect(const cli_fit *f)
     bool suspect = false;
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         suspect = suspect || found(f, kinds[i], SDM_FIT_FAILED, -INFINITY);
-    return suspect && !f->exchanged &&
-           !found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY);
+    return suspect && !f->exchanged && !found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY);
 }
 
 /* Writes into `text` that a wrong start may be the cause of the failure, and the options that

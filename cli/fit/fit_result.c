@@ -7,13 +7,6 @@
 #include "sdm/isosurface.h"
 #include "sdm/memory.h"
 
-const char *cli_fit_kind(const cli_fit *f)
-{
-    return f->target.kind == SDM_FIT_IMAGE   ? "image"
-           : f->target.kind == SDM_FIT_LABEL ? "labels"
-                                             : "points";
-}
-
 /* Returns the grid g, rotated and translated with the shape. On this grid the map of the network or
  * of the exact engine needs no interpolation. */
 static sdm_grid grid_in_pose(const sdm_grid *g, const sdm_pose *pose)

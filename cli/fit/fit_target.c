@@ -204,3 +204,10 @@ sdm_status cli_fit_read_target(cli_fit *f, sdm_error *err)
                     "(volume), " CLI_MESH_ENDINGS " (mesh), .csv or .npy (points)",
                     f->path);
 }
+
+const char *cli_fit_kind(const cli_fit *f)
+{
+    return f->target.kind == SDM_FIT_IMAGE   ? "image"
+           : f->target.kind == SDM_FIT_LABEL ? "labels"
+                                             : "points";
+}

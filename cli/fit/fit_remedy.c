@@ -78,15 +78,8 @@ static bool is_blind(const cli_fit *f)
 
 bool cli_fit_start_is_suspect(const cli_fit *f)
 {
-    static const sdm_fit_check_kind kinds[] = {
-        SDM_FIT_CHECK_CONVERGED, SDM_FIT_CHECK_NO_SHAPE,  SDM_FIT_CHECK_IN_IMAGE,
-        SDM_FIT_CHECK_RESIDUALS, SDM_FIT_CHECK_EMPTY,     SDM_FIT_CHECK_MISSING,
-        SDM_FIT_CHECK_BOUNDS,    SDM_FIT_CHECK_NEXT_POSE, SDM_FIT_CHECK_BLOB,
-        SDM_FIT_CHECK_PATCH,     SDM_FIT_CHECK_COVERED};
-    bool suspect = false;
-    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
-        suspect = suspect || found(f, kinds[i], SDM_FIT_FAILED, -INFINITY);
-    return suspect && !f->exchanged && !found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY);
+    return f->result.verdict.grade == SDM_FIT_FAILED && !f->exchanged && !is_blind(f) &&
+           !found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY);
 }
 
 /* Writes into `text` that a wrong start may be the cause of the failure, and the options that

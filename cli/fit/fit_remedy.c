@@ -78,8 +78,7 @@ static bool is_blind(const cli_fit *f)
 
 bool cli_fit_start_is_suspect(const cli_fit *f)
 {
-    return f->result.verdict.grade == SDM_FIT_FAILED && !f->exchanged && !is_blind(f) &&
-           !found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY);
+    return f->result.verdict.grade == SDM_FIT_FAILED && !f->exchanged && !is_blind(f);
 }
 
 /* Writes into `text` that a wrong start may be the cause of the failure, and the options that

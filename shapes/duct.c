@@ -120,9 +120,8 @@ static const sdm_option OPTIONS[N_OPTIONS] = {
               "constants, and the options of their names are their values"},
     [DETAIL] = {"detail", SDM_OPTION_INT, "", 0, DUCT_VALUES_MAX, 0, NULL,
                 "further parameters, for fits to labels: 1: surge, sway, flare_high, twist; 2 to "
-                "7: also so "
-                "many values along the turns for each of five ways in which the outline grows "
-                "(size_1 .. oblique_7)"},
+                "7: also so many values along the turns for each of five ways in which the outline "
+                "grows (size_1 .. oblique_7)"},
     FIXABLE(OPTION)};
 
 static const sdm_param DETAILS[] = {

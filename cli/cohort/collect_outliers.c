@@ -1,26 +1,14 @@
 /* Outliers among the parameters of a cohort. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "collect.h"
+#include "measure/median.h"
 #include "sdm/memory.h"
 
 #define LIMIT 3.5
 #define NORMAL 0.6745 /* MAD of the standard normal distribution */
 
 enum { FEWEST = 8 };
-
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *x, size_t n)
-{
-    qsort(x, n, sizeof *x, ascending);
-    return n % 2 ? x[n / 2] : 0.5 * (x[n / 2 - 1] + x[n / 2]);
-}
 
 /* Marks the rows whose value in the column is an outlier. x[rows]: scratch. */
 static void mark(cli_collect *t, size_t column, double *x)
@@ -31,9 +19,9 @@ static void mark(cli_collect *t, size_t column, double *x)
         if (t->rows[i].state == CLI_CASE_ACCEPTED && isfinite(value)) x[n++] = value;
     }
     if (n < FEWEST) return;
-    const double middle = median(x, n);
+    const double middle = cli_median(x, n);
     for (size_t i = 0; i < n; i++) x[i] = fabs(x[i] - middle);
-    const double mad = median(x, n);
+    const double mad = cli_median(x, n);
     for (size_t i = 0; i < t->ids.n && mad > 0; i++) {
         const double z = NORMAL * (t->values[i * t->n_columns + column] - middle) / mad;
         sdm_text *out = &t->rows[i].outliers;

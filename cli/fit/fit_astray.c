@@ -2,42 +2,36 @@
  */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 #include "fit_command.h"
+#include "measure/median.h"
+#include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
 /* The start is far from the data beyond this multiple of their size, the median distance of the
  * points or voxels from their middle. */
 #define FAR 1.5
-/* Another frame explains the start if the distance is then less than this part of it ... */
+/* The data are in another frame than the start, RAS instead of LPS, if the other signs of x and y
+ * bring both so near to each other: the distance falls below this share of what it was. */
 #define NEARER 0.5
-/* ... and, for points and the surface of the start shape, more than this part of their size. */
+/* Points are off the surface of the start shape where their distance from it exceeds this share of
+ * their size. */
 #define OFF 0.1
 /* Points that are compared with the start shape; of more, every second, third ... one. */
 #define POINTS_MAX 2000
 
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* The value that this share of the list does not exceed. */
+/* Sorts the list and returns the value that this share of it does not exceed; 0: it is empty. */
 static double quantile(double *list, size_t n, double share)
 {
-    if (!n) return 0;
-    qsort(list, n, sizeof *list, ascending);
-    return list[(size_t)(share * (double)(n - 1))];
+    cli_sort(list, n);
+    return n ? list[(size_t)(share * (double)(n - 1))] : 0;
 }
-
-static double median(double *list, size_t n) { return quantile(list, n, 0.5); }
 
 /* Points of the surface, or the middles of the voxels with the label. */
 typedef struct cloud {
     double *x; /* [n][3] mm, LPS */
     size_t n;
-    double middle[3], size; /* medians: of each coordinate; of the distances from there */
+    double middle[3], size; /* lower medians: of each coordinate; of the distances from there */
 } cloud;
 
 static sdm_status read_cloud(const cli_fit *f, cloud *c, sdm_error *err)
@@ -61,57 +55,55 @@ static sdm_status read_cloud(const cli_fit *f, cloud *c, sdm_error *err)
     }
     for (size_t a = 0; a < 3 && !s; a++) {
         for (size_t i = 0; i < c->n; i++) list[i] = c->x[3 * i + a];
-        c->middle[a] = median(list, c->n);
+        c->middle[a] = quantile(list, c->n, 0.5);
     }
-    for (size_t i = 0; i < c->n && !s; i++) {
-        list[i] = 0;
-        for (size_t a = 0; a < 3; a++) list[i] += pow(c->x[3 * i + a] - c->middle[a], 2);
-        list[i] = sqrt(list[i]);
-    }
-    if (!s) c->size = median(list, c->n);
+    for (size_t i = 0; i < c->n && !s; i++) list[i] = sqrt(v3_dist2(c->x + 3 * i, c->middle));
+    if (!s) c->size = quantile(list, c->n, 0.5);
     sdm_free(list);
     return s;
 }
 
-static double distance(const double a[3], const double b[3])
+/* Distance (mm) of the point y of the shape's frame from the surface, by the nearest voxel of its
+ * map on g; beyond the grid the way to its border counts, too. */
+static double surface_distance(const sdm_grid *g, const float *map, const double y[3])
 {
-    return sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2) + pow(a[2] - b[2], 2));
+    double index[3], at[3];
+    sdm_grid_index(g, y, index);
+    for (int a = 0; a < 3; a++) index[a] = fmin(fmax(round(index[a]), 0), (double)g->n[a] - 1);
+    sdm_grid_world(g, index, at);
+    const double beyond = sqrt(v3_dist2(y, at)),
+                 d = fabs((double)map[sdm_grid_voxel(g, (int64_t)index[0], (int64_t)index[1],
+                                                     (int64_t)index[2])]);
+    return beyond > g->spacing[0] + g->spacing[1] + g->spacing[2] ? d + beyond : d;
 }
 
-/* *off = the upper quartile of the distances of the points from the surface of the start shape, as
- * they are or with x and y of the other sign. Where the fit began at their middle, it would begin
- * at the other one. */
-static sdm_status start_distance(const cli_fit *f, const cloud *c, bool negated, bool at_middle,
-                                 double *off, sdm_error *err)
+/* off[2] = the upper quartile of the distances of the points from the surface of the start shape,
+ * as they are and with x and y of the other sign. Where the fit began at their middle, it would
+ * begin at the other one. */
+static sdm_status start_distances(const cli_fit *f, const cloud *c, bool at_middle, double off[2],
+                                  sdm_error *err)
 {
     const sdm_grid *g =
         f->source.model ? &sdm_model_get_info(f->source.model)->grid : &f->source.grid;
     const sdm_pose own = {{0, 0, 0}, {0, 0, 0}};
     float *map = NULL;
-    double *list = NULL, rotation[9];
-    sdm_pose_matrix(&f->opts.start_pose, rotation);
+    double *list = NULL;
     sdm_status s = SDM_ALLOC(&map, sdm_grid_count(g), "distance map", err);
     if (!s) s = SDM_ALLOC(&list, c->n, "points", err);
     if (!s) s = sdm_fit_map(&f->source, f->start, &own, g, f->opts.n_threads, map, err);
-    for (size_t i = 0; i < c->n && !s; i++) {
-        double x[3], y[3] = {0, 0, 0}, index[3], within[3], at[3];
-        for (size_t a = 0; a < 3; a++) {
-            const double sign = negated && a < 2 ? -1 : 1;
-            x[a] = sign * c->x[3 * i + a] - f->opts.start_pose.translation[a];
-            if (at_middle) x[a] -= (sign - 1) * c->middle[a];
+    for (int negated = 0; negated < 2 && !s; negated++) {
+        for (size_t i = 0; i < c->n; i++) {
+            double x[3], y[3];
+            for (size_t a = 0; a < 3; a++) {
+                const double sign = negated && a < 2 ? -1 : 1;
+                x[a] = sign * c->x[3 * i + a];
+                if (at_middle) x[a] -= (sign - 1) * c->middle[a];
+            }
+            sdm_pose_apply_inverse(&f->opts.start_pose, x, y);
+            list[i] = surface_distance(g, map, y);
         }
-        for (int k = 0; k < 9; k++) y[k % 3] += rotation[k] * x[k / 3];
-        sdm_grid_index(g, y, index);
-        for (int a = 0; a < 3; a++) within[a] = fmin(fmax(round(index[a]), 0), (double)g->n[a] - 1);
-        sdm_grid_world(g, within, at);
-        // beyond the grid the way to its border counts, too
-        const double
-            beyond = distance(y, at),
-            d = fabs((double)map[(
-                size_t)((within[2] * (double)g->n[1] + within[1]) * (double)g->n[0] + within[0])]);
-        list[i] = beyond > g->spacing[0] + g->spacing[1] + g->spacing[2] ? d + beyond : d;
+        off[negated] = quantile(list, c->n, 0.75);
     }
-    if (!s) *off = quantile(list, c->n, 0.75);
     sdm_free(map);
     sdm_free(list);
     return s;
@@ -146,16 +138,15 @@ static sdm_status check_frame(const cli_fit *f, const cloud *c, const double sta
 {
     const char *advice =
         f->args->fit.ras ? "are they LPS? Leave --ras out" : "are they RAS? --ras converts them";
-    double given = 0, negated = 0;
+    double off[2];
     bool passes = false;
     if (f->target.kind != SDM_FIT_POINTS || f->opts.turns != SDM_FIT_TURNS_NONE) return SDM_OK;
-    sdm_status s = start_distance(f, c, false, !placed, &given, err);
-    if (!s) s = start_distance(f, c, true, !placed, &negated, err);
-    if (!s && given > OFF * c->size && negated < NEARER * given)
+    sdm_status s = start_distances(f, c, !placed, off, err);
+    if (!s && off[0] > OFF * c->size && off[1] < NEARER * off[0])
         snprintf(text, size,
                  "; with x and y of the other sign most points lie within %.2g mm of the shape at "
                  "the start, not %.2g mm: %s",
-                 negated, given, advice);
+                 off[1], off[0], advice);
     else if (!s && f->doubt.status == SDM_E_QUALITY && isnan(f->args->pose.translation[0]) &&
              !f->args->fit.start_points)
         s = fit_turned(f, start, &passes, err);
@@ -176,8 +167,8 @@ sdm_status cli_fit_astray(const cli_fit *f, char *text, size_t size, sdm_error *
     sdm_status s = read_cloud(f, &c, err);
     sdm_pose_apply(&f->opts.start_pose, f->pivot, start);
     const double negated[3] = {-start[0], -start[1], start[2]},
-                 off = s ? 0 : distance(start, c.middle);
-    if (!s && placed && off > FAR * c.size && distance(negated, c.middle) < NEARER * off)
+                 off = s ? 0 : sqrt(v3_dist2(start, c.middle));
+    if (!s && placed && off > FAR * c.size && sqrt(v3_dist2(negated, c.middle)) < NEARER * off)
         snprintf(text, size,
                  "; the fit began %.3g mm from the middle of the %s; with x and y of the other "
                  "sign the start is near it: one of both is RAS, the other LPS%s",

@@ -272,8 +272,8 @@ sdm_status cli_fit_astray(const cli_fit *f, char *text, size_t size, sdm_error *
  * nothing to add. Returns text. */
 const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size);
 
-/* Is the fit refused, and may a wrong start be the cause? It is not where tissues were
- * exchanged, nor where "map voxels" alone failed. */
+/* Is the fit refused, and may a wrong start be the cause? Exchanged tissues, and a failed check
+ * "map voxels" alone, have another cause. */
 bool cli_fit_start_is_suspect(const cli_fit *f);
 
 /* Computes f->map and f->surface of the estimate. */

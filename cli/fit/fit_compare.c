@@ -1,9 +1,9 @@
 /* Compares a fitted shape with labels: overlap of the voxels inside, and distances between the
  * surfaces, within the field of view of the image. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "fit_command.h"
+#include "measure/median.h"
 #include "report/crop.h"
 #include "sdm/exact.h"
 #include "sdm/isosurface.h"
@@ -91,12 +91,6 @@ static sdm_status add_distances(const cli_fit *f, const sdm_mesh *from, const sd
     return SDM_OK;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Distances between the surfaces in both directions: mean, 95 % quantile, largest. */
 static sdm_status compare_surfaces(cli_fit *f, const sdm_mesh *reference, sdm_error *err)
 {
@@ -110,7 +104,7 @@ static sdm_status compare_surfaces(cli_fit *f, const sdm_mesh *reference, sdm_er
     if (!s) s = add_distances(f, reference, &f->surface, list, &n, err);
     o->has_surface = !s && of_fit > 0 && n > of_fit;
     if (o->has_surface) {
-        qsort(list, n, sizeof *list, ascending);
+        cli_sort(list, n);
         for (size_t i = 0; i < n; i++) o->mean_mm += list[i] / (double)n;
         o->q95_mm = list[(size_t)ceil(0.95 * (double)n) - 1]; // nearest rank
         o->hausdorff_mm = list[n - 1];

@@ -106,7 +106,7 @@ sdm_status cli_fit_explain_contrast(cli_fit *f, sdm_error *err)
     const double inside = f->opts.appearance.inside[0].mean,
                  outside = f->opts.appearance.outside[0].mean;
     side_values in = {0, 0}, around = {0, 0};
-    // a whole image (--find) has no start
+    // --find searches the whole image: there is no start pose to look at
     if (f->target.kind != SDM_FIT_IMAGE || f->doubt.status != SDM_E_QUALITY || f->args->fit.find)
         return SDM_OK;
     sdm_status s = measure_start(f, &in, &around, err);

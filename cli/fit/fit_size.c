@@ -2,9 +2,9 @@
  * most common mistake. A fit that cannot succeed is refused at once. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 #include "fit_command.h"
+#include "measure/median.h"
 #include "report/terminal.h"
 #include "sdm/internal/box.h"
 #include "sdm/internal/units.h"
@@ -128,12 +128,6 @@ static sdm_status check_image(const cli_fit *f, const shape_sizes *shape, sdm_er
     return SDM_OK;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* *size = diagonal of the box around the middle half of the points along each axis, mm: outliers
  * hardly change it. */
 static sdm_status middle_size(const cli_fit *f, double *size, sdm_error *err)
@@ -143,7 +137,7 @@ static sdm_status middle_size(const cli_fit *f, double *size, sdm_error *err)
     const sdm_status s = SDM_ALLOC(&x, n, "points", err);
     for (size_t a = 0; a < 3 && !s; a++) {
         for (size_t i = 0; i < n; i++) x[i] = f->points[3 * i + a];
-        qsort(x, n, sizeof *x, ascending);
+        cli_sort(x, n);
         square += pow(x[3 * n / 4] - x[n / 4], 2);
     }
     sdm_free(x);

@@ -125,8 +125,5 @@ void cli_print_two(const char *begin, const cli_timing *t);
 sdm_status cli_time_naive(const cli_map_maker *m, uint64_t seed, size_t n, double *ms,
                           double *share, sdm_error *err);
 
-/* Sorts v[n] and returns its median. */
-double cli_median(double *v, size_t n);
-
 /* The smallest of v[n]. */
 double cli_minimum(double *v, size_t n);

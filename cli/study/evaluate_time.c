@@ -1,10 +1,10 @@
 /* Measures the time per map on one core for a network, the exact engine and the naive method. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "evaluate.h"
+#include "measure/median.h"
 #include "report/terminal.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/config.h"
@@ -18,18 +18,6 @@ enum { N_NETWORK = 51, N_MIN = 3, N_EXACT = 9, BATCH = 32, N_BATCHES = 9, NAIVE_
 /* Below this ratio of the times the exact engine is about as fast as the network. */
 #define ABOUT_AS_FAST 2.5
 #define BATCH_BYTES 2e8 /* largest size of the maps of a batch, bytes */
-
-static int compare_reals(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-double cli_median(double *v, size_t n)
-{
-    qsort(v, n, sizeof *v, compare_reals);
-    return n % 2 ? v[n / 2] : 0.5 * (v[n / 2 - 1] + v[n / 2]);
-}
 
 double cli_minimum(double *v, size_t n)
 {

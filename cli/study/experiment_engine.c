@@ -7,6 +7,7 @@
 #include "bench.h"
 #include "bench_programs.h"
 #include "experiment_command.h"
+#include "measure/median.h"
 #include "report/terminal.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/methods.h"

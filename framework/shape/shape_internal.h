@@ -58,7 +58,8 @@ typedef struct host_call {
     const sdm_shape *shape; /* in create(): the table as the instance has it */
     sdm_mesh *mesh;
     bool files;
-    /* the byte of which the arrays of reserve() are full: 0xff, which makes NaN, unless changed */
+    /* reserve() fills the arrays that it gives to mesh() with this byte: by default 0xff, so that a
+     * coordinate that mesh() forgets to write is NaN */
     int fill;
     bool fill_stack; /* reserve() also fills the stack with it, for sdm_shape_repeat() */
     struct host_block *blocks;

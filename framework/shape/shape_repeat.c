@@ -46,12 +46,19 @@ static void count(sdm_repeat *out, sdm_repeat_cause cause, size_t shape)
     out->cause = cause;
 }
 
+/* Makes all meshes again and counts those that are unlike the first ones. */
+static void count_unlike(trial *t, const double *p, size_t n, const uint64_t *first, int fill,
+                         sdm_repeat_cause cause, sdm_repeat *out)
+{
+    for (size_t i = 0; i < n; i++)
+        if (make(t, p + i * t->shape->n_params, fill) != first[i]) count(out, cause, i);
+}
+
 /* Does mesh() read behind the last parameter? Then out->param is the index of the first value. */
 static void read_behind(trial *t, const double *p, size_t n, const uint64_t *first, sdm_repeat *out)
 {
     set_behind(t, OTHER_BEHIND);
-    for (size_t i = 0; i < n; i++)
-        if (make(t, p + i * t->shape->n_params, FILL) != first[i]) count(out, SDM_REPEAT_BEHIND, i);
+    count_unlike(t, p, n, first, FILL, SDM_REPEAT_BEHIND, out);
     set_behind(t, BEHIND);
     if (!out->unlike) return;
     for (out->param = t->shape->n_params; out->param < 2 * SHAPE_PARAMS_MAX - 1; out->param++) {
@@ -60,14 +67,6 @@ static void read_behind(trial *t, const double *p, size_t n, const uint64_t *fir
         t->p[out->param] = BEHIND;
         if (now != first[out->first]) return;
     }
-}
-
-/* Does mesh() use memory that it has not written? */
-static void read_unset(trial *t, const double *p, size_t n, const uint64_t *first, sdm_repeat *out)
-{
-    for (size_t i = 0; i < n; i++)
-        if (make(t, p + i * t->shape->n_params, OTHER_FILL) != first[i])
-            count(out, SDM_REPEAT_UNSET, i);
 }
 
 /* Does the mesh depend on the calls before? */
@@ -143,7 +142,8 @@ sdm_status sdm_shape_repeat(const sdm_instance *s, const double *p, size_t n, sd
     // what depends on the calls before would count as a fault of the other kinds, too
     if (!status) read_history(&t, p, n, first, out);
     if (!status && !out->unlike) read_behind(&t, p, n, first, out);
-    if (!status && !out->unlike) read_unset(&t, p, n, first, out);
+    // does mesh() use memory that it has not written?
+    if (!status && !out->unlike) count_unlike(&t, p, n, first, OTHER_FILL, SDM_REPEAT_UNSET, out);
     for (int i = 0; i < 2; i++) sdm_mesh_dispose(&t.mesh[i]);
     sdm_free(first);
     return status;

@@ -1,6 +1,6 @@
 /* The pose of a fit: motions that the data leave open, a pose or parameter that is kept but wrong,
- * and one that still moves. Tests: convergence.c kept_params.c kept_pose.c open_motions.c
- * pose_params.c source_params.c */
+ * and one that still moves. Tests: convergence.c kept_gain.c kept_params.c kept_pose.c
+ * open_motions.c pose_params.c source_params.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -82,7 +82,9 @@ static sdm_status measure_model(const trainer *t, const sdm_model *m, size_t n, 
     const double voxel = trainer_dataset_voxel(d);
     const float near_mm = (float)sdm_grid_near(d->grid);
     double square = 0, absolute = 0, near = 0, largest = 0, at_surface = 0, dice = 0, dice_min = 1;
-    double far[2] = {0, 0}, largest_at = 0, far_largest = NAN; // far: outside, inside
+    // far from the surface: sums of squares outside and inside, and the largest error
+    double far[2] = {0, 0}, far_largest = NAN;
+    double largest_at = 0; // exact distance where the error is largest
     size_t n_near = 0, n_at_surface = 0, n_far[2] = {0, 0};
     // sum the errors over maps and voxels
     for (size_t i = 0; i < n && !s; i++) {

@@ -27,7 +27,7 @@ int64_t trainer_history_last_step(const history *h);
    fewer than three times in this phase. */
 double trainer_history_fall(const history *h, sdm_phase phase, double floor);
 
-/* Draws loss.png: root mean square errors on training batches and on held-out shapes, and that of
-   the finished model, over the seconds, without a budget of time over the steps. A line tells where
-   the refinement begins, whose batches are others. */
+/* Draws loss.png: the root mean square errors of the training batches, of the held-out shapes, and
+   of the finished model. The axis is the time in seconds; without a budget of time, the step. A
+   line shows where the refinement begins, whose batches are others. */
 sdm_status trainer_history_picture(const trainer *t, const history *h, sdm_error *err);

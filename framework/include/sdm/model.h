@@ -83,7 +83,7 @@ typedef struct sdm_model_quality {
 /* Uses of a model, for sdm_model_check_use(), each with the figure of sdm_model_quality that
    decides. */
 typedef enum sdm_model_use {
-    SDM_USE_SURFACE = 0,           /* surfaces, level sets: grade; "poor" is not for them */
+    SDM_USE_SURFACE = 0,           /* surfaces and level sets: the grade is "poor" */
     SDM_USE_VOLUME = 1,            /* of maps: volume_error > SDM_VOLUME_BAD */
     SDM_USE_DERIVATIVE = 2,        /* of maps: derivative_error > SDM_DERIVATIVE_BAD */
     SDM_USE_VOLUME_DERIVATIVE = 3, /* volume_derivative_error > SDM_DERIVATIVE_BAD */

@@ -10,9 +10,8 @@
 // beside the shape of the data
 #define LOST 0.2
 #define LOST_POINTS 0.5
-// residuals beyond this multiple of their limit have another cause than voxels of the maps
-#define FAR_BEYOND 3.0
-// unless the voxels are longer than this multiple of theirs
+// residuals far beyond their limit have another cause than voxels of the maps, unless these are
+// longer than this multiple of theirs
 #define MUCH_COARSER 2.0
 // from this share on, nearly all contradictions have one sign
 #define NEARLY_ALL 0.8
@@ -68,14 +67,14 @@ static void name_place(const fit_problem *p, const fit_worst_place *worst, char 
              worst->same > NEARLY_ALL ? ", as in nearly all places that deviate" : "");
 }
 
-// the causes of residuals inside the shape, the most probable one first
+// writes why the residuals inside the shape may be too large, the most probable cause first
 static void name_cause(const fit_problem *p, const fit_misfit *m, const fit_suspects *other,
                        char *cause, size_t size)
 {
     const fit_coarseness *coarse = other->coarse;
     const double voxel = fit_longest_edge(&p->maps.grid);
     // voxels that are a little too coarse do not explain residuals far beyond their limit
-    const bool far = other->beyond > FAR_BEYOND && voxel < MUCH_COARSER * coarse->limit;
+    const bool far = other->far && voxel < MUCH_COARSER * coarse->limit;
     if (is_absent(p) && !has_inside_values(p))
         snprintf(cause, size,
                  "the image near the shape holds no values like those given for the inside (mean "

@@ -10,7 +10,7 @@ enum { FIT_PLACE_MAX = 190, FIT_CAUSE_MAX = 510 };
 /* What the other checks say. */
 typedef struct fit_suspects {
     bool refused;  /* the residuals refuse the fit */
-    double beyond; /* the residuals over their limit */
+    bool far;      /* they exceed the multiple of their limit that refuses labels and points */
     bool no_shape; /* image: the fit has not found any shape */
     const fit_coarseness *coarse;
     const fit_at_bounds *bounds;

@@ -188,7 +188,7 @@ static void check_residuals(const fit_problem *p, const fit_misfit *own, const f
     char why[FIT_CAUSE_MAX];
     sdm_fit_residuals_explain(p, m,
                               &(fit_suspects){.refused = refused,
-                                              .beyond = beyond,
+                                              .far = beyond > FAR_BEYOND,
                                               .no_shape = !has_passed(v, SDM_FIT_CHECK_NO_SHAPE),
                                               .coarse = &coarse,
                                               .bounds = bounds},

@@ -68,8 +68,7 @@ void sdm_fit_move_along(const fit_state *from, const double m[6], double angle, 
     for (int k = 0; k < 3; k++) to->translation[k] += angle * shift[k];
 }
 
-// change of the field per mm of motion of the surface, squared
-static double slope_squared(const fit_problem *p, size_t sample)
+double sdm_fit_slope_squared(const fit_problem *p, size_t sample)
 {
     const fit_samples *s = &p->samples;
     const float *shift =
@@ -87,7 +86,7 @@ double sdm_fit_surface_motion(const fit_problem *p, const fit_state *to)
         const double change =
             sdm_fit_maps_at(&p->maps, to, p->samples.world + 3 * i) - p->samples.field[i];
         square += change * change;
-        slope += slope_squared(p, i);
+        slope += sdm_fit_slope_squared(p, i);
     }
     return slope > 0 ? sqrt(square / slope) : 0;
 }

@@ -35,6 +35,10 @@ void sdm_fit_open_motions_describe(const fit_problem *p, char *text, size_t size
  * pose of another. */
 double sdm_fit_surface_motion(const fit_problem *p, const fit_state *to);
 
+/* Square of the change of the field at a sample of the band per mm of motion of the surface along
+ * its normal. */
+double sdm_fit_slope_squared(const fit_problem *p, size_t sample);
+
 /* Eigenvalues, in increasing order, and orthonormal eigenvectors (rows of vector[n][n]) of the
    symmetric matrix a[n][n], n <= 6, which is changed (Jacobi 1846). */
 void sdm_fit_eigen(size_t n, double *a, double *value, double *vector);

@@ -223,8 +223,8 @@ void sdm_config_set_grid(sdm_config *c, const sdm_grid *grid);
  * data.static: auto is the largest number up to 5 with which the grid has at most 256 points, with
  * a budget of time at most 300 for each minute. Where that is below 3, it is 2 along each, and with
  * up to 6 parameters 3 along as many of them, from the first one on, as 750 points in all, or 150
- * for each minute, allow. With more than 9 parameters 2
- * make too many, and there is no static grid. */
+ * for each minute, allow. With more than 9 parameters 2 make too many, and there is no static
+ * grid. */
 int64_t sdm_config_static_count(const sdm_config *c, size_t n_params, size_t i);
 
 /* Puts this number in place of `auto`. */

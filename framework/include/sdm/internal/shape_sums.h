@@ -10,8 +10,8 @@ extern "C" {
 typedef struct sdm_shape_figures {
     double volume, area; /* of sdm_mesh_sums(), mm^3 and mm^2 */
     /* integral of x + 2 y + 4 z + (x (x + y) + 2 y (y + z) + 4 z (z + x)) / sqrt(area) over the
-     * surface, mm^3. Another place of a part, or its mirror image, has another one, except by
-     * chance; other triangles of the same faces have the same. */
+     * surface, mm^3. It changes where a part is moved, turned or mirrored, except by chance; it
+     * stays where the same faces have other triangles. */
     double moment;
 } sdm_shape_figures;
 

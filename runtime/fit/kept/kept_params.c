@@ -6,19 +6,13 @@
 #include <stdio.h>
 
 #include "fit/data/source_params.h"
-#include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
-#include "posterior.h"
+#include "fit/solver/open_motions.h"
+#include "kept_gain.h"
 
-// largest number of iterations, and their eps: a rough maximum is enough
-#define ITERATIONS 25
-#define EPS 1e-3
 // a gain from which on a kept value is doubtful: a true one is four standard deviations off, once
 // in ten thousand times
 #define GAIN_DOUBTFUL 8.0
-// it is refused beyond this gain if the surface moves by more than this part of a voxel of the map
-#define GAIN_MAX 20.0
-#define MOTION_MAX 0.5
 
 /* What the free parameters gain: in log posterior density, as of independent samples; the kept one
  * whose change moves the surface most, by how much, mm rms along the normal, and its value. */
@@ -35,44 +29,25 @@ static double motion_by(const fit_problem *p, size_t k, double change)
     double square = 0, slope = 0;
     for (size_t i = 0; i < s->n; i++) {
         if (s->row[i] == SIZE_MAX) continue;
-        const float *row = s->jacobian + s->row[i] * s->n_columns,
-                    *shift = row + fit_at_translation(p->n_params);
-        square += pow((double)row[k] * change, 2);
-        for (int a = 0; a < 3; a++) slope += pow((double)shift[a], 2);
+        square += pow((double)s->jacobian[s->row[i] * s->n_columns + k] * change, 2);
+        slope += sdm_fit_slope_squared(p, i);
     }
     return slope > 0 ? sqrt(square / slope) : 0;
 }
 
 static sdm_status params_free(fit_problem *p, free_params *out, sdm_error *err)
 {
-    const sdm_fit_opts *given = p->opts;
-    sdm_fit_opts freed = *given;
     const fit_state kept = p->state;
-    double before = 0;
-    const fit_newton_opts newton = {.phase = SDM_FIT_SEARCH,
-                                    .keep_pose = given->keep_pose,
-                                    .keep_blur = given->keep_blur,
-                                    .keep_appearance = given->keep_appearance,
-                                    .max_iterations = ITERATIONS,
-                                    .eps = EPS,
-                                    .max_flat = 2};
-    fit_newton_end end;
-    double weight[FIT_PARAMS_MAX + 6], noise_factor;
+    sdm_fit_opts freed = *p->opts;
     freed.kept = NULL;
-    freed.progress = NULL;
     sdm_status s = sdm_fit_evaluate(p, err); // other checks use the maps, too
-    if (!s) before = sdm_fit_objective(p);
-    p->opts = &freed;
-    if (!s) s = sdm_fit_newton(p, &newton, &end, err);
-    if (!s) s = sdm_fit_weigh_priors(p, weight, &noise_factor, err);
-    if (!s) out->gain = (sdm_fit_objective(p) - before) / noise_factor;
+    if (!s) s = sdm_fit_free(p, &freed, &out->gain, err);
     for (size_t k = 0; k < p->n_params && !s; k++) {
         const double motion =
-            given->kept[k] ? motion_by(p, k, p->state.params[k] - kept.params[k]) : -1;
+            p->opts->kept[k] ? motion_by(p, k, p->state.params[k] - kept.params[k]) : -1;
         if (motion > out->motion)
             out->motion = motion, out->param = k, out->value = p->state.params[k];
     }
-    p->opts = given;
     p->state = kept;
     return s ? s : sdm_fit_evaluate(p, err);
 }
@@ -86,9 +61,9 @@ sdm_status sdm_fit_judge_kept_params(fit_problem *p, sdm_fit_result *r, sdm_erro
     const sdm_status s = params_free(p, &found, &failed);
     if (s == SDM_E_NOMEM || s == SDM_E_CANCELLED) return sdm_fail(err, s, "%s", failed.text);
     if (s || !(found.gain > GAIN_DOUBTFUL)) return SDM_OK;
-    const bool refused =
-        found.gain > GAIN_MAX && found.motion > MOTION_MAX * fit_longest_edge(&p->maps.grid);
-    const double limit = refused ? GAIN_MAX : GAIN_DOUBTFUL;
+    const bool refused = found.gain > FIT_FREE_GAIN_MAX &&
+                         found.motion > FIT_FREE_MOTION_MAX * fit_longest_edge(&p->maps.grid);
+    const double limit = refused ? FIT_FREE_GAIN_MAX : GAIN_DOUBTFUL;
     sdm_fit_finding f = {.kind = SDM_FIT_CHECK_KEPT_PARAMS,
                          .grade = refused ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL,
                          .figure = found.gain,

@@ -69,8 +69,10 @@ static void print_derivatives(const sdm_verdict *v)
         "%s, the worst one)",
         (int)v->derivative_shapes, percent(v->derivative_error, text), v->derivative_by);
     if (isfinite(v->volume_derivative_error))
-        printf(", of volumes by %s %% (by %s)", percent(v->volume_derivative_error, text),
-               v->volume_derivative_by);
+        printf(", of volumes by %s %% (by %s%s)", percent(v->volume_derivative_error, text),
+               v->volume_derivative_by,
+               v->volume_derivatives_small[0] ? "; where they change by less than 5 %, of 5 %"
+                                              : "");
     printf("\n");
 }
 

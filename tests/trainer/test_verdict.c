@@ -626,6 +626,65 @@ static void volumes_and_derivatives(void **state)
     }
 }
 
+// The parameters whose derivatives are too wrong are listed, the worst first; those that hardly
+// change the volume with their own size, and where the sign may be wrong.
+static void lists_of_derivatives(void **state)
+{
+    (void)state;
+    static const sdm_param p[] = {{.name = "a"}, {.name = "b"}, {.name = "c"},
+                                  {.name = "d"}, {.name = "e"}, {.name = "f"}};
+    char text[SDM_VERDICT_LIST];
+    trainer_list_derivatives(p, (double[]){0.3, NAN, 0.1, 0.4, 0.3}, 5, text);
+    assert_string_equal(text, "d: off by 40 %; by a: off by 30 %; by e: off by 30 %");
+    trainer_list_derivatives(p, (double[]){NAN, 0.2}, 2, text);
+    assert_string_equal(text, "");
+    trainer_list_small(p, (double[]){NAN, 0.2}, 2, text);
+    assert_string_equal(text, "");
+    trainer_list_small(p, (double[]){0.1, 0.35}, 2, text);
+    assert_string_equal(text,
+                        "b: off by 35 % of their own size: these parameters hardly change the "
+                        "volume");
+    trainer_list_small(p, (double[]){0.3, INFINITY, 1.4, 0.9, 0.8, 0.7}, 6, text);
+    assert_string_equal(text,
+                        "b: off by over 1000 % of their own size; by c: off by 140 %; by d: off by "
+                        "90 %; by e: off by 80 %; ...: these parameters hardly change the volume, "
+                        "and the sign may be wrong");
+}
+
+// A joint that turns hardly changes the volume: the derivative by it is named with its own size,
+// also in the model.
+static void small_changes_of_the_volume(void **state)
+{
+    (void)state;
+    static const char text[] = "shape: {name: linkage, options: {links: 1}}\n"
+                               "grid: {size: [28, 16, 16], spacing: 0.6, centre: [1, 0, 0]}\n"
+                               "network: {kind: template, depth: 0}\n"
+                               "data: {start: 60, online: 0, holdout: 8, memory_gb: 0.5}\n"
+                               "train: {steps: 10, batch: 64, refine: 0}\n";
+    static const sdm_named_text option = {"links", "1"};
+    static const char begin[] = "q1: off by ";
+    const sdm_config c = parse_config(text, NULL, 0);
+    sdm_instance *shape;
+    sdm_train_report r;
+    sdm_model *m;
+    sdm_error e = {0};
+    run_files_remove();
+    if (sdm_instance_create(sdm_registry_find(registry, "linkage", NULL), &option, 1, NULL, &shape,
+                            &e) ||
+        sdm_train(&c, shape, folder, false, NULL, &r, &e))
+        fail_msg("%s", e.text);
+    const sdm_verdict *v = &r.verdict;
+    if (strncmp(v->volume_derivatives_small, begin, sizeof begin - 1) ||
+        !strstr(v->volume_derivatives_small, "and the sign may be wrong"))
+        fail_msg("%s", v->volume_derivatives_small);
+    assert_string_equal(v->volume_derivatives_bad, "");
+    assert_int_equal(sdm_model_open(r.model_path, &m, NULL), SDM_OK);
+    assert_non_null(
+        strstr(sdm_model_get_info(m)->quality.unfit, "derivatives of the volume by q1: off by "));
+    sdm_model_free(m);
+    sdm_instance_free(shape);
+}
+
 // On coarse voxels a surface encloses too little while its map holds the volume, which the uses
 // tell with the spacing that mends it.
 static void surfaces_lose_volume(void **state)
@@ -736,6 +795,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(surface_of_a_sphere),
         cmocka_unit_test(parts_add_up),
         cmocka_unit_test(volumes_and_derivatives),
+        cmocka_unit_test(lists_of_derivatives),
+        cmocka_unit_test(small_changes_of_the_volume),
         cmocka_unit_test(surfaces_lose_volume),
         cmocka_unit_test(progress_is_true),
     };

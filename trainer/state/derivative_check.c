@@ -12,6 +12,7 @@
 #include "sdm/internal/part_audit.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
+#include "sdm/model.h"
 
 /* Shapes that are compared: so many, unless the number of parameters of all of them together
    exceeds the second, but at least the third. Voxels near the surface of each of them. */
@@ -26,6 +27,9 @@ static const double STEP = 0.005;
 
 /* The least change of the volume over the range of a parameter, over the volume. */
 static const double VOLUME_CHANGE = 0.05;
+
+/* A parameter that changes the volume by a smaller part of it does not change it: rounding. */
+static const double VOLUME_SAME = 1e-6;
 
 static const size_t JACOBIAN_BYTES = 1000000000;
 
@@ -46,6 +50,7 @@ typedef struct shape_beside {
 typedef struct slope_sums {
     double error, size;               // squares: of maps
     double volume_error, volume_size; // of volumes
+    double volume_own, volume_scale;  // exact derivatives; volumes over the range
 } slope_sums;
 
 /* Memory of one check. */
@@ -172,9 +177,11 @@ static void add_slopes(const trainer *t, const check_memory *c, size_t k, double
         sums->size += exact * exact;
     }
     const double exact = (high->volume - low->volume) / over,
-                 least = VOLUME_CHANGE * 0.5 * (high->volume + low->volume) / range;
+                 scale = 0.5 * (high->volume + low->volume) / range, least = VOLUME_CHANGE * scale;
     sums->volume_error += (volume - exact) * (volume - exact);
     sums->volume_size += fmax(exact * exact, least * least);
+    sums->volume_own += exact * exact;
+    sums->volume_scale += scale * scale;
 }
 
 /* Adds up the errors of the derivatives at p; *n counts the shape unless the grid cuts it. */
@@ -207,6 +214,12 @@ static void take_largest(const slope_sums *sums, size_t n, derivative_check *out
         const double slope = sqrt(sums[k].error / sums[k].size),
                      volume = sqrt(sums[k].volume_error / sums[k].volume_size);
         out->slopes[k] = slope, out->volume_slopes[k] = volume;
+        const double change = sqrt(sums[k].volume_own / sums[k].volume_scale);
+        // of a parameter that changes nothing any error is infinitely large
+        const double none = volume > SDM_DERIVATIVE_BAD ? INFINITY : NAN;
+        out->volume_own[k] =
+            change > VOLUME_SAME ? sqrt(sums[k].volume_error / sums[k].volume_own) : none;
+        out->volume_small[k] = change < VOLUME_CHANGE;
         if (!(slope <= out->slope) && isfinite(slope)) out->slope = slope, out->slope_param = k;
         if (!(volume <= out->volume_slope) && isfinite(volume))
             out->volume_slope = volume, out->volume_slope_param = k;

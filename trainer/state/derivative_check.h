@@ -16,6 +16,11 @@ typedef struct derivative_check {
     size_t slope_param, volume_slope_param;
     /* the same of every parameter */
     double slopes[SDM_POD_MAX_PARAMS], volume_slopes[SDM_POD_MAX_PARAMS];
+    /* Of the derivative of the volume, over its own root mean square alone, however small. Where
+       the parameter does not change the volume: infinite if the figure above exceeds
+       SDM_DERIVATIVE_BAD, else NaN. */
+    double volume_own[SDM_POD_MAX_PARAMS];
+    bool volume_small[SDM_POD_MAX_PARAMS]; /* it changes it by less than 5 % over its range */
 } derivative_check;
 
 /* Measures m on 32 shapes; of more than twelve parameters, or when a twentieth of a budget of time

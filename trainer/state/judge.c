@@ -352,26 +352,6 @@ static void set_parts(const error_measures *m, const model_errors *errors, doubl
     }
 }
 
-/* text[size] = the parameters p[n] whose errors exceed SDM_DERIVATIVE_BAD, the worst first. */
-static void list_bad(const sdm_param *p, const double *error, size_t n, char *text, size_t size)
-{
-    size_t used = 0;
-    double last = INFINITY;
-    for (;;) {
-        size_t worst = n;
-        for (size_t k = 0; k < n; k++)
-            if (error[k] < last && (worst == n || error[k] > error[worst])) worst = k;
-        if (worst == n || !(error[worst] > SDM_DERIVATIVE_BAD)) return;
-        last = error[worst];
-        char one[112];
-        const int length = snprintf(one, sizeof one, "%s%.60s: off by %.0f %%", used ? "; by " : "",
-                                    p[worst].name, 100 * last);
-        const bool fits = used + (size_t)length + sizeof "; ..." <= size;
-        used += (size_t)snprintf(text + used, size - used, "%s", fits ? one : "; ...");
-        if (!fits) return;
-    }
-}
-
 static void set_derivatives(const trainer *t, const derivative_check *c, sdm_verdict *v)
 {
     size_t n;
@@ -379,10 +359,16 @@ static void set_derivatives(const trainer *t, const derivative_check *c, sdm_ver
     v->derivative_shapes = (int64_t)c->shapes;
     v->derivative_error = c->slope;
     v->volume_derivative_error = c->volume_slope;
-    list_bad(p, c->slopes, isfinite(c->slope) ? n : 0, v->derivatives_bad,
-             sizeof v->derivatives_bad);
-    list_bad(p, c->volume_slopes, isfinite(c->volume_slope) ? n : 0, v->volume_derivatives_bad,
-             sizeof v->volume_derivatives_bad);
+    if (isfinite(c->slope)) trainer_list_derivatives(p, c->slopes, n, v->derivatives_bad);
+    if (isfinite(c->volume_slope)) {
+        double large[SDM_POD_MAX_PARAMS], small[SDM_POD_MAX_PARAMS];
+        for (size_t k = 0; k < n; k++) {
+            large[k] = c->volume_small[k] ? NAN : c->volume_own[k];
+            small[k] = c->volume_small[k] ? c->volume_own[k] : NAN;
+        }
+        trainer_list_derivatives(p, large, n, v->volume_derivatives_bad);
+        trainer_list_small(p, small, n, v->volume_derivatives_small);
+    }
     if (isfinite(c->slope))
         snprintf(v->derivative_by, sizeof v->derivative_by, "%.60s", p[c->slope_param].name);
     if (isfinite(c->volume_slope))

@@ -59,7 +59,8 @@ typedef struct sdm_model_quality {
        a short training, fewer), and for the parameter for which they are largest: of the
        derivatives of the map within half a voxel of the surface, and of the derivative of the
        volume, where a parameter that changes the volume by less than 5 % over its range counts as
-       if it changed it by 5 %. */
+       if it changed it by 5 %: `unfit` names those whose derivative is wrong beside its own size.
+     */
     double volume_error, derivative_error, volume_derivative_error;
     /* as volume_error, of the volume inside the surface of a map (sdm_isosurface()): edges and thin
        walls between the voxels are cut */

@@ -43,6 +43,9 @@ typedef enum sdm_cause {
     SDM_CAUSES
 } sdm_cause;
 
+/* Size of a list of parameters in a verdict. */
+enum { SDM_VERDICT_LIST = 320 };
+
 typedef struct sdm_verdict {
     double voxel_mm;               /* smallest spacing of the grid */
     double rmse_mm, rmse_voxel_mm; /* of all voxels; of those within a voxel of the surface */
@@ -80,8 +83,11 @@ typedef struct sdm_verdict {
     int64_t derivative_shapes;                        /* on which derivatives were measured */
     char derivative_by[64], volume_derivative_by[64]; /* names of these parameters; "": none */
     /* all parameters whose errors exceed SDM_DERIVATIVE_BAD, the worst first, as "a: off by 32 %;
-       by b: off by 24 %"; cut where they are too many */
-    char derivatives_bad[256], volume_derivatives_bad[256];
+       by b: off by 24 %"; cut where they are too many. Of the volume: of the parameters that
+       change it by at least 5 % over their range; the others have their own list, with their errors
+       over the size of their derivatives, however small. */
+    char derivatives_bad[SDM_VERDICT_LIST], volume_derivatives_bad[SDM_VERDICT_LIST],
+        volume_derivatives_small[SDM_VERDICT_LIST];
     /* a parameter that changes the numbers of vertices or the triangles of the mesh, so that
        vertices do not correspond; "": none was found */
     char triangles_by[64];

@@ -592,6 +592,40 @@ static void tell_apart(teller *t)
     sdm_mesh_dispose(&mesh);
 }
 
+/* Two parts that meet in some of the shapes: where they begin to, and which parameter decides. */
+static void tell_meeting(teller *t)
+{
+    const sdm_survey_meeting *c = &t->s->found.meeting;
+    const sdm_survey_count first = {.worst = c->shape[1]};
+    sdm_part_audit audit = {0};
+    sdm_text text = {0};
+    if (!c->pairs) return;
+    if (audit_worst(t, &first, &audit) && c->part[1] < audit.n) {
+        for (int i = 0; i < 2; i++) {
+            sdm_text_add(&text, "%s", i ? "and " : "");
+            cli_name_part(&audit, c->part[i], &text);
+        }
+        sdm_text_add(&text, "meet in %zu of %zu shapes and lie apart in the others: ", c->meet,
+                     c->meet + c->apart);
+        const char *name = sdm_instance_params(t->s->shape, NULL)[c->param].name;
+        if (10 * c->odd <= c->meet + c->apart) {
+            sdm_text_add(&text, "'%s' decides, they meet %s about %s=%.3g", name,
+                         c->below ? "up to" : "from", name, c->value);
+        } else {
+            sdm_text_add(&text, "they meet at ");
+            add_params(t->s, c->shape[1], SIZE_MAX, &text);
+            sdm_text_add(&text, ", not at ");
+            add_params(t->s, c->shape[0], SIZE_MAX, &text);
+        }
+        if (c->pairs > 1) sdm_text_add(&text, "; so do %zu other pairs of parts", c->pairs - 1);
+        sdm_text_add(&text,
+                     "; the surface joins or splits there, where a network errs most: if this is "
+                     "not meant, narrow the ranges");
+        tell(t, SDM_OK, &text);
+    }
+    sdm_part_audit_dispose(&audit);
+}
+
 static void tell_notes(teller *t)
 {
     const sdm_shape_survey *f = &t->s->found;
@@ -678,6 +712,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_callbacks(&t);
     tell_notes(&t);
     tell_apart(&t);
+    tell_meeting(&t);
     tell_untested(&t);
     return t.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the findings") : SDM_OK;
 }

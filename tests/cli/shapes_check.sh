@@ -25,6 +25,10 @@ has '^but 21 of 21 shapes have parts that meet no other part .*: if they are mea
 expect 0 - sdmgen shapes check faulty -O fault=within --plugin "$plugin" --samples 16
 has '^note +parts that meet no other part .*: part 2 of 2 \(12 triangles, .*\) lies inside part 1 and changes nothing; if it is to be a cavity, reverse'
 
+# Parts that meet in some shapes only: a note, with the parameter that decides.
+expect 0 - sdmgen shapes check faulty -O fault=meets --plugin "$plugin" --samples 64
+has "^note +part 1 of 2 \(12 triangles, .*\) and part 2 of 2 \(.*\) meet in [0-9]+ of 69 shapes and lie apart in the others: 'reach' decides, they meet up to about reach=1\.[56][0-9]*; the surface joins or splits there, where a network errs most"
+
 # faulty FAULT CODE PATTERN: the finding is a line of the output.
 faulty() {
     local word=warning

@@ -19,7 +19,8 @@ static const sdm_option FAULTY_OPTIONS[] = {
     {"fault", SDM_OPTION_CHOICE, "", 0, 0, 0,
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
-     "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset",
+     "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
+     "meets",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -131,7 +132,9 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     // 1.75 counts, and nothing but that
     const double half = !strcmp(fault, "wall") ? p[0] - 1.75 : 0.25,
                  reach = strcmp(fault, "step") ? p[1] : 1 + (p[1] > 1.75);
-    const double begin = p[0] + (strcmp(fault, "apart") ? -0.5 : 0.5);
+    // `meets`: the handle meets the body up to a reach of 1.6
+    const double begin =
+        !strcmp(fault, "meets") ? p[0] + reach - 1.6 : p[0] + (strcmp(fault, "apart") ? -0.5 : 0.5);
     double handle[2][3] = {{begin, -half, -half + shift}, {p[0] + reach, half, half + shift}};
     if (!strcmp(fault, "within")) handle[0][0] -= 1, handle[1][0] -= 2.2;
     if (!strcmp(fault, "twins")) memcpy(handle, body, sizeof handle);
@@ -163,13 +166,14 @@ static int faulty_velocity(const void *self, const sdm_host *host, const sdm_opt
                            const double *p, size_t n_vert, double *velocity)
 {
     (void)self, (void)host, (void)p;
-    const int wrong = !strcmp(options[0].text, "velocity");
+    const int wrong = !strcmp(options[0].text, "velocity"),
+              moves = !strcmp(options[0].text, "meets"); // both ends of the handle
     memset(velocity, 0, 6 * n_vert * sizeof *velocity);
     for (size_t v = 0; v < n_vert; v++) {
         for (size_t d = 0; d < 3 && v < 8; d++) velocity[3 * v + d] = v >> d & 1 ? 1 : -1;
         if (v < 8) continue;
         velocity[3 * v] = 1;
-        velocity[3 * (n_vert + v)] = v & 1 ? (wrong ? 1.01 : 1) : 0;
+        velocity[3 * (n_vert + v)] = moves || v & 1 ? (wrong ? 1.01 : 1) : 0;
     }
     return 0;
 }

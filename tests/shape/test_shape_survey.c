@@ -1,6 +1,6 @@
 /* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
  * known from the source; shapes without faults pass.
- * Tests: shape_survey.c survey_fold.c survey_line.c survey_repeat.c
+ * Tests: shape_survey.c survey_fold.c survey_line.c survey_meeting.c survey_repeat.c
  * survey_scale.c survey_swing.c units.c */
 #include <math.h>
 #include <setjmp.h>
@@ -49,6 +49,32 @@ static sdm_shape_survey survey_with(const char *fault, const sdm_survey_opts *op
 static sdm_shape_survey survey(const char *fault)
 {
     return survey_with(fault, &(sdm_survey_opts){.samples = 32, .seed = 1});
+}
+
+// The handle of `meets` meets the body up to a reach of 1.6, and is apart beyond: the survey names
+// the pair, the parameter and about the value. A handle that always meets it, or never, is none.
+static void parts_begin_to_meet(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("meets");
+    const sdm_survey_meeting *m = &s.meeting;
+    size_t meet = 0;
+    for (size_t i = 0; i < s.n; i++) meet += s.p[2 * i + 1] < 1.6;
+    assert_int_equal(m->pairs, 1);
+    assert_true(m->part[0] == 0 && m->part[1] == 1);
+    assert_int_equal(m->meet, meet);
+    assert_int_equal(m->apart, s.n - meet);
+    assert_true(m->param == 1 && m->below && m->odd == 0);
+    if (!(fabs(m->value - 1.6) < 0.05)) fail_msg("at %g", m->value);
+    assert_true(s.p[2 * m->shape[1] + 1] < 1.6 && s.p[2 * m->shape[0] + 1] > 1.6);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_OK);
+    sdm_shape_survey_dispose(&s);
+    static const char *const others[] = {"none", "apart", "within"};
+    for (size_t i = 0; i < 3; i++) {
+        s = survey(others[i]);
+        assert_int_equal(s.meeting.pairs, 0);
+        sdm_shape_survey_dispose(&s);
+    }
 }
 
 /* Number of the shapes with size > 2. */
@@ -474,6 +500,7 @@ static void built_in_shapes_pass(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(parts_begin_to_meet),
         cmocka_unit_test(without_faults),
         cmocka_unit_test(parts_that_are_inside_out),
         cmocka_unit_test(broken_meshes),

@@ -149,6 +149,13 @@ static void measure_parts(job *j)
     }
 }
 
+/* Notes that a triangle of part a meets one of part b, another one. */
+static void count_meeting(sdm_part_audit *out, uint32_t a, uint32_t b)
+{
+    out->part[a].met++;
+    if (b < SDM_PART_MEETS) out->part[a].meets |= (uint32_t)1 << b;
+}
+
 /* Counts the triangles of edge e that lie beside those of another part. */
 static void count_shared_edge(job *j, const sdm_edge *e)
 {
@@ -156,8 +163,8 @@ static void count_shared_edge(job *j, const sdm_edge *e)
     for (uint32_t h = next[e->first]; h != SDM_NONE; h = next[h]) {
         const uint32_t other = j->part_of[h / 3];
         if (other == part) continue;
-        j->out->part[part].met++;
-        j->out->part[other].met++;
+        count_meeting(j->out, part, other);
+        count_meeting(j->out, other, part);
     }
 }
 
@@ -181,7 +188,7 @@ static void count_edges_and_contacts(job *j)
                        b = j->part_of[contacts->list[i].other];
         if (a == NO_PART || b == NO_PART) continue;
         if (a != b)
-            j->out->part[a].met++;
+            count_meeting(j->out, a, b);
         else if (contacts->list[i].tri < contacts->list[i].other) // the list has each pair twice
             j->out->part[a].crossed++;
     }

@@ -14,6 +14,7 @@
 #include "sdm/memory.h"
 #include "survey_fold.h"
 #include "survey_line.h"
+#include "survey_meeting.h"
 #include "survey_repeat.h"
 #include "survey_scale.h"
 
@@ -39,6 +40,7 @@ typedef struct finding {
     double turned_over;  /* the largest of sdm_part.folded */
     double thick;        /* of the thinnest part, mm; NaN: not known */
     double beyond[3][2]; /* mm */
+    survey_contacts contacts;
 } finding;
 
 /* ---- parameters ---- */
@@ -121,6 +123,7 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
         out->winding = fmax(out->winding, sdm_survey_part_winding(&audit, i));
         out->turned_over = fmax(out->turned_over, audit.part[i].folded);
     }
+    sdm_survey_contacts(&audit, &out->contacts);
     out->thick = sdm_part_audit_thickness(&audit);
     out->inside_out = audit.inside_out;
     out->overlaps = audit.mesh.self_intersections;
@@ -308,6 +311,27 @@ static void sum_up(survey *v)
 }
 
 /* ---- what a brief survey leaves out ---- */
+
+/* Looks for parts that meet in some of the shapes with the triangles of the first one only. */
+static sdm_status find_meeting(survey *v, sdm_error *err)
+{
+    sdm_shape_survey *s = v->out;
+    const finding *first = &v->found[0];
+    survey_contacts *contacts = NULL;
+    const sdm_status status = SDM_ALLOC(&contacts, s->n, "parts that meet", err);
+    if (status) return status;
+    for (size_t i = 0; i < s->n; i++) {
+        const finding *f = &v->found[i];
+        const bool same = !f->status && !f->open && f->n_vert == first->n_vert &&
+                          f->n_tri == first->n_tri && f->crc_tri == first->crc_tri &&
+                          f->contacts.n == first->contacts.n;
+        if (same) contacts[i] = f->contacts;
+    }
+    const sdm_status found =
+        sdm_survey_find_meeting(contacts, s->n, s->p, s->n_params, &s->meeting, err);
+    sdm_free(contacts);
+    return found;
+}
 
 static sdm_status find_fold(void *user, size_t i, sdm_mesh *mesh, sdm_error *err)
 {
@@ -501,7 +525,8 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
     if (!s) s = run(opts, n_threads, "shapes", out->n, examine_one, &v, err);
     if (!s) sum_up(&v);
     if (!s && !opts->brief && out->failed.shapes < out->n - out->untested) {
-        s = find_folds(&v, n_threads, err);
+        s = find_meeting(&v, err);
+        if (!s) s = find_folds(&v, n_threads, err);
         if (!s) s = follow_lines(&v, n_threads, err);
         if (!s) s = compare_velocities(&v, err);
         if (!s) s = repeat(&v, n_threads, err);

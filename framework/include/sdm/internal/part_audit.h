@@ -27,6 +27,9 @@ typedef enum sdm_part_state {
     SDM_PART_OPEN        /* it has open or badly oriented edges */
 } sdm_part_state;
 
+/* Of so many parts it is known which of them meet. */
+enum { SDM_PART_MEETS = 32 };
+
 typedef struct sdm_part {
     size_t n_tri, first_tri;      /* number of triangles; lowest index of one */
     size_t first_vert, last_vert; /* lowest and highest index of a vertex */
@@ -35,6 +38,7 @@ typedef struct sdm_part {
     double open_at[3]; /* middle of the first of them, mm */
     size_t met; /* pairs of a triangle of this part and a triangle of another that meet or share an
                    edge */
+    uint32_t meets;        /* bit k: it meets part k, for the first SDM_PART_MEETS parts */
     size_t crossed;        /* pairs of triangles of this part that meet */
     double volume, area;   /* signed, mm^3, as given; mm^2 */
     double min[3], max[3]; /* bounding box, mm */

@@ -56,6 +56,20 @@ typedef struct sdm_survey_jump {
     double mm;     /* JUMP: how far */
 } sdm_survey_jump;
 
+/* Two parts that meet in some of the shapes and lie apart in others: the union joins or splits in
+ * between. */
+typedef struct sdm_survey_meeting {
+    size_t pairs;       /* pairs of parts of which this is so; 0: none, and no more is known */
+    size_t part[2];     /* the pair that changes most often */
+    size_t meet, apart; /* in so many shapes they meet, and are apart */
+    size_t shape[2]; /* index of the first shape in which they are apart, and in which they meet */
+    /* The parameter that decides: in all but `odd` of these shapes they meet if it is below `value`
+     * (below: true), or above. */
+    size_t param, odd;
+    double value;
+    bool below;
+} sdm_survey_meeting;
+
 /* How large the shapes are, and whether they look like shapes in another unit than mm. */
 typedef struct sdm_survey_scale {
     double size;   /* longest edge of the box of all shapes, mm */
@@ -145,6 +159,7 @@ typedef struct sdm_shape_survey {
     sdm_repeat repeat;
 
     /* what a brief survey leaves out */
+    sdm_survey_meeting meeting;
     /* corners and the first samples in which triangles have turned over within a sixteenth of the
      * straight way from shape 0: walls pass through each other; amount: the share of these
      * triangles of the area, which is above SDM_SURVEY_FOLD_MIN, or, where a part of the shape

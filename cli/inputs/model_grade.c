@@ -63,7 +63,8 @@ void cli_print_quality(const sdm_model_info *m)
             "by %.5f mm RMS\n",
             q->between_mm);
     if (!isnan(q->thickness_mm))
-        cli_print("             the thinnest part of the held-out shapes is %.2g mm thick\n",
+        cli_print("             the thinnest part of a few held-out shapes is %.2g mm thick; "
+                  "at the ends of the ranges it may be thinner\n",
                   q->thickness_mm);
     if (!isnan(q->volume_error))
         cli_print("             volumes of maps are off by %.3g %%\n", 100 * q->volume_error);

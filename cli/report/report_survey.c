@@ -422,7 +422,7 @@ static void tell_thin(teller *t)
     if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
         cli_describe_thin(&audit, sdm_part_audit_thinnest(&audit), sdm_grid_coarsest(t->s->grid),
                           &text);
-        sdm_text_add(&text, " (at ");
+        sdm_text_add(&text, " (the thinnest of all, at ");
         add_params(t->s, c->worst, SIZE_MAX, &text);
         sdm_text_add(&text, "; parts are too thin ");
         add_share(t->s, c, &text);

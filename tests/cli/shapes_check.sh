@@ -94,7 +94,7 @@ expect 0 "^sdmgen: warning: $large$" sdmgen config good.yaml 'grid.size=[62,78,7
 # The handle is 0.5 mm thick.
 thin='part 2 of 2 \(box [^a-z]* mm\) is 0\.5 mm thick, too thin for voxels of 0\.5 mm: it will be missing or broken in surfaces; a spacing of at most 0\.25 mm shows it'
 expect 4 mend sdmgen shapes check good.yaml grid.spacing=0.5 grid.size=[25,17,17] --plugin "$plugin" --samples 16
-has "^warning +$thin \(at size=.*; parts are too thin in all 21 shapes\)$"
+has "^warning +$thin \(the thinnest of all, at size=.*; parts are too thin in all 21 shapes\)$"
 expect 0 "^sdmgen: warning: $thin" sdmgen config good.yaml grid.spacing=0.5 grid.size=[25,17,17] --plugin "$plugin" -q
 expect 0 "^sdmgen: warning: $thin$" sdmgen exact --shape faulty --plugin "$plugin" --spacing 0.5 -o thin.nrrd -q
 

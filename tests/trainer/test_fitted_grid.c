@@ -177,7 +177,7 @@ static void test_thin(void **state)
     const double fine = c[0].grid.spacing[0], usual = c[1].grid.spacing[0];
     assert_true(c[1].grid.n[0] <= 60 && 3 * usual > 0.5);
     assert_true(c[0].grid.n[0] <= 96 && 3 * fine < 0.42);
-    assert_non_null(strstr(line.data, "because the thinnest part is 0.4"));
+    assert_non_null(strstr(line.data, "because the thinnest part of 8 random shapes is 0.4"));
     assert_true(c[2].grid.spacing[0] > fine && c[2].grid.spacing[0] < usual);
     sdm_text_dispose(&line);
     sdm_instance_free(plate);

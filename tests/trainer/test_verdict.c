@@ -337,8 +337,8 @@ static void uses_and_spacing(void **state)
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "volumes of maps: off by 12 %\n"
                                "its thinnest part and volumes of surfaces (.stl): it is 1 mm "
-                               "thick, too thin for voxels of 0.8 mm, and will be missing or "
-                               "broken; grid.spacing 0.5 shows it\n"
+                               "thick in a few held-out shapes, too thin for voxels of 0.8 mm, "
+                               "and will be missing or broken; grid.spacing 0.5 shows it\n"
                                "derivatives of maps by r: off by 32 %\n");
     v.volume_error = NAN;
     v.grade = SDM_GRADE_USABLE, v.thickness_mm = 1;

@@ -117,9 +117,9 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
                  f.low[0], f.high[0], f.low[1], f.high[1], f.low[2], f.high[2]);
     if (finer)
         sdm_text_add(line,
-                     "; voxels of %.3g mm in place of %.3g, because the thinnest part is %.2g mm "
-                     "thick (grid.voxels: %d for the coarser grid)",
-                     grid.spacing[0], usual, thick, SDM_GRID_VOXELS);
+                     "; voxels of %.3g mm in place of %.3g, because the thinnest part of %d random "
+                     "shapes is %.2g mm thick (grid.voxels: %d for the coarser grid)",
+                     grid.spacing[0], usual, THIN_SAMPLES, thick, SDM_GRID_VOXELS);
     return line->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
 }
 

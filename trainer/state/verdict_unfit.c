@@ -61,7 +61,8 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
         add(l, "volumes of maps: off by %s %%", percent(v->volume_error, text));
     if (sdm_verdict_lacks_part(v))
         add(l,
-            "its thinnest part and volumes of surfaces (.stl): it is %.2g mm thick, too thin for "
+            "its thinnest part and volumes of surfaces (.stl): it is %.2g mm thick in a few "
+            "held-out shapes, too thin for "
             "voxels of %.3g mm, and will be missing or broken; grid.spacing %.2g shows it",
             v->thickness_mm, v->coarse_mm, spacing);
     else if (sdm_verdict_surfaces_off(v) && spacing < v->coarse_mm)

@@ -370,6 +370,9 @@ sdm_status cli_check_trained(const cli_args *args, const sdm_model *m, const sdm
     for (size_t i = 0; i < n && s; i++)
         if (!isfinite(values[i])) return s; // no policy accepts it
     if (!s || !err) return s;
+    for (size_t i = 0; i < n; i++)
+        if (*sdm_unit_question(values[i], params[i].min, params[i].max, params[i].unit))
+            return s; // the unit is to be mended, not the policy
     const char *exact = exact_allows(args, m, values, &known)
                             ? ", --policy exact computes exact maps"
                         : known ? "; the range of the shape itself does not hold it either"

@@ -101,14 +101,34 @@ const char *sdm_format_real(double v, char buf[32])
     return buf;
 }
 
+/* Does the value lie in the range, or outside by at most half of its ends? */
+static bool is_near_range(double value, double min, double max)
+{
+    const double around = 0.5 * fmin(fabs(min), fabs(max));
+    return value >= min - around && value <= max + around;
+}
+
+const char *sdm_unit_question(double value, double min, double max, const char *unit)
+{
+    const double size = fabs(value), low = fmin(fabs(min), fabs(max)),
+                 high = fmax(fabs(min), fabs(max));
+    if (strcmp(unit, "mm") || (value >= min && value <= max)) return "";
+    if (size < 0.01 * low && is_near_range(1e3 * value, min, max))
+        return "; was it given in metres? It needs mm";
+    if (size > 100 * high && is_near_range(1e-3 * value, min, max))
+        return "; was it given in micrometres? It needs mm";
+    return "";
+}
+
 sdm_status sdm_fail_range(const char *name, double value, double min, double max, const char *unit,
                           sdm_error *err)
 {
     char v[32], low[32], high[32];
     const char *space = *unit ? " " : "";
-    return sdm_fail(err, SDM_E_RANGE, "parameter '%s' = %s%s%s, allowed %s .. %s%s%s", name,
+    return sdm_fail(err, SDM_E_RANGE, "parameter '%s' = %s%s%s, allowed %s .. %s%s%s%s", name,
                     isnan(value) ? "nan" : sdm_format_real(value, v), space, unit,
-                    sdm_format_real(min, low), sdm_format_real(max, high), space, unit);
+                    sdm_format_real(min, low), sdm_format_real(max, high), space, unit,
+                    sdm_unit_question(value, min, max, unit));
 }
 
 #define WORD_MAX 64

@@ -69,7 +69,9 @@ static sdm_status refuse_param(const sdm_model_param *p, double value, sdm_error
 {
     sdm_error range = {0};
     sdm_fail_range(p->name, value, p->min, p->max, p->unit, &range);
-    if (!isfinite(value)) return sdm_fail(err, SDM_E_RANGE, "%s", range.text); // for all policies
+    // for all policies; and who gave another unit needs no policy
+    if (!isfinite(value) || *sdm_unit_question(value, p->min, p->max, p->unit))
+        return sdm_fail(err, SDM_E_RANGE, "%s", range.text);
     return sdm_fail(err, SDM_E_RANGE,
                     "%s, the trained range; sdm_generate_opts.policy clamp moves it into the "
                     "range, exact computes exact maps where the shape allows them",

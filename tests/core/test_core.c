@@ -198,6 +198,33 @@ static void range_mistakes_have_one_text(void **state)
     sdm_fail_range("b", NAN, -1, 0.25, "", &err);
     assert_string_equal(err.text, "parameter 'b' = nan, allowed -1 .. 0.25");
     assert_int_equal(sdm_fail_range("b", INFINITY, -1, 0.25, "", NULL), SDM_E_RANGE);
+    sdm_fail_range("a", 0.0042, 2, 5, "mm", &err);
+    assert_string_equal(err.text, "parameter 'a' = 0.0042 mm, allowed 2 .. 5 mm; was it given in "
+                                  "metres? It needs mm");
+}
+
+/* A length that is a thousand times too small or too large may be in another unit. */
+static void another_unit_is_asked_for(void **state)
+{
+    (void)state;
+    static const double metres[][3] = {{0.003, 2, 5},
+                                       {0.006, 2, 5},
+                                       {0.0015, 2, 5},
+                                       {-3e-3, -5, -2}},
+                        micrometres[][3] = {{3000, 2, 5}, {-3000, -5, 5}},
+                        neither[][3] = {{0.03, 2, 5}, {3e-4, 2, 5},  {50, 2, 5},  {5.5, -5, 5},
+                                        {3, 2, 5},    {1e300, 2, 5}, {NAN, 2, 5}, {INFINITY, 2, 5}};
+    for (size_t k = 0; k < 4; k++)
+        assert_non_null(
+            strstr(sdm_unit_question(metres[k][0], metres[k][1], metres[k][2], "mm"), "in metres"));
+    for (size_t k = 0; k < 2; k++)
+        assert_non_null(
+            strstr(sdm_unit_question(micrometres[k][0], micrometres[k][1], micrometres[k][2], "mm"),
+                   "in micrometres"));
+    for (size_t k = 0; k < sizeof neither / sizeof *neither; k++)
+        assert_string_equal(sdm_unit_question(neither[k][0], neither[k][1], neither[k][2], "mm"),
+                            "");
+    assert_string_equal(sdm_unit_question(0.003, 2, 5, "rad"), "");
 }
 
 static void json_text_is_escaped(void **state)
@@ -410,6 +437,7 @@ int main(void)
         cmocka_unit_test(crc_known_answer),
         cmocka_unit_test(numbers_and_names_are_parsed),
         cmocka_unit_test(range_mistakes_have_one_text),
+        cmocka_unit_test(another_unit_is_asked_for),
         cmocka_unit_test(json_text_is_escaped),
         cmocka_unit_test(files_are_written_whole_or_not),
         cmocka_unit_test(thread_counts_are_limited),

@@ -125,6 +125,23 @@ static void test_capsule(void **state)
     run_files_remove();
 }
 
+// A spacing in metres would make more voxels than any computer holds.
+static void test_metres(void **state)
+{
+    (void)state;
+    sdm_config c;
+    sdm_error e = {0};
+    read_config(&c, "grid: {spacing: 0.0002}");
+    assert_int_equal(sdm_train_complete(&c, capsule, NULL, &e), SDM_E_CONFIG);
+    assert_non_null(strstr(e.text, "test.yaml: grid.spacing is 0.0002 mm, and the shape is "));
+    assert_non_null(strstr(e.text, "Give the spacing in mm (0.2, if it was given in metres), or "));
+    assert_non_null(strstr(e.text, "grid.voxels"));
+    // finer than any unit explains
+    read_config(&c, "grid: {spacing: 0.000001}");
+    assert_int_equal(sdm_train_complete(&c, capsule, NULL, &e), SDM_E_CONFIG);
+    assert_null(strstr(e.text, "metres"));
+}
+
 static const sdm_param PLATE[] = {{"thick", "mm", 0.4, 0.5, 0.45, "thickness"}};
 
 /* A plate of 10 mm x 10 mm. */
@@ -311,13 +328,10 @@ static void test_proposal(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_around),
-        cmocka_unit_test(test_capsule),
-        cmocka_unit_test(test_thin),
-        cmocka_unit_test(test_faces),
-        cmocka_unit_test(test_surplus),
-        cmocka_unit_test(test_proposal),
-        cmocka_unit_test(test_faces_on_planes),
+        cmocka_unit_test(test_around),   cmocka_unit_test(test_capsule),
+        cmocka_unit_test(test_metres),   cmocka_unit_test(test_thin),
+        cmocka_unit_test(test_faces),    cmocka_unit_test(test_surplus),
+        cmocka_unit_test(test_proposal), cmocka_unit_test(test_faces_on_planes),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,5 +1,6 @@
 /* The grid that is fitted to the shapes of a configuration. */
 #include <math.h>
+#include <stdio.h>
 
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/text.h"
@@ -12,6 +13,9 @@ enum { BOX_SAMPLES = 256, THIN_SAMPLES = 8, FACE_SAMPLES = 8, BOX_SEED = 1 };
  * training cost as much as there are voxels. */
 enum { VOXELS_MOST = 96 };
 static const double COUNT_MOST = 4e5;
+
+/* Most voxels of any fitted grid: a map of floats has 8 GB then. */
+static const double COUNT_LIMIT = 2e9;
 
 /* Most voxels of a grid that is proposed with the spacing of the configuration. */
 static const double PROPOSED_MAX = 2.5e6;
@@ -87,6 +91,31 @@ static void add_keys(sdm_text *out, const sdm_grid *g)
     add_three(out, g->origin);
 }
 
+/* Refuses a spacing that makes more voxels than COUNT_LIMIT in the box of the
+ * shapes: most often it is in metres. */
+static sdm_status check_spacing(const sdm_config *config, const family *f, sdm_error *err)
+{
+    const double *h = config->grid.spacing;
+    double voxels = 1, longest = 0, count = 0, finest = h[0];
+    for (int i = 0; i < 3; i++) {
+        const double edge = f->high[i] - f->low[i];
+        voxels *= ceil(edge / h[i]) + 1 + 2 * SDM_GRID_MARGIN;
+        longest = fmax(longest, edge);
+        count = fmax(count, edge / h[i]);
+        finest = fmin(finest, h[i]);
+    }
+    if (voxels <= COUNT_LIMIT) return SDM_OK;
+    char metres[64] = "";
+    const double as_metres = count / 1e3;
+    if (as_metres >= 4 && as_metres <= 1000)
+        snprintf(metres, sizeof metres, " (%.3g, if it was given in metres)", 1e3 * finest);
+    return sdm_fail(err, SDM_E_CONFIG,
+                    "%s: grid.spacing is %.3g mm, and the shape is %.3g mm long: that would be "
+                    "%.2g voxels, at most %.0g are possible. Give the spacing in mm%s, or "
+                    "grid.voxels, the number along the longest edge",
+                    config->file, finest, longest, voxels, COUNT_LIMIT, metres);
+}
+
 sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm_text *line,
                               sdm_error *err)
 {
@@ -99,6 +128,7 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
     family f;
     sdm_grid grid;
     sdm_status s = find_family(config, shape, &f, err);
+    if (!s && spacing) s = check_spacing(config, &f, err);
     if (s) return s;
     s = sdm_grid_around(f.low, f.high, config->grid_voxels, spacing, &grid, err);
     if (s) return sdm_fail_in(err, SDM_E_CONFIG, "%s: grid", config->file);

@@ -56,8 +56,12 @@ SDM_INTERNAL_API const char *sdm_comma_hint(const char *s, char buf[64]);
  * Returns buf. */
 SDM_INTERNAL_API const char *sdm_format_real(double v, char buf[32]);
 
-/* SDM_E_RANGE, "parameter 'a' = 9 mm, allowed 2 .. 5 mm": the one text about a parameter out of its
- * range min .. max. */
+/* "; was it given in metres? It needs mm" for a length outside its range that would be in it or
+ * near it if it were in metres, the same for micrometres, "" for others. */
+const char *sdm_unit_question(double value, double min, double max, const char *unit);
+
+/* SDM_E_RANGE, "parameter 'a' = 9 mm, allowed 2 .. 5 mm" and sdm_unit_question(): the one text
+ * about a parameter out of its range min .. max. */
 sdm_status sdm_fail_range(const char *name, double value, double min, double max, const char *unit,
                           sdm_error *err);
 

@@ -57,6 +57,8 @@ static sdm_status settle(run *r, trainer *t, sdm_error *err)
         // the folder may have been moved
         trainer_export_path(t, r->turns.first.model_path);
         if (!s && !found) {
+            if (r->resume) trainer_tell_no_checkpoint(t);
+            r->resume = false;
             s = trainer_race(t, r->settled, &r->turns, r->gain, err);
             r->turns.tried = trainer_shared_seconds(t);
         }

@@ -161,9 +161,7 @@ static sdm_status train_begin(trainer *t, bool resume, bool *found, sdm_error *e
     if (!s) tell_vain_keys(t);
     if (!s && resume) {
         s = trainer_checkpoint_read(t, found, err);
-        if (!s && !*found)
-            trainer_message(t, "no checkpoint in %s: training starts from the beginning",
-                            t->folder);
+        if (!s && !*found) trainer_tell_no_checkpoint(t);
     }
     if (s) return s;
     const sdm_phase from = t->phase;

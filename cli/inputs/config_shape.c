@@ -1,7 +1,9 @@
 /* Reads the configuration of a training and creates its shape. */
+#define _XOPEN_SOURCE 700 // realpath()
 #include "config_shape.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "report/terminal.h"
@@ -75,6 +77,36 @@ sdm_status cli_check_memory(const sdm_config *c, const sdm_instance *shape, sdm_
     return s && !fewer ? sdm_fail(err, s, "%s", why.text) : SDM_OK;
 }
 
+/* Is `origin`, of a shape, this plug-in? The registry holds the paths without links. */
+static bool is_from(const char *origin, const char *plugin)
+{
+    char *path = realpath(plugin, NULL);
+    const bool is = !strcmp(origin, path ? path : plugin);
+    free(path);
+    return is;
+}
+
+/* Tells if none of the plug-ins of the command holds the shape of the configuration. */
+static void tell_other_plugins(const cli_args *args, const sdm_registry *r, const sdm_config *c)
+{
+    const char *origin = "";
+    sdm_text shapes = {0};
+    bool given = false;
+    for (size_t i = 0; i < sdm_registry_count(r); i++) {
+        const char *name = sdm_registry_at(r, i)->name, *from = sdm_registry_origin(r, i);
+        bool plugin = false;
+        for (size_t k = 0; k < args->plugins.n; k++)
+            plugin = plugin || is_from(from, args->plugins.items[k]);
+        if (!strcmp(name, c->shape.name)) origin = from, given = plugin;
+        if (plugin) sdm_text_add(&shapes, "%s%s", shapes.size ? ", " : "", name);
+    }
+    if (!given && shapes.size && !shapes.failed)
+        cli_notice("shape '%s' of %s is not from --plugin, which holds %s: it is from %s",
+                   c->shape.name, c->file, shapes.data,
+                   !strcmp(origin, "built in") ? "the program" : origin);
+    sdm_text_dispose(&shapes);
+}
+
 static void add_lines(sdm_error *err, const char *lines)
 {
     const size_t used = strlen(err->text);
@@ -92,5 +124,6 @@ sdm_status cli_open_config(const cli_args *args, sdm_config **config, sdm_regist
     if (!s_shape) s_shape = make_shape(*config, *registry, shape, &of_shape);
     if (!s && s_shape) return sdm_fail(err, s_shape, "%s", of_shape.text);
     if (s_shape == SDM_E_CONFIG) add_lines(err, of_shape.text);
+    if (!s) tell_other_plugins(args, *registry, *config);
     return s ? s : fit_grid(*config, *shape, err);
 }

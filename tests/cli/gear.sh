@@ -19,6 +19,9 @@ expect 5 "shape 'gear': parameter 'angle' = 0\.2 rad, allowed " sdmgen mesh --sh
 expect 2 "option 'teeth' is 3, need 6 \.\. 100" sdmgen mesh --shape gear -O teeth=3 --audit --plugin $plugin
 
 expect 2 "unknown shape 'gear'; .* --plugin FILE" sdmgen config "$config"
+# A plug-in that does not hold the shape of the configuration is told.
+expect 0 "^sdmgen: shape 'cochlea' of .* is not from --plugin, which holds gear: it is from the program\$" \
+    sdmgen config "$source_folder/tests/cli/tiny.yaml" --plugin $plugin
 expect 0 - sdmgen train "$config" "${small[@]}" --plugin $plugin --out run --quiet
 has '(^  not for)? +its thinnest part and volumes of surfaces \(\.stl\): it is [0-9.]+ mm thick in a few held-out shapes, too thin for voxels of 0\.9 mm, and will be missing or broken; grid\.spacing 0\.5[0-9]* shows it'
 has '^  verdict     .*lower grid\.spacing from 0\.9 to 0\.5'

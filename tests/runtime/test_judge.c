@@ -379,6 +379,16 @@ static void test_surfaces_without_each_other_are_told(void **state)
         if (patch->grade != cases[k].patch || covered->grade != cases[k].covered)
             fail_msg("case %zu, %zu points: patch %.3g, covered %.3g, %s", k, n, patch->figure,
                      covered->figure, err.text);
+        // one limit, and the text names the place and the other one
+        assert_true(patch->limit < 0.02);
+        if (patch->grade != SDM_FIT_PASSED) {
+            assert_non_null(strstr(patch->text, ", densest at ("));
+            assert_non_null(strstr(patch->text, " mm outside of its surface: "));
+            assert_non_null(strstr(patch->text, "; failed above 0.05"));
+        }
+        if (*covered->text)
+            assert_true(!strstr(covered->text, " of the points lie away from the surface") ==
+                        !cases[k].n_more);
         const bool refused = cases[k].patch == SDM_FIT_FAILED || cases[k].covered == SDM_FIT_FAILED;
         assert_int_equal(s, refused ? SDM_E_QUALITY : SDM_OK);
         sdm_fit_dispose(&r);

@@ -372,6 +372,11 @@ sdm_status trainer_checkpoint_turns(const trainer *t, training_turns *out, bool 
     return s;
 }
 
+void trainer_tell_no_checkpoint(const trainer *t)
+{
+    trainer_message(t, "no checkpoint in %s: training starts from the beginning", t->folder);
+}
+
 /* Takes the metrics of the interrupted run, which are whole lines of text. */
 static sdm_status metrics_read(const trainer *t, const sdm_section *metrics, sdm_error *err)
 {

@@ -22,6 +22,9 @@ void trainer_checkpoint_if_due(trainer *t, double now);
 sdm_status trainer_checkpoint_turns(const trainer *t, training_turns *out, bool *found,
                                     sdm_error *err);
 
+/* Tells that a run that was to go on starts from the beginning. */
+void trainer_tell_no_checkpoint(const trainer *t);
+
 /* First half of reading, before the maps are made: checks the configuration, restores counters,
    times, sample plan and metrics. t->data.n_taken becomes the number of random samples that the
    caller has to make again. *found: false if there is no checkpoint. SDM_E_CONFIG: the

@@ -103,21 +103,60 @@ static double roundness(const cloud *c, const size_t *number, size_t n)
     return trace > 0 ? 27 * det / (trace * trace * trace) : 1;
 }
 
-/* Number of strays in patches. */
-static size_t count_patch(const cloud *strays, double spacing)
+/* The strays that form patches. */
+typedef struct patches {
+    size_t n;
+    double world[3]; // mean of the stray with the densest neighbourhood and its neighbours
+} patches;
+
+static patches find_patches(const cloud *strays, double spacing)
 {
-    size_t n = 0;
+    patches found = {0};
+    double densest = INFINITY;
     for (size_t i = 0; i < strays->n && strays->n > MANY; i++) {
         double d2[MANY];
         size_t number[MANY + 1];
         find_nearest(strays, strays->x[i], i, MANY, d2, number);
         number[MANY] = i;
         const double few = sqrt(d2[FEW - 1]);
-        n += few > SAME * spacing &&
-             (few < ALIKE * spacing ||
-              (few < DENSE * spacing && roundness(strays, number, MANY + 1) < FLAT));
+        if (!(few > SAME * spacing &&
+              (few < ALIKE * spacing ||
+               (few < DENSE * spacing && roundness(strays, number, MANY + 1) < FLAT))))
+            continue;
+        found.n++;
+        if (!(d2[MANY - 1] < densest)) continue;
+        densest = d2[MANY - 1];
+        for (int a = 0; a < 3; a++) {
+            found.world[a] = 0;
+            for (size_t k = 0; k <= MANY; k++)
+                found.world[a] += strays->x[number[k]][a] / (MANY + 1);
+        }
     }
-    return n;
+    return found;
+}
+
+/* Adds the finding about strays in patches; bare: share of the surface without points. */
+static void judge_patches(const fit_problem *p, const patches *found, size_t n_points, double stray,
+                          double bare, sdm_fit_verdict *v)
+{
+    const fit_field field = sdm_fit_maps_distances(&p->maps);
+    const double share = (double)found->n / (double)n_points,
+                 most = fmax(p->opts->tolerance, PATCH_MAX),
+                 refused = bare > UNCOVERED_MAX ? fmin(PATCH_MAX_UNCOVERED, most) : most,
+                 limit = fmax(fmax(p->opts->tolerance, PATCH_DOUBTFUL), BY_CHANCE * stray),
+                 *x = found->world, d = sdm_fit_field_at(&field, &p->state, x);
+    double y[3];
+    sdm_fit_to_shape(&p->state, x, y);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_PATCH, share <= fmin(limit, refused),
+                      share > refused ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, share,
+                      fmin(limit, refused),
+                      "%.2g %% of the points form a surface that the fitted shape does not "
+                      "have, densest at (%.3g, %.3g, %.3g) mm, in the shape's frame "
+                      "(%.3g, %.3g, %.3g), %.2g mm %s of its surface: another shape, or a fit "
+                      "that stopped at a wrong one; give a better start, or take other things out "
+                      "of the data (sdm_fit_opts.tolerance allows more); failed above %.3g",
+                      100 * share, x[0], x[1], x[2], y[0], y[1], y[2], fabs(d),
+                      d < 0 ? "inside" : "outside", refused);
 }
 
 /* Splits points into those on the surface and strays, at most MOST in all. */
@@ -233,26 +272,17 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
     if (!s && on.n > MANY) s = find_spacing(&on, &spacing, err);
     if (!s && on.n > MANY) s = surface_places(p, &surface, voxel, err);
     if (!s && spacing > 0) {
-        const double most = fmax(p->opts->tolerance, PATCH_MAX), sd = p->state.point_sd,
-                     patch = (double)count_patch(&strays, spacing) / (double)(on.n + strays.n),
+        const patches found = find_patches(&strays, spacing);
+        const double sd = p->state.point_sd,
                      bare = find_bare(&surface, &on, &strays, REACH * spacing + 3 * sd, bare_at),
                      stray = (double)strays.n / (double)(on.n + strays.n);
         const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
-        const bool both = bare > UNCOVERED_MAX && patch > fmin(PATCH_MAX_UNCOVERED, most);
-        const bool failed = patch > most || both;
-        const double limit =
-            both     ? PATCH_MAX_UNCOVERED
-            : failed ? most
-                     : fmax(fmax(p->opts->tolerance, PATCH_DOUBTFUL), BY_CHANCE * stray);
-        sdm_fit_judge_add(v, SDM_FIT_CHECK_PATCH, patch <= limit,
-                          failed ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, patch, limit,
-                          "%.2g %% of the points form a surface that the fitted shape does not "
-                          "have: another shape, or a fit that stopped at a wrong one; give a "
-                          "better start, or take other things out of the data "
-                          "(sdm_fit_opts.tolerance allows more)",
-                          100 * patch);
-        char names[200], unseen_text[300] = "";
+        judge_patches(p, &found, on.n + strays.n, stray, bare, v);
+        char names[200], unseen_text[300] = "", astray[80] = "";
+        if (stray >= 0.005)
+            snprintf(astray, sizeof astray, ", and %.0f %% of the points lie away from the surface",
+                     100 * stray);
         const double unseen = name_unseen(p, r, surface.n, voxel, bare_at, names, sizeof names);
         if (unseen > 0)
             snprintf(unseen_text, sizeof unseen_text,
@@ -268,9 +298,7 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
             sdm_fit_judge_add(
                 v, SDM_FIT_CHECK_COVERED, covered,
                 grown || other ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, bare, UNCOVERED_MAX,
-                "%.0f %% of the fitted surface has no points near it, and %.0f %% of the points "
-                "lie on no surface of the shape: %s%s%s",
-                100 * bare, 100 * stray,
+                "%.0f %% of the fitted surface has no points near it%s: %s%s%s", 100 * bare, astray,
                 grown   ? "a fit that stopped at a wrong shape; give a better start, or take the "
                           "strays out (sdm_fit_opts.tolerance allows more)"
                 : other ? "most of it, and half of the parameters or more end at their bounds: the "

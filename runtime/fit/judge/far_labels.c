@@ -27,8 +27,8 @@ fit_far_labels sdm_fit_far_labels(const fit_problem *p, double beyond)
     const fit_field field = sdm_fit_maps_distances(&p->maps);
     const double reach = LABEL_REACH * fit_longest_edge(&p->target->grid) +
                          MAP_REACH * fit_longest_edge(&p->maps.grid),
-                 weight = pow((double)p->stride, 3), share = SHARE_MIN * volume_of(p);
-    fit_far_labels far = {.voxels = {beyond, 0}};
+                 weight = pow((double)p->stride, 3), volume = fmax(volume_of(p), 1);
+    fit_far_labels far = {.voxels = {beyond, 0}, .limit = fmax(SHARE_MIN, VOXELS_MIN / volume)};
     for (size_t i = 0; i < p->samples.n; i++) {
         const bool label = p->samples.value[i] > 0.5f;
         const double d = sdm_fit_field_at(&field, &p->state, p->samples.world + 3 * i);
@@ -37,6 +37,8 @@ fit_far_labels sdm_fit_far_labels(const fit_problem *p, double beyond)
         far.depth[!label] = fmax(far.depth[!label], fabs(d));
     }
     for (int side = 0; side < 2; side++)
-        if (!(far.voxels[side] >= VOXELS_MIN && far.voxels[side] > share)) far.voxels[side] = 0;
+        if (!(far.voxels[side] >= VOXELS_MIN && far.voxels[side] > SHARE_MIN * volume))
+            far.voxels[side] = 0;
+    for (int side = 0; side < 2; side++) far.share[side] = far.voxels[side] / volume;
     return far;
 }

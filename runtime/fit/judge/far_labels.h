@@ -9,6 +9,8 @@
  * inside. */
 typedef struct fit_far_labels {
     double voxels[2]; /* 0: none, or no more than stray ones */
+    double share[2];  /* their volume over that of the shape */
+    double limit;     /* the share from which on they are no stray ones */
     double depth[2];  /* largest distance of such a sample from the surface, mm */
 } fit_far_labels;
 

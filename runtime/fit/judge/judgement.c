@@ -262,8 +262,7 @@ static void check_far_labels(const fit_problem *p, const fit_misfit *m, sdm_fit_
         if (!has_passed(v, kind) || !(far.voxels[inside] > 0)) continue;
         if (far.depth[inside] > 0)
             snprintf(depth, sizeof depth, ", up to %.2g mm from its surface", far.depth[inside]);
-        sdm_fit_judge_add(v, kind, false, SDM_FIT_DOUBTFUL, inside ? m->empty : m->missing,
-                          VOLUME_MIN,
+        sdm_fit_judge_add(v, kind, false, SDM_FIT_DOUBTFUL, far.share[inside], far.limit,
                           "%.0f voxels %s%s: the data may have a part that the shape has not, or "
                           "lack one (sdm_fit_opts.tolerance accepts a difference)",
                           far.voxels[inside],

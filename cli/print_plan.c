@@ -71,11 +71,15 @@ static void print_stages(const sdm_config *config, const sdm_train_work *w, cons
                format_seconds(p->seconds[i], time), format_bytes(p->received[i], bytes),
                stage_text((sdm_plan_stage)i));
     }
-    const bool longer =
-        config->train.minutes > 0 && p->all_seconds > 1.01 * 60 * config->train.minutes;
-    printf("  %-8s %-16s %10s  %-18s  the sum of these lines%s\n", "total", "",
-           format_seconds(p->all_seconds, time), format_bytes(p->all_received, bytes),
-           longer ? ", longer than train.minutes" : "");
+    char sum[96] = "the sum of these lines";
+    const double budget = 60 * config->train.minutes;
+    const bool longer = budget > 0 && p->all_seconds > 1.01 * budget;
+    if (longer)
+        snprintf(sum, sizeof sum, "train.minutes ends the run; the sum of these lines is %s",
+                 format_seconds(p->all_seconds, time));
+    printf("  %-8s %-16s %10s  %-18s  %s\n", "total", "",
+           format_seconds(longer ? budget : p->all_seconds, time),
+           format_bytes(p->all_received, bytes), sum);
 }
 
 /* Says what a budget of time is for, or, if half of it is too short for the maps that the

@@ -3,6 +3,7 @@
 #include "derivative_check.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "data/surface_check.h"
@@ -13,6 +14,16 @@
 #include "sdm/map.h"
 #include "sdm/memory.h"
 #include "sdm/model.h"
+
+/* Of those that hardly change the volume so many are named. */
+enum { SMALL_NAMED = 4 };
+
+/* From this error on, over the size of the derivative, its sign may be wrong: the error of a single
+   shape is often twice the root mean square. */
+static const double SIGN_WRONG = 0.5;
+
+/* Larger errors are not told apart. */
+static const double ERROR_MOST = 10;
 
 /* Shapes that are compared: so many, unless the number of parameters of all of them together
    exceeds the second, but at least the third. Voxels near the surface of each of them. */
@@ -269,4 +280,59 @@ sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, deriva
     memory_dispose(&c);
     if (!s && out->shapes) take_largest(sums, d->n_params, out);
     return s;
+}
+
+/* true: parameter a comes before b in the list. */
+static bool is_worse(const double *error, size_t a, size_t b)
+{
+    return error[a] > error[b] || (error[a] == error[b] && a < b);
+}
+
+/* The worst parameter after `last` (n: the first one); n: none. */
+static size_t next_worst(const double *error, size_t n, size_t last)
+{
+    size_t worst = n;
+    for (size_t k = 0; k < n; k++)
+        if (error[k] > SDM_DERIVATIVE_BAD && (last == n || is_worse(error, last, k)) &&
+            (worst == n || is_worse(error, k, worst)))
+            worst = k;
+    return worst;
+}
+
+/* Lists at most `most` parameters within `room` characters; `of` follows the first error. */
+static void list(const sdm_param *p, const double *error, size_t n, const char *of, size_t most,
+                 size_t room, char *text)
+{
+    size_t used = 0, named = 0;
+    text[0] = '\0';
+    for (size_t k = next_worst(error, n, n); k < n; k = next_worst(error, n, k)) {
+        char one[160];
+        const bool over = error[k] > ERROR_MOST;
+        const int length =
+            snprintf(one, sizeof one, "%s%.60s: off by %s%.0f %%%s", used ? "; by " : "", p[k].name,
+                     over ? "over " : "", 100 * (over ? ERROR_MOST : error[k]), used ? "" : of);
+        const bool fits = used + (size_t)length + sizeof "; ..." <= room && named++ < most;
+        used += (size_t)snprintf(text + used, room - used, "%s", fits ? one : "; ...");
+        if (!fits) return;
+    }
+}
+
+void trainer_list_derivatives(const sdm_param *p, const double *error, size_t n,
+                              char text[SDM_VERDICT_LIST])
+{
+    list(p, error, n, "", n, SDM_VERDICT_LIST, text);
+}
+
+void trainer_list_small(const sdm_param *p, const double *error, size_t n,
+                        char text[SDM_VERDICT_LIST])
+{
+    static const char why[] = ": these parameters hardly change the volume",
+                      sign[] = ", and the sign may be wrong";
+    const size_t worst = next_worst(error, n, n),
+                 room = SDM_VERDICT_LIST - sizeof why - sizeof sign;
+    list(p, error, n, " of their own size", SMALL_NAMED, room, text);
+    if (worst == n) return;
+    const size_t used = strlen(text);
+    snprintf(text + used, SDM_VERDICT_LIST - used, "%s%s", why,
+             error[worst] < SIGN_WRONG ? "" : sign);
 }

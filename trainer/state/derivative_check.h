@@ -2,6 +2,7 @@
  * Measured on a few held-out shapes that lie within the grid. */
 #pragma once
 
+#include "sdm/internal/verdict.h"
 #include "trainer.h"
 
 typedef struct derivative_check {
@@ -32,3 +33,12 @@ sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, deriva
 
 /* Sets *out to figures that are not known. */
 void trainer_derivatives_unknown(derivative_check *out);
+
+/* text = the parameters p[n] whose relative errors exceed SDM_DERIVATIVE_BAD, the worst first, as
+   sdm_verdict.derivatives_bad. An error that is NaN is not known. */
+void trainer_list_derivatives(const sdm_param *p, const double *error, size_t n,
+                              char text[SDM_VERDICT_LIST]);
+
+/* The same as sdm_verdict.volume_derivatives_small, of parameters that hardly change the volume. */
+void trainer_list_small(const sdm_param *p, const double *error, size_t n,
+                        char text[SDM_VERDICT_LIST]);

@@ -41,12 +41,3 @@ typedef struct verdict_input {
 
 /* Sets grade, limit, key, values and sentence from the figures in *v. */
 void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v);
-
-/* text = the parameters p[n] whose relative errors exceed SDM_DERIVATIVE_BAD, the worst first, as
-   sdm_verdict.derivatives_bad. An error that is NaN is not known. */
-void trainer_list_derivatives(const sdm_param *p, const double *error, size_t n,
-                              char text[SDM_VERDICT_LIST]);
-
-/* The same as sdm_verdict.volume_derivatives_small, of parameters that hardly change the volume. */
-void trainer_list_small(const sdm_param *p, const double *error, size_t n,
-                        char text[SDM_VERDICT_LIST]);

@@ -1,6 +1,6 @@
-/* Cost of the unknowns by Laplace's method. With the prior N(m, s^2) of each parameter, the estimate
- * x, the covariance C of the k parameters and their prior variances s^2 the cost is
- *   1/2 sum log s^2 - 1/2 log det C + 1/2 sum ((x - m) / s)^2. */
+/* Cost of the unknowns by Laplace's method. With the prior N(m, s^2) of each parameter, the
+ * estimate x, the covariance C of the k parameters and their prior variances s^2 the cost is 1/2
+ * sum log s^2 - 1/2 log det C + 1/2 sum ((x - m) / s)^2. */
 #include "unknowns_cost.h"
 
 #include <math.h>
@@ -13,7 +13,7 @@ static double params_cost(const fit_problem *p, const sdm_fit_result *r, size_t 
                           const size_t *list)
 {
     double c[FIT_PARAMS_MAX * FIT_PARAMS_MAX] = {0}, factor[FIT_PARAMS_MAX * FIT_PARAMS_MAX],
-        scale[FIT_PARAMS_MAX], cost = 0;
+                              scale[FIT_PARAMS_MAX], cost = 0;
     const size_t size = p->n_params + 6;
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++) c[i * n + j] = r->covariance[list[i] * size + list[j]];

@@ -1,7 +1,7 @@
 /* Parts of the fit: derivatives against differences, bounded steps, averaged gradient, Anderson
  * acceleration.
  * Tests: anderson.c averaged_gradient.c averaged_maps.c map_fields.c newton.c objective.c solve.c
- */
+ * unknowns_cost.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,6 +13,7 @@
 #include <cmocka.h>
 
 #include "fit/data/observation.h"
+#include "fit/judge/unknowns_cost.h"
 #include "fit/solver/anderson.h"
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"
@@ -356,9 +357,47 @@ static void test_anderson_converges_fast(void **state)
     }
 }
 
+// ---- cost of the unknowns
+
+// Two parameters with priors of sd 1 about 0, known to 0.1 (at 0.5) and to 0.2, or correlated; and
+// one with a normal distribution that the data leave open.
+static void test_unknowns_cost(void **state)
+{
+    (void)state;
+    sdm_fit_opts o = sdm_fit_defaults();
+    double params[3] = {0.5, 0, 7}, covariance[81] = {0};
+    fit_problem *p = calloc(1, sizeof *p);
+    assert_non_null(p);
+    p->opts = &o;
+    p->n_params = 3;
+    for (int k = 0; k < 2; k++) p->low[k] = -1, p->high[k] = 1;
+    p->low[2] = -100, p->high[2] = 100;
+    p->distribution[2] = (sdm_distribution){SDM_DISTRIBUTION_NORMAL, 7, 3};
+    const sdm_fit_result r = {.params = params, .covariance = covariance, .n_params = 3};
+    covariance[0] = 0.01, covariance[10] = 0.04, covariance[20] = 9;
+    // 1e6 independent samples: an unknown costs at most log(1e6) / 2 = 6.9
+    const double pose = 6 * 0.5 * log(1e6), separate = log(10) + 0.125 + log(5);
+    assert_true(fabs(sdm_fit_unknowns_cost(p, &r, 1e6) - pose - separate) < 1e-9);
+    // correlated: the determinant counts
+    covariance[1] = covariance[9] = 0.8 * 0.1 * 0.2;
+    const double both = separate - 0.5 * log(1 - 0.64);
+    assert_true(fabs(sdm_fit_unknowns_cost(p, &r, 1e6) - pose - both) < 1e-9);
+    // few samples: none costs more than an unknown of the pose
+    assert_true(fabs(sdm_fit_unknowns_cost(p, &r, 4) - (6 + 2) * 0.5 * log(4)) < 1e-9);
+    // what is kept costs nothing
+    o.keep_pose = true;
+    o.kept = (const bool[3]){false, true, false};
+    assert_true(fabs(sdm_fit_unknowns_cost(p, &r, 1e6) - log(10) - 0.125) < 1e-9);
+    // singular: as much as unknowns of a pose
+    covariance[0] = 0;
+    assert_true(fabs(sdm_fit_unknowns_cost(p, &r, 1e6) - 2 * 0.5 * log(1e6)) < 1e-9);
+    free(p);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_unknowns_cost),
         cmocka_unit_test(test_scores_match_differences),
         cmocka_unit_test(test_information_of_gaussians),
         cmocka_unit_test(test_bounded_step),

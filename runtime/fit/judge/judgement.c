@@ -15,6 +15,7 @@
 #include "rival.h"
 #include "sdm/internal/shared.h"
 #include "suffice.h"
+#include "unknowns_cost.h"
 
 // the sd of a tissue may exceed the robust sd by this factor where the shape is right; the sd of
 // the texture and the tails of a distribution that is not Gaussian make up the difference
@@ -56,15 +57,13 @@ static const sdm_fit_law *main_law(const sdm_fit_law *law, size_t n)
     return &law[most];
 }
 
-// Gain in log-likelihood by the shape, as of independent voxels, less the cost of its unknowns
-// (Schwarz 1978). The covariance of the score, which noise_factor belongs to, is that of the few
-// voxels at the surface; the robust correlations of all others are the steadier measure.
+// Gain in log-likelihood by the shape, as of independent voxels, less the cost of its unknowns. The
+// covariance of the score, which noise_factor belongs to, is that of the few voxels at the surface;
+// the robust correlations of all others are the steadier measure.
 static double evidence_of(const fit_problem *p, const sdm_fit_result *r, double factor)
 {
-    double unknowns = p->opts->keep_pose ? 0 : 6;
-    for (size_t k = 0; k < p->n_params; k++) unknowns += !fit_param_is_kept(p, k);
     return (p->information.log_likelihood - r->log_likelihood_without) / factor -
-           0.5 * unknowns * log((double)p->samples.n / factor);
+           sdm_fit_unknowns_cost(p, r, (double)p->samples.n / factor);
 }
 
 // evidence, contrast, cavities, field of view, convergence

@@ -3,11 +3,10 @@
 
 #include "fit/solver/problem.h"
 
-/* The logarithm by which the likelihood of the best values exceeds the mean likelihood over all
-   values of the unknowns that were possible before the fit. r: with its covariance;
-   n_independent: the number of independent samples.
-   Parameters: Laplace's method (Kass and Raftery 1995), with their priors. So a parameter that the
-   data do not determine costs nothing.
-   Pose: it has no prior; each of its six unknowns costs log(n_independent) / 2 (Schwarz 1978). So
-   do parameters where the covariance is unknown. */
+/* The logarithm by which the likelihood of the best values exceeds its mean over all values of the
+   unknowns that were likely before the fit. r: with its covariance; n_independent: the number of
+   independent samples.
+   Pose: it has no prior; each of its six unknowns costs log(n_independent) / 2 (Schwarz 1978).
+   Parameters: Laplace's method with their priors (Kass and Raftery 1995), so that a parameter which
+   the data do not determine costs nothing; at most as much as an unknown of the pose. */
 double sdm_fit_unknowns_cost(const fit_problem *p, const sdm_fit_result *r, double n_independent);

@@ -43,8 +43,7 @@ double sdm_fit_prior_sd(const fit_problem *p, size_t k)
                : 0.5 * p->opts->prior_sd * range;
 }
 
-// centre of the prior of parameter k
-static double prior_mean(const fit_problem *p, size_t k)
+double sdm_fit_prior_mean(const fit_problem *p, size_t k)
 {
     return p->distribution[k].kind == SDM_DISTRIBUTION_NORMAL ? p->distribution[k].mean
                                                               : 0.5 * (p->low[k] + p->high[k]);
@@ -60,7 +59,7 @@ double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient,
     // parameters
     for (size_t k = 0; k < p->n_params && o->prior_sd > 0; k++) {
         const double sd = sdm_fit_prior_sd(p, k), precision = weight[k] / (sd * sd);
-        const double residual = s->params[k] - prior_mean(p, k);
+        const double residual = s->params[k] - sdm_fit_prior_mean(p, k);
         sum -= 0.5 * precision * residual * residual;
         normal_add(n, k, residual, precision, gradient, complete, observed);
     }

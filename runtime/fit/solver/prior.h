@@ -10,6 +10,10 @@ bool sdm_fit_has_prior(const fit_problem *p);
  * prior, that of the uniform distribution over its range. */
 double sdm_fit_prior_sd(const fit_problem *p, size_t k);
 
+/* Centre of the prior of parameter k, in the unit of the parameter: the mean of its distribution or
+ * the middle of its range. */
+double sdm_fit_prior_mean(const fit_problem *p, size_t k);
+
 /* Log prior density of state s, up to a constant: Gaussians, each multiplied by
    problem->prior_weight. Adds its derivatives by the N = information.n_unknowns unknowns to
    gradient[N] and its negative second derivatives to complete[N][N] and observed[N][N]; each of the

@@ -16,7 +16,7 @@
      equations. `complete` pretends that the tissue of every sample is known (expected information
      of expectation-maximisation); `observed` accounts for the unknown tissues (Louis 1982).
    - evidence: log-likelihood gained by the shape over a mixture of the same tissues without a
-     shape, less the cost of the shape's unknowns (Schwarz 1978). */
+     shape, less the cost of the shape's unknowns. */
 #pragma once
 
 #include "information.h"

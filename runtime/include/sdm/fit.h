@@ -261,7 +261,7 @@ typedef struct sdm_fit_opts {
 
 /* What is checked before a fit is trusted. New checks are added at the end. */
 typedef enum sdm_fit_check_kind {
-    /* image: evidence of the shape against the same voxels without a shape (Schwarz 1978) */
+    /* image: evidence of the shape against the same voxels without a shape */
     SDM_FIT_CHECK_NO_SHAPE = 0,
     /* image: the inside is darker or brighter than the outside as at the start; figure: inside mean
        less outside mean */
@@ -445,9 +445,12 @@ typedef struct sdm_fit_result {
        NaN */
     double log_likelihood_without;
     /* image: evidence of the shape: its gain in log-likelihood, as of independent voxels, less the
-       cost of its unknowns (Schwarz 1978). How many voxels count as one independent one follows
-       from the robust correlations of SDM_FIT_CHECK_RESIDUALS or, where these cannot be measured,
-       is noise_factor. At most 0: the image shows no such shape. Other targets: NaN */
+       cost of its unknowns: log(N) / 2 for each unknown of the pose, N being the number of
+       independent voxels (Schwarz 1978); for a parameter as much or less, by Laplace's method with
+       its prior, so that one which the data do not determine costs nothing (Kass and Raftery
+       1995). How many voxels count as one independent one follows from the robust correlations of
+       SDM_FIT_CHECK_RESIDUALS or, where these cannot be measured, is noise_factor. At most 0: the
+       image shows no such shape. Other targets: NaN */
     double evidence;
     /* share of the volume of the shape that lies in the image; 1 for points; NaN if the fit failed
        before computing it; the same holds for the figures marked "NaN as inside_share" */

@@ -15,6 +15,7 @@
 #include "fit/kept/kept_params.h"
 #include "fit/kept/kept_pose.h"
 #include "fit/solver/averaged_gradient.h"
+#include "fit/solver/between.h"
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
 #include "fit/solver/open_motions.h"
@@ -54,6 +55,8 @@
 // plain steps up to this size are followed by steps with the averaged gradient, in units of
 // sdm_fit_opts.eps
 #define STEP_NEAR 1e-2
+// the same: a second grid may yet end the iterations
+#define STEP_BETWEEN 0.1
 // number of flat steps (of negligible predicted gain) in a row that ends the iterations with a
 // network's maps
 #define FLAT_MAX 6
@@ -319,6 +322,19 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
     return s;
 }
 
+/* Goes on with maps on a grid moved by half a voxel, too, where the place of the grid counts. */
+static sdm_status maximise_between(fit_problem *p, fit_newton_opts *newton, fit_newton_end *end,
+                                   size_t max_iterations, double eps, sdm_error *err)
+{
+    bool added;
+    if (!end->converged && !(end->step <= STEP_BETWEEN)) return SDM_OK;
+    const sdm_status s = sdm_fit_between_add(p, &added, err);
+    if (s || !added) return s;
+    newton->max_iterations = max_iterations;
+    newton->eps = eps;
+    return maximise_settled(p, newton, end, err);
+}
+
 /* Maximises with maps of one kind. Plain Newton steps come first, then steps with the averaged
  * gradient: with exact maps because of the kinks of the likelihood; with a network's maps where
  * flat steps ended the iterations, because rounding errors of its derivatives then prevent
@@ -342,14 +358,17 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
     sdm_status s = maximise_settled(p, newton, end, err);
     // where kinks keep plain steps from converging, averaged ones may
     const bool near = end->converged || end->step <= STEP_NEAR;
-    if (s || !near || !average || !(exact || end->flat)) return s;
+    if (s) return s;
+    if (!average || !(exact || end->flat))
+        return maximise_between(p, newton, end, max_iterations, eps, err);
     // averaged gradient
     newton->averaged = true;
     newton->max_iterations = max_iterations;
     newton->eps = eps;
     newton->max_flat = 0;
     sdm_fit_averaging_begin(p);
-    s = maximise_settled(p, newton, end, err);
+    if (near) s = maximise_settled(p, newton, end, err);
+    if (!s) s = maximise_between(p, newton, end, max_iterations, eps, err);
     sdm_fit_averaging_end(p);
     return s ? s : sdm_fit_evaluate(p, err);
 }

@@ -67,7 +67,29 @@ void sdm_fit_maps_dispose(fit_maps *m)
     sdm_free(m->distance);
     sdm_free(m->packed);
     sdm_free(m->spare);
+    sdm_fit_maps_between_end(m);
     *m = (fit_maps){0};
+}
+
+void sdm_fit_maps_between_end(fit_maps *m)
+{
+    if (m->between) sdm_fit_maps_dispose(m->between);
+    sdm_free(m->between);
+    m->between = NULL;
+}
+
+sdm_status sdm_fit_maps_between_begin(fit_maps *m, const sdm_fit_opts *opts, sdm_error *err)
+{
+    const double half[3] = {0.5, 0.5, 0.5};
+    sdm_status s = SDM_ALLOC(&m->between, 1, "maps", err);
+    if (!s) s = sdm_fit_maps_create(m->source, m->share, opts, m->between, err);
+    if (s) {
+        sdm_free(m->between);
+        m->between = NULL;
+        return s;
+    }
+    sdm_grid_world(&m->grid, half, m->between->grid.origin);
+    return SDM_OK;
 }
 
 static bool outside_network_range(const sdm_model_info *info, const double *params)
@@ -111,12 +133,57 @@ sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives
     const bool exact = m->exact || outside;
     const sdm_status s =
         exact ? map_make_exact(m, params, derivatives, err) : map_make_network(m, params, err);
+    m->made_exact = exact;
     *(exact ? &m->n_exact : &m->n_network) += 1;
     *(exact ? &m->seconds_exact : &m->seconds_network) += sdm_clock() - from;
     m->n_outside += outside;
     for (size_t v = 0; v < m->n_voxels && !s && !fit_maps_direct(m); v++)
         m->distance[v] = (double)m->values[v];
-    return s;
+    if (s || !m->between) return s;
+    return sdm_fit_maps_between_make(m, params, derivatives, err);
+}
+
+// to = from half a voxel farther along an axis, by cubic convolution (Keys 1981); values of the
+// border continue beyond it. step: between neighbours along the axis, of which there are n
+static void move_by_half(const float *from, size_t n_voxels, size_t step, size_t n, float *to)
+{
+    for (size_t v = 0; v < n_voxels; v++) {
+        const size_t i = v / step % n, before = i > 0 ? step : 0, next = i + 1 < n ? step : 0,
+                     last = i + 2 < n ? 2 * step : next;
+        to[v] = (float)(0.5625 * ((double)from[v] + (double)from[v + next]) -
+                        0.0625 * ((double)from[v - before] + (double)from[v + last]));
+    }
+}
+
+// to[n_voxels] = from[n_voxels] at the middle between eight voxels; scratch[n_voxels]
+static void interpolate_between(const sdm_grid *g, const float *from, float *scratch, float *to)
+{
+    const size_t nx = (size_t)g->n[0], ny = (size_t)g->n[1], nz = (size_t)g->n[2], n = nx * ny * nz;
+    move_by_half(from, n, 1, nx, to);
+    move_by_half(to, n, nx, ny, scratch);
+    move_by_half(scratch, n, nx * ny, nz, to);
+}
+
+sdm_status sdm_fit_maps_between_make(fit_maps *m, const double *params, bool derivatives,
+                                     sdm_error *err)
+{
+    fit_maps *b = m->between;
+    b->exact = m->made_exact;
+    if (b->exact) {
+        const sdm_status s = sdm_fit_maps_make(b, params, derivatives, err);
+        m->n_exact += b->n_exact;
+        m->seconds_exact += b->seconds_exact;
+        b->n_exact = 0;
+        b->seconds_exact = 0;
+        return s;
+    }
+    float *scratch = (float *)b->packed; // sdm_fit_maps_pack() fills it anew
+    interpolate_between(&m->grid, m->values, scratch, b->values);
+    for (size_t k = 0; k < m->n_params && derivatives; k++)
+        interpolate_between(&m->grid, m->jacobian + k * m->n_voxels, scratch,
+                            b->jacobian + k * m->n_voxels);
+    for (size_t v = 0; v < m->n_voxels; v++) b->distance[v] = (double)b->values[v];
+    return SDM_OK;
 }
 
 sdm_status sdm_fit_maps_voxels(fit_maps *m, sdm_error *err)
@@ -209,6 +276,7 @@ void sdm_fit_maps_pack(fit_maps *m, double blur, bool derivatives)
     sdm_fit_blur(&m->grid, m->n_fields, variance, m->share, n_threads, &m->packed, &m->spare);
     if (m->share && derivatives)
         sdm_fit_laplacian(&m->grid, m->n_fields, blur, n_threads, m->packed);
+    if (m->between) sdm_fit_maps_pack(m->between, blur, derivatives);
 }
 
 fit_field sdm_fit_maps_field(const fit_maps *maps)

@@ -42,6 +42,11 @@ typedef struct fit_maps {
     size_t n_network, n_exact, n_outside;
     /* wall-clock time spent on these maps, s */
     double seconds_network, seconds_exact;
+    /* whether the exact engine made the latest map */
+    bool made_exact;
+    /* NULL, or maps of the same shape on the grid moved by half a voxel along each axis, see
+       solver/between.h. The field is then the mean of both */
+    struct fit_maps *between;
 } fit_maps;
 
 /* Longest edge of a voxel, mm. */
@@ -58,6 +63,16 @@ static inline bool fit_maps_direct(const fit_maps *m) { return m->points && m->e
 sdm_status sdm_fit_maps_create(const sdm_fit_source *source, bool share, const sdm_fit_opts *opts,
                                fit_maps *out, sdm_error *err);
 void sdm_fit_maps_dispose(fit_maps *m);
+
+/* Allocates m->between. _end: frees it, as sdm_fit_maps_dispose() does. */
+sdm_status sdm_fit_maps_between_begin(fit_maps *m, const sdm_fit_opts *opts, sdm_error *err);
+void sdm_fit_maps_between_end(fit_maps *m);
+
+/* Makes the maps of m->between as sdm_fit_maps_make() does, which calls it, for the
+   params[n_params] of the latest maps of *m: by the exact engine if it made those; else by
+   interpolation of the distances, which is right where they are smooth. */
+sdm_status sdm_fit_maps_between_make(fit_maps *m, const double *params, bool derivatives,
+                                     sdm_error *err);
 
 /* Computes values, distance and, if `derivatives`, jacobian at params[n_params]; `packed` is not
  * updated. Direct: makes the surface only, see sdm_fit_maps_voxels(). Returns SDM_E_CANCELLED or an

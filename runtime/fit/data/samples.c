@@ -33,7 +33,10 @@ double sdm_fit_maps_at(const fit_maps *maps, const fit_state *s, const double x[
 {
     const fit_field f = sdm_fit_maps_field(maps);
     double y[3];
-    if (!fit_maps_direct(maps)) return sdm_fit_field_at(&f, s, x);
+    if (!fit_maps_direct(maps)) {
+        const double here = sdm_fit_field_at(&f, s, x);
+        return maps->between ? 0.5 * (here + sdm_fit_maps_at(maps->between, s, x)) : here;
+    }
     sdm_fit_to_shape(s, x, y);
     return sdm_exact_point(maps->surface.engine, y, NULL, NULL, NULL);
 }
@@ -242,6 +245,17 @@ static sdm_status evaluate_direct(fit_samples *samples, const fit_maps *maps,
     return s;
 }
 
+// gradient[3] and rest[n_fields - 1]: the means of those given and those of the maps between
+static void add_between(const fit_maps *between, const double y[3], double gradient[3],
+                        double *rest)
+{
+    const fit_field f = sdm_fit_maps_field(between);
+    double g[3], r[FIT_FIELDS_MAX];
+    (void)sdm_fit_interpolate_all(&f, y, g, r);
+    for (int k = 0; k < 3; k++) gradient[k] = 0.5 * (gradient[k] + g[k]);
+    for (size_t k = 0; k + 1 < f.n_fields; k++) rest[k] = 0.5 * (rest[k] + r[k]);
+}
+
 sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
                                     const fit_observation *obs, const fit_state *state,
                                     sdm_error *err)
@@ -255,7 +269,7 @@ sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = samples->n * slice / FIT_SLICES; i < samples->n * (slice + 1) / FIT_SLICES;
              i++)
-            samples->field[i] = sdm_fit_field_at(&f, state, samples->world + 3 * i);
+            samples->field[i] = sdm_fit_maps_at(maps, state, samples->world + 3 * i);
     // derivatives, one row for each sample of the band
     const sdm_status s = rows_number(samples, maps, obs, err);
     if (s) return s;
@@ -267,6 +281,7 @@ sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
             if (samples->row[i] == SIZE_MAX) continue;
             sdm_fit_to_shape(state, samples->world + 3 * i, y);
             (void)sdm_fit_interpolate_all(&f, y, gradient, rest);
+            if (maps->between) add_between(maps->between, y, gradient, rest);
             jacobian_row(maps, state, samples->world + 3 * i, gradient, rest,
                          samples->jacobian + samples->row[i] * samples->n_columns);
         }

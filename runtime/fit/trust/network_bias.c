@@ -59,7 +59,8 @@ sdm_status sdm_fit_network_bias(const fit_problem *p, const double *influence, d
     sdm_status s = sdm_fit_maps_create(p->source, p->maps.share, p->opts, &exact, err);
     if (s) return s;
     exact.exact = true;
-    s = SDM_ALLOC(&parts, FIT_SLICES * n, "scores of the samples", err);
+    if (p->maps.between) s = sdm_fit_maps_between_begin(&exact, p->opts, err);
+    if (!s) s = SDM_ALLOC(&parts, FIT_SLICES * n, "scores of the samples", err);
     if (!s) s = sdm_fit_maps_make(&exact, p->state.params, false, err);
     if (!s) {
         sdm_fit_maps_pack(&exact, sdm_fit_field_blur(p), false);

@@ -177,44 +177,62 @@ void cli_name_part(const sdm_part_audit *a, size_t index, sdm_text *text)
     sdm_text_add(text, ") ");
 }
 
-/* The smallest solid part whose box holds that of part `index`; a->n: there is none. */
-static size_t part_around(const sdm_part_audit *a, size_t index)
+/* Volume of the solid parts of a group, mm^3; 0: there are none. */
+static double group_volume(const sdm_part_audit *a, size_t group)
 {
-    const sdm_part *p = &a->part[index];
-    size_t around = a->n;
-    for (size_t i = 0; i < a->n; i++) {
-        const sdm_part *q = &a->part[i];
-        bool holds = i != index && q->state == SDM_PART_SOLID;
-        for (int d = 0; d < 3; d++)
-            holds = holds && q->min[d] <= p->min[d] && q->max[d] >= p->max[d];
-        if (holds && (around == a->n || fabs(q->volume) < fabs(a->part[around].volume))) around = i;
+    double volume = 0;
+    for (size_t i = 0; i < a->n; i++)
+        if (a->part[i].group == group && a->part[i].state == SDM_PART_SOLID)
+            volume += fabs(a->part[i].volume);
+    return volume;
+}
+
+/* Appends "part 2 of 9 (...) " or "parts 2 (...), 3 (...) and 5 more of 9 ": the parts of a group.
+ * Returns how many there are. */
+static size_t add_group(const sdm_part_audit *a, size_t group, sdm_text *text)
+{
+    size_t n = 0, told = 0;
+    for (size_t i = 0; i < a->n; i++) n += a->part[i].group == group;
+    if (n == 1) {
+        cli_name_part(a, group, text);
+        return n;
     }
-    return around;
+    for (size_t i = group; i < a->n && told < NAMED; i++) {
+        if (a->part[i].group != group) continue;
+        sdm_text_add(text, "%s%zu (", told++ ? ", " : "parts ", i + 1);
+        add_place(&a->part[i], text);
+        sdm_text_add(text, ")");
+    }
+    if (n > told) sdm_text_add(text, " and %zu more", n - told);
+    sdm_text_add(text, " of %zu ", a->n);
+    return n;
 }
 
 void cli_describe_apart(const sdm_mesh *mesh, const sdm_part_audit *audit, sdm_text *text)
 {
-    size_t at = audit->n;
+    size_t at = audit->n; // the lowest part of the smallest group
+    double least = INFINITY;
     for (size_t i = 0; i < audit->n; i++) {
-        const sdm_part *p = &audit->part[i];
-        if (p->state != SDM_PART_SOLID || p->met) continue;
-        if (at == audit->n || fabs(p->volume) < fabs(audit->part[at].volume)) at = i;
+        const double volume = audit->part[i].group == i ? group_volume(audit, i) : 0;
+        if (volume > 0 && volume < least) least = volume, at = i;
     }
-    if (at == audit->n || audit->n < 2) return;
+    if (at == audit->n || audit->bodies < 2) return;
     const double gap = sdm_part_gap(mesh, audit, at);
-    const size_t around = gap < 0 ? part_around(audit, at) : audit->n;
-    cli_name_part(audit, at, text);
+    const size_t around = gap < 0 ? sdm_part_around(audit, at) : audit->n;
+    const bool many = add_group(audit, at, text) > 1;
     if (around < audit->n)
         sdm_text_add(text,
-                     "lies inside part %zu and changes nothing; if it is to be a cavity, reverse "
-                     "the vertices of its triangles",
-                     around + 1);
+                     "%s inside part %zu and %s nothing; if %s to be a cavity, reverse the "
+                     "vertices of %s triangles",
+                     many ? "lie" : "lies", around + 1, many ? "change" : "changes",
+                     many ? "they are" : "it is", many ? "their" : "its");
     else if (isfinite(gap))
         sdm_text_add(text,
-                     "lies %.2g mm from the others; where they belong together, let them overlap",
-                     fabs(gap));
+                     "%s %.2g mm from the others; where they belong together, let them overlap",
+                     many ? "lie" : "lies", fabs(gap));
     else
-        sdm_text_add(text, "meets no other; where they belong together, let them overlap");
+        sdm_text_add(text, "%s no other; where they belong together, let them overlap",
+                     many ? "meet" : "meets");
 }
 
 void cli_describe_open(const sdm_part_audit *a, sdm_text *text)

@@ -575,7 +575,8 @@ static void add_crossed(const teller *t, const sdm_survey_count *c, sdm_text *te
     sdm_part_audit_dispose(&audit);
 }
 
-/* Parts that meet no other part, the smallest of one shape, and how far it lies from the others. */
+/* Groups of parts that meet no other group, the smallest of one shape, and how far it lies from the
+ * others. */
 static void tell_apart(teller *t)
 {
     const sdm_shape_survey *f = &t->s->found;
@@ -583,7 +584,7 @@ static void tell_apart(teller *t)
     sdm_part_audit audit = {0};
     sdm_text text = {0};
     if (!f->apart.shapes) return;
-    add_count(t->s, &f->apart, "parts that meet no other part", &text);
+    add_count(t->s, &f->apart, "groups of parts that meet no other part", &text);
     sdm_text_add(&text, ": ");
     if (make(t->s, f->apart.worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL))
         cli_describe_apart(&mesh, &audit, &text);

@@ -290,8 +290,9 @@ static sdm_status give_verdict(const check *c, sdm_error *err)
     const sdm_survey_count *apart = &c->survey.found.apart;
     if (!failed && apart->shapes)
         printf(
-            "but %zu of %zu shapes have parts that meet no other part (the note above names one): "
-            "if they are meant to be apart, nothing is to be done; else let them overlap\n",
+            "but %zu of %zu shapes have groups of parts that meet no other part (the note above "
+            "names "
+            "one): if they are meant to be apart, nothing is to be done; else let them overlap\n",
             apart->shapes, c->survey.found.n - c->survey.found.untested);
     sdm_text_dispose(&left);
     return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the verdict") : SDM_OK;

@@ -1,6 +1,6 @@
-/* How far a part of a mesh lies from the other parts. The points of two surfaces that are nearest
-   to each other are found from many points of the one surface by projections from each surface to
-   the other in turn (Cheney and Goldstein 1959). */
+/* How far a group of parts of a mesh lies from the other parts. The points of two surfaces that are
+   nearest to each other are found from many points of the one surface by projections from each
+   surface to the other in turn (Cheney and Goldstein 1959). */
 #include <math.h>
 #include <string.h>
 
@@ -10,26 +10,39 @@
 
 enum { STEPS = 200 }; // projections
 
-// true if the vertices of another part have numbers among those of part `index`
-static bool is_mixed(const sdm_part_audit *a, size_t index)
+// true if the vertices of another part have numbers among those of a part of the group
+static bool is_mixed(const sdm_part_audit *a, size_t group)
 {
-    const sdm_part *p = &a->part[index];
-    for (size_t i = 0; i < a->n; i++)
-        if (i != index && a->part[i].first_vert <= p->last_vert &&
-            a->part[i].last_vert >= p->first_vert)
+    for (size_t k = 0; k < a->n; k++) {
+        const sdm_part *p = &a->part[k];
+        if (p->group != group) continue;
+        for (size_t i = 0; i < a->n; i++)
+            if (a->part[i].group != group && a->part[i].first_vert <= p->last_vert &&
+                a->part[i].last_vert >= p->first_vert)
+                return true;
+    }
+    return false;
+}
+
+// true if the vertex belongs to a part of the group
+static bool has_vertex(const sdm_part_audit *a, size_t group, uint32_t v)
+{
+    for (size_t k = 0; k < a->n; k++)
+        if (a->part[k].group == group && v >= a->part[k].first_vert && v <= a->part[k].last_vert)
             return true;
     return false;
 }
 
-// the triangles of one part, or of all others; the vertices of the rest stay, unused
-static sdm_status triangles_of(const sdm_mesh *mesh, const sdm_part *part, bool own, sdm_mesh *out)
+// the triangles of one group, or of all others; the vertices of the rest stay, unused
+static sdm_status triangles_of(const sdm_mesh *mesh, const sdm_part_audit *a, size_t group,
+                               bool own, sdm_mesh *out)
 {
     const sdm_status s = sdm_mesh_copy(mesh, out, NULL);
     if (s) return s;
     out->n_tri = 0;
     for (size_t t = 0; t < mesh->n_tri; t++) {
         const uint32_t *corner = mesh->tri + 3 * t;
-        if ((corner[0] >= part->first_vert && corner[0] <= part->last_vert) != own) continue;
+        if (has_vertex(a, group, corner[0]) != own) continue;
         for (int k = 0; k < 3; k++) out->tri[3 * out->n_tri + (size_t)k] = corner[k];
         out->n_tri++;
     }
@@ -62,22 +75,22 @@ static double near_point(const sdm_mesh *own, const sdm_exact *others, double x[
 
 double sdm_part_gap(const sdm_mesh *m, const sdm_part_audit *a, size_t index)
 {
-    const sdm_part *part = &a->part[index];
+    const size_t group = a->part[index].group;
     const sdm_exact_opts opts = {.keep_overlap = true, .n_threads = 1};
     sdm_mesh mesh[2] = {{0}};
     sdm_exact *engine[2] = {NULL};
     double x[3], least = NAN, side = NAN;
-    if (a->n < 2 || is_mixed(a, index)) return NAN;
+    if (a->n < 2 || is_mixed(a, group)) return NAN;
     sdm_status s = SDM_OK;
     for (int own = 0; own < 2 && !s; own++) {
-        s = triangles_of(m, part, own, &mesh[own]);
+        s = triangles_of(m, a, group, own, &mesh[own]);
         if (!s) s = sdm_exact_create(&mesh[own], &opts, &engine[own], NULL);
     }
     if (!s) least = near_point(&mesh[1], engine[0], x);
     for (int i = 0; i < STEPS && !s; i++) {
         double nearest[3];
         const double d = sdm_exact_point(engine[i % 2], x, nearest, NULL, NULL);
-        if (!i) side = d; // of a point of this part from the others
+        if (!i) side = d; // of a point of this group from the others
         memcpy(x, nearest, sizeof nearest);
         least = fmin(least, fabs(d));
     }

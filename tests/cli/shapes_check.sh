@@ -19,11 +19,16 @@ for shape in duct ellipsoid torus capsule linkage; do
 done
 
 expect 0 - sdmgen shapes check faulty -O fault=apart --plugin "$plugin" --samples 16
-has '^note +parts that meet no other part in all 21 shapes, up to 2 at .*: part 2 of 2 \(12 triangles, .*\) lies 0\.5 mm from the others; where they belong together, let them overlap$'
+has '^note +groups of parts that meet no other part in all 21 shapes, up to 2 at .*: part 2 of 2 \(12 triangles, .*\) lies 0\.5 mm from the others; where they belong together, let them overlap$'
 
-has '^but 21 of 21 shapes have parts that meet no other part .*: if they are meant to be apart, nothing is to be done; else let them overlap$'
+has '^but 21 of 21 shapes have groups of parts that meet no other part .*: if they are meant to be apart, nothing is to be done; else let them overlap$'
 expect 0 - sdmgen shapes check faulty -O fault=within --plugin "$plugin" --samples 16
-has '^note +parts that meet no other part .*: part 2 of 2 \(12 triangles, .*\) lies inside part 1 and changes nothing; if it is to be a cavity, reverse'
+has '^note +groups of parts that meet no other part .*: part 2 of 2 \(12 triangles, .*\) lies inside part 1 and changes nothing; if it is to be a cavity, reverse'
+
+# Groups of parts: each part meets another one, the groups do not meet. In a training, too.
+expect 0 - sdmgen shapes check faulty -O fault=groups --plugin "$plugin" --samples 16
+has '^note +groups of parts that meet no other part in all 21 shapes, up to 2 at .*: parts 2 \(vertices 8 \.\. 15, box .* mm\), 3 \(vertices 16 \.\. 23, box .* mm\) of 4 lie 0\.5 mm from the others; where they belong together, let them overlap$'
+has '^but 21 of 21 shapes have groups of parts that meet no other part'
 
 # Parts that meet in some shapes only: a note, with the parameter that decides.
 expect 0 - sdmgen shapes check faulty -O fault=meets --plugin "$plugin" --samples 64

@@ -164,7 +164,7 @@ static void test_cavity_and_parts_apart(void **state)
     near(a.union_volume, 64 - 8 + 1);
     near(a.union_volume, engine_volume(&m, &turned));
     near(sdm_part_gap(&m, &a, 2), 3);
-    near(sdm_part_gap(&m, &a, 1), -1); // within the first box
+    near(sdm_part_gap(&m, &a, 1), 3); // of the box with its cavity
     assert_int_equal(turned, 1);
     sdm_part_audit_dispose(&a);
     assert_int_equal(sdm_mesh_turn_parts(&m, &n, &err), SDM_OK);
@@ -187,6 +187,27 @@ static void test_gap_of_a_bar(void **state)
     assert_int_equal(a.n, 2);
     near(sdm_part_gap(&m, &a, 0), 3.25);
     near(sdm_part_gap(&m, &a, 1), 3.25);
+    sdm_part_audit_dispose(&a);
+    sdm_mesh_dispose(&m);
+}
+
+/* Two groups of two boxes that overlap, 2 mm apart, in an order that mixes them; a cavity belongs
+ * to the part around it. */
+static void test_groups(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    add_box(&m, 0, 4, 2, false);
+    add_box(&m, 8, 10, 2, false);
+    add_box(&m, 3, 6, 1, false);
+    add_box(&m, 9, 12, 1, false);
+    add_box(&m, 1, 2, 0.25, true);
+    sdm_part_audit a = audit_of(&m);
+    static const size_t group[] = {0, 1, 0, 1, 0};
+    assert_int_equal(a.n, 5);
+    for (size_t i = 0; i < 5; i++) assert_int_equal(a.part[i].group, group[i]);
+    assert_int_equal(a.bodies, 2);
+    for (size_t i = 0; i < 5; i++) near(sdm_part_gap(&m, &a, i), 2);
     sdm_part_audit_dispose(&a);
     sdm_mesh_dispose(&m);
 }
@@ -421,6 +442,7 @@ int main(void)
         cmocka_unit_test(test_boxes_with_a_common_face),
         cmocka_unit_test(test_cavity_and_parts_apart),
         cmocka_unit_test(test_gap_of_a_bar),
+        cmocka_unit_test(test_groups),
         cmocka_unit_test(test_open_and_flat_parts),
         cmocka_unit_test(test_thickness),
         cmocka_unit_test(test_thickness_of_necks),

@@ -20,7 +20,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
-     "meets",
+     "meets|groups",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -111,7 +111,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         if (!none) faulty_wound(p, out);
         return none;
     }
-    const size_t boxes = !strcmp(fault, "sizes") && is_large ? 3 : 2;
+    const int groups = !strcmp(fault, "groups"); // body and mast, handle and knob
+    const size_t boxes = groups ? 4 : !strcmp(fault, "sizes") && is_large ? 3 : 2;
     const size_t less = !strcmp(fault, "open");
     const int failed = host->reserve(host, out, 8 * boxes, 12 * boxes - less);
     if (failed) return failed;
@@ -133,11 +134,18 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     const double half = !strcmp(fault, "wall") ? p[0] - 1.75 : 0.25,
                  reach = strcmp(fault, "step") ? p[1] : 1 + (p[1] > 1.75);
     // `meets`: the handle meets the body up to a reach of 1.6
-    const double begin =
-        !strcmp(fault, "meets") ? p[0] + reach - 1.6 : p[0] + (strcmp(fault, "apart") ? -0.5 : 0.5);
+    const double begin = !strcmp(fault, "meets")
+                             ? p[0] + reach - 1.6
+                             : p[0] + (strcmp(fault, "apart") && !groups ? -0.5 : 0.5);
     double handle[2][3] = {{begin, -half, -half + shift}, {p[0] + reach, half, half + shift}};
     if (!strcmp(fault, "within")) handle[0][0] -= 1, handle[1][0] -= 2.2;
     if (!strcmp(fault, "twins")) memcpy(handle, body, sizeof handle);
+    if (groups) {
+        const double end = p[0] + reach, mast[2][3] = {{-0.3, -0.3, 0}, {0.3, 0.3, 4}},
+                     knob[2][3] = {{end - 0.125, -0.5, -0.5}, {end + 0.5, 0.5, 0.5}};
+        faulty_box(out, 2, knob[0], knob[1], 0);
+        faulty_box(out, 3, mast[0], mast[1], 0);
+    }
     if (boxes == 3) {
         const double far[2][3] = {{10, 10, 10}, {11, 11, 11}};
         faulty_box(out, 2, far[0], far[1], 0);
@@ -171,9 +179,9 @@ static int faulty_velocity(const void *self, const sdm_host *host, const sdm_opt
     memset(velocity, 0, 6 * n_vert * sizeof *velocity);
     for (size_t v = 0; v < n_vert; v++) {
         for (size_t d = 0; d < 3 && v < 8; d++) velocity[3 * v + d] = v >> d & 1 ? 1 : -1;
-        if (v < 8) continue;
+        if (v < 8 || v >= 24) continue;
         velocity[3 * v] = 1;
-        velocity[3 * (n_vert + v)] = moves || v & 1 ? (wrong ? 1.01 : 1) : 0;
+        velocity[3 * (n_vert + v)] = moves || v >= 16 || v & 1 ? (wrong ? 1.01 : 1) : 0;
     }
     return 0;
 }

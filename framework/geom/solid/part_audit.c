@@ -25,6 +25,7 @@ typedef struct job {
     sdm_arena arena;
     sdm_survey survey; /* of `turned` */
     uint32_t *part_of; /* [n_tri] index of the part; NO_PART: none */
+    uint32_t *group;   /* [number of parts] a forest: parts that meet have the same root */
     sdm_part_audit *out;
 } job;
 
@@ -150,10 +151,12 @@ static void measure_parts(job *j)
 }
 
 /* Notes that a triangle of part a meets one of part b, another one. */
-static void count_meeting(sdm_part_audit *out, uint32_t a, uint32_t b)
+static void count_meeting(job *j, uint32_t a, uint32_t b)
 {
-    out->part[a].met++;
-    if (b < SDM_PART_MEETS) out->part[a].meets |= (uint32_t)1 << b;
+    sdm_part *p = &j->out->part[a];
+    p->met++;
+    if (b < SDM_PART_MEETS) p->meets |= (uint32_t)1 << b;
+    sdm_forest_join(j->group, a, b);
 }
 
 /* Counts the triangles of edge e that lie beside those of another part. */
@@ -163,9 +166,45 @@ static void count_shared_edge(job *j, const sdm_edge *e)
     for (uint32_t h = next[e->first]; h != SDM_NONE; h = next[h]) {
         const uint32_t other = j->part_of[h / 3];
         if (other == part) continue;
-        count_meeting(j->out, part, other);
-        count_meeting(j->out, other, part);
+        count_meeting(j, part, other);
+        count_meeting(j, other, part);
     }
+}
+
+size_t sdm_part_around(const sdm_part_audit *a, size_t index)
+{
+    const sdm_part *p = &a->part[index];
+    size_t around = a->n;
+    for (size_t i = 0; i < a->n; i++) {
+        const sdm_part *q = &a->part[i];
+        bool holds = i != index && q->state == SDM_PART_SOLID;
+        for (int d = 0; d < 3; d++)
+            holds = holds && q->min[d] <= p->min[d] && q->max[d] >= p->max[d];
+        if (holds && (around == a->n || fabs(q->volume) < fabs(a->part[around].volume))) around = i;
+    }
+    return around;
+}
+
+/* Finds the groups of parts that meet, and counts the solid ones. */
+static sdm_status find_groups(job *j, sdm_error *err)
+{
+    sdm_part_audit *a = j->out;
+    bool *solid = NULL;
+    const sdm_status s = SDM_ALLOC(&solid, a->n, "groups of parts", err);
+    if (s) return s;
+    for (size_t i = 0; i < a->n; i++) {
+        const size_t around = a->part[i].state == SDM_PART_CAVITY ? sdm_part_around(a, i) : a->n;
+        if (around < a->n) sdm_forest_join(j->group, (uint32_t)i, (uint32_t)around);
+    }
+    for (size_t i = 0; i < a->n; i++) {
+        sdm_part *p = &a->part[i];
+        p->group = sdm_forest_root(j->group, (uint32_t)i);
+        if (p->state != SDM_PART_SOLID || solid[p->group]) continue;
+        solid[p->group] = true;
+        a->bodies++;
+    }
+    sdm_free(solid);
+    return SDM_OK;
 }
 
 /* Counts open edges and contacts between parts. */
@@ -188,7 +227,7 @@ static void count_edges_and_contacts(job *j)
                        b = j->part_of[contacts->list[i].other];
         if (a == NO_PART || b == NO_PART) continue;
         if (a != b)
-            count_meeting(j->out, a, b);
+            count_meeting(j, a, b);
         else if (contacts->list[i].tri < contacts->list[i].other) // the list has each pair twice
             j->out->part[a].crossed++;
     }
@@ -261,11 +300,13 @@ static sdm_status find_parts(job *j, sdm_error *err)
         s = sdm_parts_survey(&j->turned, &j->arena, &j->survey, &j->out->mesh, &j->out->turned,
                              &n_turned, err);
     if (!s) s = number_parts(j, err);
+    if (!s) s = SDM_ALLOC(&j->group, j->out->n, "groups of parts", err);
     if (s) return s;
+    for (size_t i = 0; i < j->out->n; i++) j->group[i] = (uint32_t)i;
     measure_parts(j);
     count_edges_and_contacts(j);
     judge_parts(j);
-    return SDM_OK;
+    return find_groups(j, err);
 }
 
 /* Thickness and folds of the parts. */
@@ -284,6 +325,7 @@ static void job_dispose(job *j)
     sdm_arena_dispose(&j->arena);
     sdm_mesh_dispose(&j->turned);
     sdm_free(j->part_of);
+    sdm_free(j->group);
 }
 
 sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audit *out,

@@ -117,7 +117,6 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
     for (size_t i = 0; i < audit.n; i++) {
         out->open += audit.part[i].open_edges;
         out->turned += audit.part[i].turned && audit.part[i].volume < 0;
-        out->apart += audit.n > 1 && audit.part[i].state == SDM_PART_SOLID && !audit.part[i].met;
         out->crossed += audit.part[i].crossed;
         out->flat += sdm_survey_part_is_flat(&audit, i);
         out->winding = fmax(out->winding, sdm_survey_part_winding(&audit, i));
@@ -125,6 +124,7 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
     }
     sdm_survey_contacts(&audit, &out->contacts);
     out->thick = sdm_part_audit_thickness(&audit);
+    out->apart = audit.bodies > 1 ? audit.bodies : 0;
     out->inside_out = audit.inside_out;
     out->overlaps = audit.mesh.self_intersections;
     out->degenerate = audit.mesh.degenerate;

@@ -38,7 +38,9 @@ typedef struct sdm_part {
     double open_at[3]; /* middle of the first of them, mm */
     size_t met; /* pairs of a triangle of this part and a triangle of another that meet or share an
                    edge */
-    uint32_t meets;        /* bit k: it meets part k, for the first SDM_PART_MEETS parts */
+    uint32_t meets; /* bit k: it meets part k, for the first SDM_PART_MEETS parts */
+    size_t group; /* lowest index of the parts that such pairs connect with it; a cavity belongs to
+                     the part around it */
     size_t crossed;        /* pairs of triangles of this part that meet */
     double volume, area;   /* signed, mm^3, as given; mm^2 */
     double min[3], max[3]; /* bounding box, mm */
@@ -68,6 +70,7 @@ typedef struct sdm_part_audit {
     sdm_part *part; /* [n], by their lowest triangle; triangles that repeat a vertex have no part */
     size_t n;
     size_t inside_out; /* parts of this state */
+    size_t bodies;     /* groups of parts with a solid part: what does not meet is counted apart */
     /* volume, mm^3, and area, mm^2, of the union, as the engine measures it: overlaps count once.
      * NaN: not asked for, or the mesh is open. */
     double union_volume, union_area;
@@ -90,11 +93,13 @@ void sdm_triangle_add(const sdm_mesh *m, size_t t, const double apex[3], double 
  */
 void sdm_mesh_sums(const sdm_mesh *m, double *volume, double *area);
 
-/* The smallest distance, mm, between the surface of part `index`, which must touch no other part,
- * and the surfaces of the other parts; negative: part `index` lies inside one of them. NaN: it is
- * the only part, numbers of its vertices lie among those of another part, or the engine refuses the
- * other parts. [any thread] */
+/* The smallest distance, mm, between the surfaces of the group of part `index` and those of all
+ * other parts; negative: the group lies inside one of them. NaN: there is no other group, numbers
+ * of its vertices lie among those of another one, or the engine refuses one side. [any thread] */
 double sdm_part_gap(const sdm_mesh *m, const sdm_part_audit *a, size_t index);
+
+/* Index of the smallest solid part whose box holds that of part `index`; a->n: there is none. */
+size_t sdm_part_around(const sdm_part_audit *a, size_t index);
 
 /* Index of the part with the smallest thickness; a->n: none is known. */
 size_t sdm_part_audit_thinnest(const sdm_part_audit *a);

@@ -137,8 +137,9 @@ typedef struct sdm_shape_survey {
      * the first shape; of a few samples, too, if it is slow there. 0: it moves no vertex by 1e-9 of
      * the size over the range. */
     double *speed;
-    size_t slow;            /* parameters that are odd by themselves: sdm_survey_is_slow() */
-    sdm_survey_count apart; /* solid parts that meet no other part of the mesh */
+    size_t slow; /* parameters that are odd by themselves: sdm_survey_is_slow() */
+    /* groups of parts that meet each other, but no part of another group; amount: their number */
+    sdm_survey_count apart;
     /* parts that enclose nothing, or are thinner than SDM_SURVEY_FLAT times the longest edge of the
      * box of the shape: two walls of a part lie on each other */
     sdm_survey_count flat;

@@ -85,10 +85,11 @@ static void print_other(const sdm_train_report *r)
     printf("\n");
 }
 
-/* before: the error of the model that the run has replaced, mm; NaN: there is none to compare. */
+/* before: the error of the model that the run has replaced, mm; NaN: there is none to compare.
+ * minutes: train.minutes of the run. */
 static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
                                 const cli_timing *times, const cli_ranks_use *use, double before,
-                                sdm_error *err)
+                                double minutes, sdm_error *err)
 {
     const sdm_accuracy *a = &r->accuracy;
     // print as JSON
@@ -146,6 +147,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     if (r->compared) print_other(r);
     cli_print_verdict(&r->verdict);
     if (isfinite(before)) cli_print_before(before, a->rmse_mm);
+    cli_print_far(args, r, minutes);
     cli_print_next(args, r, r->chosen ? kind_name(r->kind) : NULL, times->ms_network);
     if (cli_warnings() > 0)
         printf("  warnings    %zu, at the beginning of the output%s\n", cli_warnings(),
@@ -179,7 +181,7 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     if (!s) s = look_at_model(report.model_path, shape, folder, &times, err);
     const double old_mm = s ? NAN : cli_before_rmse(before, report.model_path);
     sdm_model_free(before);
-    if (!s) s = print_summary(args, &report, &times, &use, old_mm, err);
+    if (!s) s = print_summary(args, &report, &times, &use, old_mm, config->train.minutes, err);
     sdm_free(use.memory);
     return s || !args->report
                ? s

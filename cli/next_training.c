@@ -59,26 +59,74 @@ static void add_changes(sdm_text *command, const cli_args *args, const sdm_verdi
     cli_add_next_word(command, change);
 }
 
+/* Appends the options of the command line, and a folder beside that of the run. */
+static void add_options(sdm_text *command, const cli_args *args, const sdm_train_report *r)
+{
+    const char *slash = strrchr(r->model_path, '/');
+    const int length = slash ? (int)(slash - r->model_path) : 0;
+    char folder[sizeof r->model_path + 8];
+    snprintf(folder, sizeof folder, "%.*s-2", length, r->model_path);
+    for (size_t i = 0; i < args->plugins.n; i++)
+        add_option(command, "--plugin", args->plugins.items[i]);
+    if (args->isolate) cli_add_next_word(command, "--isolate");
+    add_number(command, "--isolate-seconds", args->isolate_seconds);
+    add_number(command, "--isolate-memory", args->isolate_memory);
+    add_number(command, "--ranks", (double)args->ranks);
+    if (args->dataset) add_option(command, "--dataset", args->dataset);
+    add_option(command, "--out", folder);
+}
+
+/* "0.012 mm, 22 times worse": an error, compared with that of this run's model. */
+static void add_error(sdm_text *text, double error, double own)
+{
+    const double ratio = error / own;
+    sdm_text_add(text, "%.2g mm", error);
+    if (ratio > 1.05)
+        sdm_text_add(text, ", %.2g times worse", ratio);
+    else if (ratio < 1 / 1.05)
+        sdm_text_add(text, ", %.2g times better", 1 / ratio);
+    else
+        sdm_text_add(text, ", the same");
+}
+
+void cli_print_far(const cli_args *args, const sdm_train_report *r, double minutes)
+{
+    // the verdict, with the changes of the other kind: none but the minutes
+    const sdm_verdict *v = &r->verdict, pod = {.minutes = minutes};
+    sdm_text command = {0}, price = {0};
+    if (!v->limited || v->limit != SDM_CAUSE_FAR || v->cut > 0 || v->inside_out > 0) return;
+    if (r->compared || r->tried) {
+        sdm_text_add(&price, "auto has %s it, too: within a voxel of the surface ",
+                     r->compared ? "trained" : "tried");
+        add_error(&price, r->other_voxel_mm, v->rmse_voxel_mm);
+        sdm_text_add(&price, "; everywhere ");
+        add_error(&price, r->other.rmse_mm, v->rmse_mm);
+        if (!r->compared) sdm_text_add(&price, " (a trial, which training improves)");
+    } else {
+        sdm_text_add(&price, "this run has not measured it: near the surface it may be worse");
+    }
+    if (args->files.n) {
+        add_changes(&command, args, &pod, "pod");
+        add_options(&command, args, r);
+    }
+    if (!price.failed && !command.failed) {
+        printf("  far away    where distances far from the surface matter: pod; %s\n", price.data);
+        if (command.data) printf("              sdmgen train%s\n", command.data);
+    }
+    sdm_text_dispose(&price);
+    sdm_text_dispose(&command);
+}
+
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
                     double ms_map)
 {
     const sdm_verdict *v = &r->verdict;
-    const char *slash = strrchr(r->model_path, '/');
-    char folder[sizeof r->model_path + 8];
     sdm_text command = {0};
     // the maps of another grid are not in --dataset
     const bool other_maps = args->dataset && (v->cut > 0 || !strncmp(v->key, "grid.", 5));
-    if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || !slash || other_maps) return;
-    snprintf(folder, sizeof folder, "%.*s-2", (int)(slash - r->model_path), r->model_path);
+    if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || other_maps) return;
     add_changes(&command, args, v, kind);
-    for (size_t i = 0; i < args->plugins.n; i++)
-        add_option(&command, "--plugin", args->plugins.items[i]);
-    if (args->isolate) cli_add_next_word(&command, "--isolate");
-    add_number(&command, "--isolate-seconds", args->isolate_seconds);
-    add_number(&command, "--isolate-memory", args->isolate_memory);
-    add_number(&command, "--ranks", (double)args->ranks);
-    if (args->dataset) add_option(&command, "--dataset", args->dataset);
-    add_option(&command, "--out", folder);
+    add_options(&command, args, r);
     if (!command.failed)
         printf("  %-11s sdmgen train%s\n", v->grade == SDM_GRADE_GOOD ? "better" : "next",
                command.data);

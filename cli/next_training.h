@@ -9,3 +9,8 @@
    same kind again, and a second line tells what a map costs with it, ms_map; else NULL. */
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
                     double ms_map);
+
+/* Prints the line `far away` where the template errs far from the surface alone: the command that
+   trains `pod` with so many minutes (0: the configuration gives another budget), and what `auto`
+   has measured of it. */
+void cli_print_far(const cli_args *args, const sdm_train_report *r, double minutes);

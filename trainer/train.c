@@ -164,6 +164,12 @@ static sdm_status train_all(run *r, trainer *t, sdm_train_report *report, sdm_er
     sdm_status s = settle(r, t, err);
     if (!s && r->turns.at == 0) {
         s = train_turn(r, t, &unfit, report, err);
+        if (!s && r->turns.tried_other) {
+            report->tried = true;
+            report->other = (sdm_accuracy){.rmse_mm = r->turns.other.rmse_mm};
+            report->other_voxel_mm = r->turns.other.rmse_voxel_mm;
+            report->other_kind = r->turns.other.kind;
+        }
         if (s || r->turns.n == 1) return s;
         r->turns.first = *report;
         s = begin_second(r, t, err);

@@ -11,6 +11,7 @@
 #include "sdm/internal/near.h"
 #include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
+#include "sdm/internal/verdict.h"
 #include "sdm/isosurface.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
@@ -160,8 +161,9 @@ static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *s
         const double cuts = trained ? map->trained_mm : voxel;
         char advice[96] = "";
         if (trained || !map->thin)
-            snprintf(advice, sizeof advice, "; %s%.2g shows more of them",
-                     trained ? "a training with grid.spacing " : "--spacing ", 0.5 * cuts);
+            snprintf(advice, sizeof advice, "; about %.0f %% for this shape with %s%.2g",
+                     100 * SDM_VOLUME_BAD, trained ? "a training with grid.spacing " : "--spacing ",
+                     sdm_spacing_for_volume(cuts, fabs(more)));
         cli_warn(
             "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
             "%.3g mm cut its edges and thin parts%s",

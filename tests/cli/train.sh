@@ -121,6 +121,22 @@ sdmgen train link.yaml network.kind=pod data.start=700 data.memory_gb=0.012 --ou
 grep -q '^sdmgen: data.memory_gb is 0.012: of 700 random maps (data.start) on 8.78e+03 voxels the training starts with 659, ' err ||
     bad "the memory for maps: $(cat err)"
 
+# A template that errs far from the surface alone: nothing to change, or pod, at a price that auto has measured.
+cat >far.yaml <<'YAML'
+shape: {name: linkage, options: {links: 2, length: 1, radius: 1, tip: 1, joint: 1, base: 1}}
+grid: {spacing: 0.2}
+data: {static: 2, start: 64, online: 0, holdout: 12}
+train: {minutes: 0.05}
+YAML
+pod='^  far away    where distances far from the surface matter: pod; '
+expect 0 - sdmgen train far.yaml --out far --quiet
+has '^  verdict     Far from the surface .*: nothing to change for surfaces, level sets and fits near the surface; where distances far away matter, set network.kind to pod'
+has "${pod}auto has tried it, too: within a voxel of the surface [0-9.]+ mm, [0-9.e+]+ times worse; everywhere [0-9.]+ mm, .* \(a trial, which training improves\)\$"
+has '^              sdmgen train far\.yaml train\.minutes=0\.05 network\.kind=pod --out far-2$'
+expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 --out named --quiet
+has "${pod}this run has not measured it: near the surface it may be worse\$"
+has '^              sdmgen train far\.yaml train\.minutes=0\.02 network\.kind=pod --out named-2$'
+
 # auto: the command names the kind that was kept and the cost of its maps; that of the other kind is in its line and in the JSON.
 expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 data.holdout=12 --out both --quiet
 has '^  auto        trained (pod|template), too: RMSE .*, [0-9.e-]+ ms a map; not kept'

@@ -88,7 +88,9 @@ static void largest_part_limits(void **state)
         {"data.memory_gb=0.005", SDM_CAUSE_MAPS, 0, 0, "to 400 and data.memory_gb to 1;"},
         {NULL, SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f16"},
         {"network.weights=f16", SDM_CAUSE_ROUNDING, 0, 0, "set network.weights to f32"},
-        {NULL, SDM_CAUSE_FAR, 0, 0, "set network.kind to pod, which may be worse near the surface"},
+        {NULL, SDM_CAUSE_FAR, 0, 0,
+         "nothing to change for surfaces, level sets and fits near the surface; where distances "
+         "far away matter, set network.kind to pod (a finer grid does not change them)"},
         {NULL, SDM_CAUSE_TEMPLATE, 0, 0,
          "lower grid.spacing from 0.8 to 0.4 (and raise grid.size in proportion, if it is given)"},
     };
@@ -189,7 +191,7 @@ static void error_far_from_the_surface(void **state)
     trainer_verdict_decide(&in, &v);
     assert_int_equal(v.limit, SDM_CAUSE_FAR);
     assert_true(!v.key[0] &&
-                strstr(v.sentence, "set network.kind to pod, which may be worse near"));
+                strstr(v.sentence, "nothing to change for surfaces, level sets and fits near"));
     assert_non_null(strstr(v.sentence, "75 %"));
     v.largest_mm = 2, v.far_largest_mm = 0.9;
     assert_true(sdm_verdict_errs_far(&v));
@@ -324,7 +326,10 @@ static void uses_and_spacing(void **state)
     assert_true(fabs(sdm_verdict_spacing(&v) - 0.59) < 1e-9);
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "volumes of surfaces (.stl): off by 2.9 %, voxels of 0.8 mm cut "
-                               "edges and thin parts; grid.spacing 0.59 keeps more of them\n");
+                               "edges and thin parts; about 2 % with grid.spacing 0.59 (root mean "
+                               "square of the shapes)\n");
+    // one rule for the shapes of a training and for a single shape
+    assert_true(sdm_spacing_for_volume(0.8, 0.029) == sdm_verdict_spacing(&v));
     // a finer grid does not help where the network errs
     v.volume_error = 0.025;
     assert_true(isnan(sdm_verdict_spacing(&v)));

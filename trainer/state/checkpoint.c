@@ -328,10 +328,10 @@ static bool report_is_sound(const sdm_train_report *r)
 {
     const sdm_verdict *v = &r->verdict;
     return r->steps >= 0 && r->seconds >= 0 && ends(r->model_path, sizeof r->model_path) &&
-           is_bool(&r->compared) && is_bool(&r->chosen) && is_bool(&v->limited) &&
-           (unsigned)v->grade <= SDM_GRADE_POOR && (unsigned)v->limit < SDM_CAUSES &&
-           ends(v->key, sizeof v->key) && ends(v->triangles_by, sizeof v->triangles_by) &&
-           ends(v->sentence, sizeof v->sentence);
+           is_bool(&r->compared) && is_bool(&r->tried) && is_bool(&r->chosen) &&
+           is_bool(&v->limited) && (unsigned)v->grade <= SDM_GRADE_POOR &&
+           (unsigned)v->limit < SDM_CAUSES && ends(v->key, sizeof v->key) &&
+           ends(v->triangles_by, sizeof v->triangles_by) && ends(v->sentence, sizeof v->sentence);
 }
 
 /* Reads the turns of a run with two kinds. */
@@ -341,7 +341,8 @@ static sdm_status turns_read(const trainer *t, const sdm_section *stored, traini
     if (stored->size == sizeof *out) memcpy(out, stored->data, sizeof *out);
     bool sound = stored->size == sizeof *out && out->n == 2 && (out->at == 0 || out->at == 1) &&
                  out->share > 0 && out->share <= 1 && out->tried >= 0 && isfinite(out->tried) &&
-                 is_bool(&out->chosen) && report_is_sound(&out->first);
+                 is_bool(&out->chosen) && is_bool(&out->tried_other) &&
+                 report_is_sound(&out->first);
     for (int i = 0; i < 2 && sound; i++)
         sound = out->kind[i] == SDM_NETWORK_POD || out->kind[i] == SDM_NETWORK_TEMPLATE;
     return sound ? SDM_OK

@@ -221,9 +221,13 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
         snprintf(change, sizeof change, ": set network.weights to %s",
                  c->network.weights == SDM_WEIGHT_I8 ? "f16" : "f32");
     if (v->limit == SDM_CAUSE_FAR)
-        snprintf(change, sizeof change,
-                 ": where such distances matter, set network.kind to pod, which may be worse near "
-                 "the surface; a finer grid does not change them");
+        snprintf(
+            change, sizeof change,
+            ": %s; where distances far away matter, set network.kind to pod (a finer grid does "
+            "not change them)",
+            v->grade == SDM_GRADE_GOOD
+                ? "nothing to change for surfaces, level sets and fits near the surface"
+                : "surfaces, level sets and fits near the surface do not suffer from it");
     if (!strcmp(v->key, "grid.spacing"))
         snprintf(also, sizeof also, " (and raise grid.size in proportion, if it is given)");
     // with `auto`, a value that is the default of `auto` would become that of the kind

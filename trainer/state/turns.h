@@ -4,6 +4,12 @@
 
 #include "sdm/internal/train.h"
 
+/* The errors of one of the kinds that are compared, root mean squares in mm. */
+typedef struct turn_figures {
+    sdm_network_kind kind;
+    double rmse_mm, rmse_voxel_mm; /* of all voxels; of those within a voxel of the surface */
+} turn_figures;
+
 typedef struct training_turns {
     int n, at;                /* number of kinds to train, 1 or 2; the one in training */
     sdm_network_kind kind[2]; /* in the order of training */
@@ -13,6 +19,8 @@ typedef struct training_turns {
     double share;             /* part of the budget left by the trials that the first of two may
                                  use, 0 .. 1 */
     sdm_train_report first;   /* result of the first, while the second trains */
+    bool tried_other;         /* one kind is trained, but the other had a trial: */
+    turn_figures other;       /* its errors in the trial */
 } training_turns;
 
 /* *out = `asked` with the kind of the present turn, its defaults for all keys that have those of
@@ -28,12 +36,6 @@ double trainer_turns_left(const training_turns *r, const sdm_config *asked);
 
 /* "pod" or "template". */
 const char *trainer_turn_name(sdm_network_kind kind);
-
-/* The errors of one of the kinds that are compared, root mean squares in mm. */
-typedef struct turn_figures {
-    sdm_network_kind kind;
-    double rmse_mm, rmse_voxel_mm; /* of all voxels; of those within a voxel of the surface */
-} turn_figures;
 
 turn_figures trainer_turn_figures(sdm_network_kind kind, const sdm_train_report *r);
 

@@ -86,18 +86,26 @@ const char *sdm_grade_text(const sdm_verdict *v, char *text)
     return text;
 }
 
+/* The spacing, rounded down to two digits. */
+static double rounded_down(double spacing)
+{
+    const double unit = pow(10, floor(log10(spacing)) - 1);
+    return floor(spacing / unit) * unit;
+}
+
+double sdm_spacing_for_volume(double spacing, double off)
+{
+    // the volume that edges and thin walls lose is about quadratic in the spacing
+    return rounded_down(0.9 * sqrt(SDM_VOLUME_BAD / off) * spacing);
+}
+
 double sdm_verdict_spacing(const sdm_verdict *v)
 {
     if (!strcmp(v->key, "grid.spacing")) return v->to;
     const bool grid =
         sdm_verdict_surfaces_off(v) && !(v->surface_volume_error < GRID_SHARE * v->volume_error);
-    // the volume that edges and thin walls lose is about quadratic in the spacing
-    const double loss = SDM_VOLUME_BAD / v->surface_volume_error,
-                 most = sdm_verdict_lacks_part(v) ? 0.5 * v->thickness_mm
-                        : grid                    ? 0.9 * sqrt(loss) * v->coarse_mm
-                                                  : NAN,
-                 unit = pow(10, floor(log10(most)) - 1);
-    return floor(most / unit) * unit;
+    if (sdm_verdict_lacks_part(v)) return rounded_down(0.5 * v->thickness_mm);
+    return grid ? sdm_spacing_for_volume(v->coarse_mm, v->surface_volume_error) : NAN;
 }
 
 bool sdm_verdict_errs_far(const sdm_verdict *v) { return v->far_largest_mm > v->voxel_mm; }

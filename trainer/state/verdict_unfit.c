@@ -58,8 +58,8 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
     else if (sdm_verdict_surfaces_off(v) && spacing < v->coarse_mm)
         add(l,
             "volumes of surfaces (.stl): off by %s %%, voxels of %.3g mm cut edges and thin parts; "
-            "grid.spacing %.2g keeps more of them",
-            percent(v->surface_volume_error, text), v->coarse_mm, spacing);
+            "about %.0f %% with grid.spacing %.2g (root mean square of the shapes)",
+            percent(v->surface_volume_error, text), v->coarse_mm, 100 * SDM_VOLUME_BAD, spacing);
     else if (sdm_verdict_surfaces_off(v))
         add(l, "volumes of surfaces (.stl): off by %s %%", percent(v->surface_volume_error, text));
 }

@@ -82,6 +82,9 @@ typedef struct sdm_train_report {
     sdm_network_kind other_kind;
     sdm_accuracy other;
     double other_voxel_mm, other_ms;
+    /* It has only tried another kind, in a short trial: other_kind, other.rmse_mm and
+       other_voxel_mm are of this. */
+    bool tried;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled

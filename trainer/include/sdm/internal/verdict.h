@@ -150,6 +150,11 @@ bool sdm_verdict_lacks_part(const sdm_verdict *v);
    thread] */
 double sdm_verdict_spacing(const sdm_verdict *v);
 
+/* The spacing, mm, with which surfaces enclose volumes that are off by a little less than
+   SDM_VOLUME_BAD, where with `spacing` they are off by `off` > 0 of the volume, because voxels cut
+   edges and thin walls. Rounded down to two digits. [any thread] */
+double sdm_spacing_for_volume(double spacing, double off);
+
 /* true: farther than near_mm from the surface, where the grade says nothing, the largest error
    exceeds a voxel. [any thread] */
 bool sdm_verdict_errs_far(const sdm_verdict *v);

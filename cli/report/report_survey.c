@@ -427,6 +427,9 @@ static void tell_thin(teller *t)
         sdm_text_add(&text, "; parts are too thin ");
         add_share(t->s, c, &text);
         sdm_text_add(&text, ")");
+        if (t->s->config)
+            sdm_text_add(&text, "; use grid: {spacing: %.2g}",
+                         0.5 * sdm_part_audit_thickness(&audit));
         tell(t, SDM_E_QUALITY, &text);
     }
     sdm_part_audit_dispose(&audit);

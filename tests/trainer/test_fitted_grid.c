@@ -200,6 +200,58 @@ static void test_thin(void **state)
     sdm_instance_free(plate);
 }
 
+/* A plate of 10 scale x 10 scale mm. */
+static int scaled_plate(const sdm_host *host, const double *p, double scale, sdm_mesh_out *out)
+{
+    const int failed = plate_mesh(NULL, host, NULL, p, out);
+    for (int i = 0; i < 8 && !failed; i++)
+        for (int a = 0; a < 2; a++) out->vert[3 * i + a] *= scale;
+    return failed;
+}
+
+static int sheet_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                      const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    return scaled_plate(host, p, 3, out);
+}
+
+static int foil_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                     const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    return scaled_plate(host, p, 20, out);
+}
+
+// A part that needs over 96 voxels along the longest edge for two voxels across it gets them, up to
+// 400,000 in all; the line says what keeps the grid from being finer, and the key that makes it so.
+static void test_thinner(void **state)
+{
+    (void)state;
+    static const char text[] = "shape: {name: plate}\ntrain: {steps: 1}\n";
+    sdm_error e = {0};
+    for (int k = 0; k < 2; k++) {
+        sdm_shape thin = plate_shape;
+        sdm_config c;
+        sdm_text line = {0};
+        sdm_instance *sheet = NULL;
+        thin.mesh = k ? foil_mesh : sheet_mesh;
+        if (sdm_instance_create(&thin, NULL, 0, NULL, &sheet, &e) ||
+            sdm_config_parse("test.yaml", text, strlen(text), NULL, 0, &c, &e) ||
+            sdm_train_complete(&c, sheet, &line, &e))
+            fail_msg("%s", e.text);
+        if (!k) assert_true(c.grid.n[0] > 96 && 2 * c.grid.spacing[0] <= 0.42);
+        assert_true(sdm_grid_count(&c.grid) <= 400000);
+        if (!strstr(line.data, k ? "; at most 400,000 voxels in all; still finer with grid: "
+                                   "{spacing: 0.1"
+                                 : "; no more than two voxels across it, as the longest edge has "
+                                   "over 96; still finer with grid: {spacing: 0.1"))
+            fail_msg("%s", line.data);
+        sdm_text_dispose(&line);
+        sdm_instance_free(sheet);
+    }
+}
+
 /* Distance, in voxels, of a plane perpendicular to an axis from the closest voxel centres. */
 static double plane_distance(const sdm_grid *g, int axis, double at)
 {
@@ -328,10 +380,11 @@ static void test_proposal(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_around),   cmocka_unit_test(test_capsule),
-        cmocka_unit_test(test_metres),   cmocka_unit_test(test_thin),
-        cmocka_unit_test(test_faces),    cmocka_unit_test(test_surplus),
-        cmocka_unit_test(test_proposal), cmocka_unit_test(test_faces_on_planes),
+        cmocka_unit_test(test_around),          cmocka_unit_test(test_capsule),
+        cmocka_unit_test(test_metres),          cmocka_unit_test(test_thin),
+        cmocka_unit_test(test_thinner),         cmocka_unit_test(test_faces),
+        cmocka_unit_test(test_surplus),         cmocka_unit_test(test_proposal),
+        cmocka_unit_test(test_faces_on_planes),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -10,8 +10,9 @@ enum { BOX_SAMPLES = 256, THIN_SAMPLES = 8, FACE_SAMPLES = 8, BOX_SEED = 1 };
 
 /* `grid: auto` makes SDM_GRID_THIN_VOXELS voxels across the thinnest part of the shapes, as long as
  * the longest edge has at most VOXELS_MOST of them and the grid at most COUNT_MOST: maps and
- * training cost as much as there are voxels. */
-enum { VOXELS_MOST = 96 };
+ * training cost as much as there are voxels. A longer edge is allowed for LEAST_ACROSS voxels:
+ * thinner parts are missing. */
+enum { VOXELS_MOST = 96, VOXELS_END = 4096, LEAST_ACROSS = 2 };
 static const double COUNT_MOST = 4e5;
 
 /* Most voxels of any fitted grid: a map of floats has 8 GB then. */
@@ -39,21 +40,31 @@ static sdm_status find_family(const sdm_config *config, const sdm_instance *shap
 }
 
 /* Replaces *grid, which has SDM_GRID_VOXELS along its longest edge, by a finer one if the thinnest
- * part of the shapes, *thick mm, needs it: the grid of `grid: auto`. */
+ * part of the shapes, *thick mm, needs it: the grid of `grid: auto`. *limit = what keeps it from
+ * SDM_GRID_THIN_VOXELS voxels across this part; NULL: nothing. */
 static sdm_status refine_for_thin(const sdm_config *config, const sdm_instance *shape,
-                                  const family *f, double *thick, sdm_grid *grid, sdm_error *err)
+                                  const family *f, double *thick, const char **limit,
+                                  sdm_grid *grid, sdm_error *err)
 {
     size_t n_params;
     sdm_instance_params(shape, &n_params);
     sdm_status s = sdm_shape_thickness(shape, (const double(*)[2])f->range, THIN_SAMPLES, BOX_SEED,
                                        thick, err);
-    for (int n = SDM_GRID_VOXELS + 4; n <= VOXELS_MOST && !s; n += 4) {
+    for (int n = SDM_GRID_VOXELS + 4; n <= VOXELS_END && !s; n += 4) {
         sdm_grid finer;
-        if (isnan(*thick) || SDM_GRID_THIN_VOXELS * sdm_grid_coarsest(grid) <= *thick) break;
+        const double h = sdm_grid_coarsest(grid);
+        *limit = NULL;
+        if (isnan(*thick) || SDM_GRID_THIN_VOXELS * h <= *thick) break;
+        *limit = n > VOXELS_MOST + 4
+                     ? "no more than two voxels across it, as the longest edge has over 96"
+                     : "at most 96 voxels along the longest edge";
+        if (n > VOXELS_MOST && LEAST_ACROSS * h <= *thick) break;
         s = sdm_grid_around(f->low, f->high, n, NULL, &finer, err);
-        if (s || (double)sdm_grid_count(&finer) > COUNT_MOST ||
-            !sdm_train_fits_memory(config, n_params, &finer))
-            break;
+        if (s) break;
+        *limit = "at most 400,000 voxels in all";
+        if ((double)sdm_grid_count(&finer) > COUNT_MOST) break;
+        *limit = "data.memory_gb does not hold maps of more voxels";
+        if (!sdm_train_fits_memory(config, n_params, &finer)) break;
         *grid = finer;
     }
     return s;
@@ -125,6 +136,7 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
     if (config->grid.n[0] > 0) return SDM_OK;
     const double *spacing = config->grid.spacing[0] > 0 ? config->grid.spacing : NULL;
     double thick = NAN;
+    const char *limit = NULL;
     family f;
     sdm_grid grid;
     sdm_status s = find_family(config, shape, &f, err);
@@ -133,7 +145,7 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
     s = sdm_grid_around(f.low, f.high, config->grid_voxels, spacing, &grid, err);
     if (s) return sdm_fail_in(err, SDM_E_CONFIG, "%s: grid", config->file);
     const double usual = grid.spacing[0];
-    if (config->grid_auto) s = refine_for_thin(config, shape, &f, &thick, &grid, err);
+    if (config->grid_auto) s = refine_for_thin(config, shape, &f, &thick, &limit, &grid, err);
     if (!s) s = avoid_faces(shape, &f, &grid, err);
     if (s) return s;
     const bool finer = grid.spacing[0] < usual;
@@ -150,6 +162,10 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
                      "; voxels of %.3g mm in place of %.3g, because the thinnest part of %d random "
                      "shapes is %.2g mm thick (grid.voxels: %d for the coarser grid)",
                      grid.spacing[0], usual, THIN_SAMPLES, thick, SDM_GRID_VOXELS);
+    if (limit)
+        sdm_text_add(line, "; %s; %s with grid: {spacing: %.2g}", limit,
+                     finer ? "still finer" : "finer for the thinnest part",
+                     thick / SDM_GRID_THIN_VOXELS);
     return line->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
 }
 
@@ -171,8 +187,9 @@ sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance 
         sdm_text_add(out, "} (");
     } else {
         double thick;
+        const char *limit;
         s = sdm_grid_around(f.low, f.high, SDM_GRID_VOXELS, NULL, &grid, err);
-        if (!s) s = refine_for_thin(config, shape, &f, &thick, &grid, err);
+        if (!s) s = refine_for_thin(config, shape, &f, &thick, &limit, &grid, err);
         if (!s) s = avoid_faces(shape, &f, &grid, err);
         if (s) return s;
         sdm_text_add(out, "grid: auto (");

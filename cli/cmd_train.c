@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "commands.h"
 #include "inputs/config_shape.h"
@@ -158,6 +159,14 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     return SDM_OK;
 }
 
+/* Does the folder hold a checkpoint from which --resume goes on? */
+static bool has_checkpoint(const char *folder)
+{
+    char path[SDM_PATH_TEXT_MAX + 32];
+    snprintf(path, sizeof path, "%s/checkpoint.sdmc", folder);
+    return !access(path, F_OK);
+}
+
 static sdm_status train_network(const cli_args *args, const sdm_config *config,
                                 const sdm_instance *shape, const sdm_map_store *store,
                                 sdm_comm *comm, sdm_error *err)
@@ -170,7 +179,8 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     sdm_train_report report = {0};
     hooks.comm = comm;
     sdm_model *before = first && args->force ? cli_model_before(folder) : NULL;
-    if (first && !args->resume) cli_notice_survey(config, shape);
+    // a run that goes on has told it at its beginning
+    if (first && !(args->resume && has_checkpoint(folder))) cli_notice_survey(config, shape);
     if (first) cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
     if (first) cli_progress_end(&progress, !s);
@@ -196,6 +206,21 @@ static void share_threads(const cli_args *args, sdm_config *config)
     if (args->ranks > 1 && !config->threads) config->threads = n > 1 ? n : 1;
 }
 
+/* Refuses options that do nothing in a plan. */
+static sdm_status check_plan(const cli_args *args, sdm_error *err)
+{
+    const struct {
+        const char *name;
+        bool given;
+    } options[] = {{"--ranks", args->ranks > 0},       {"--resume", args->resume},
+                   {"--force", args->force},           {"--out", args->out != NULL},
+                   {"--report", args->report != NULL}, {"--dataset", args->dataset != NULL}};
+    for (size_t i = 0; i < sizeof options / sizeof *options; i++)
+        if (options[i].given)
+            return sdm_fail(err, SDM_E_ARG, "--plan trains nothing: leave out %s", options[i].name);
+    return SDM_OK;
+}
+
 sdm_status cmd_train(const cli_args *args, sdm_error *err)
 {
     sdm_config *config = NULL;
@@ -206,14 +231,14 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     sdm_status s = cli_page_check_option(args, err);
     if (!s && (args->nodes || args->cores) && !args->plan)
         s = sdm_fail(err, SDM_E_ARG, "--nodes and --cores belong to --plan");
-    if (!s && args->ranks && args->plan)
-        s = sdm_fail(err, SDM_E_ARG, "--plan trains nothing: leave out --ranks");
+    if (!s && args->plan) s = check_plan(args, err);
     const bool trains = !args->plan;
     if (!s && trains) s = cli_ranks_start(args, &comm, err);
     if (!s) s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && args->out && strlen(args->out) >= sizeof config->output.folder)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
+    if (!s && !trains) cli_notice_survey(config, shape);
     if (!s && !trains) s = cli_plan_training(args, config, shape, err);
     if (!s && trains && !sdm_comm_rank(comm))
         s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);

@@ -74,4 +74,13 @@ has '^  maps     [0-9]+ maps '
 grep -q '^  refine' out && bad 'steps of a template without a correction'
 expect 2 '--nodes and --cores belong to --plan' sdmgen train "$tiny" --nodes 2
 expect 2 "'0'" sdmgen train "$tiny" --plan --nodes 0
+# Options of a training do nothing here. A grid that cuts the shapes is told, as train does.
+for option in '--ranks 2' --resume --force '--out run' '--report page.html' '--dataset maps'; do
+    # shellcheck disable=SC2086
+    expect 2 "^sdmgen: error: --plan trains nothing: leave out ${option%% *}\$" sdmgen train template.yaml --plan $option
+done
+cuts='warning: over the parameters the shape reaches from .*; the grid covers .* and cuts'
+expect 0 "$cuts" sdmgen train template.yaml 'grid.size=[8,8,8]' --plan -q
+# So does a run that is to go on, but begins, as there is no checkpoint.
+expect 0 "$cuts" sdmgen train template.yaml 'grid.size=[8,8,8]' --resume --out begun -q
 finish

@@ -146,6 +146,13 @@ static sdm_status make_blocks(job *j, const sdm_exact *engine, sdm_error *err)
     return s;
 }
 
+/* Is nothing asked for but --measure, which needs no map? */
+static bool measures_alone(const cli_args *args)
+{
+    return args->measure && !args->outputs.n && !args->json && !args->certify && !args->returns &&
+           !cli_layers_wanted(args);
+}
+
 static sdm_status run_engine(job *j, sdm_error *err)
 {
     const sdm_exact_opts opts = {.sign = find_sign_method(j->args->sign),
@@ -159,7 +166,8 @@ static sdm_status run_engine(job *j, sdm_error *err)
     j->report = *sdm_exact_get_report(j->engine);
     s = cli_grid_for_box(j->args, j->report.audit.min, j->report.audit.max, &j->grid, err);
     const double query = sdm_clock();
-    if (!s && blocks_suffice(j)) s = make_blocks(j, j->engine, err);
+    if (s || measures_alone(j->args)) return s;
+    if (blocks_suffice(j)) s = make_blocks(j, j->engine, err);
     if (!s && !j->blocks.tile) {
         s = cli_allocate_map(&j->grid, &j->values, err);
         if (!s) s = cli_layers_map(&j->layers, j->args, j->engine, &j->grid, j->values, err);
@@ -290,10 +298,11 @@ static bool writes_labels(const cli_args *args)
 static void notice_mesh(job *j)
 {
     const sdm_audit *a = &j->report.audit;
+    const bool map = !j->args->points && !measures_alone(j->args);
     int64_t inside = 1; // a level set without voxels inside is refused when it is written
     float min, max;
     if (j->values) find_range(j, &min, &max, &inside);
-    if (inside && !j->args->points)
+    if (inside && map)
         cli_warn_cut_shape(&j->grid, j->mesh.vert, j->mesh.n_vert,
                            "a larger grid (--size, --spacing, --origin) holds it");
     const double size = sqrt(v3_dist2(a->min, a->max));
@@ -303,16 +312,16 @@ static void notice_mesh(job *j)
     // a closed part that meets no other cannot be inside out after the engine has turned it; the
     // audit of the single part of a file, which may be large, would only tell its thickness
     if (a->components > 1 || !a->closed || j->args->shape)
-        j->thin = cli_warn_mesh(&j->mesh, j->args->points ? 0 : sdm_grid_coarsest(&j->grid),
+        j->thin = cli_warn_mesh(&j->mesh, map ? sdm_grid_coarsest(&j->grid) : 0,
                                 j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
     else {
         cli_warn_audit(a);
         if (j->report.turned) cli_notice("the mesh is inside out; maps turn it");
     }
     // a part that is too thin, told above, is the cause of both
-    if (!j->thin && inside) warn_torn(j);
+    if (map && !j->thin && inside) warn_torn(j);
     if (!j->thin && !inside) tell_nothing_inside(&j->grid);
-    if (inside && a->closed && !j->args->points)
+    if (inside && a->closed && map)
         cli_tell_hits(&j->mesh, &j->grid, writes_labels(j->args), !j->args->like);
     if (j->report.unioned)
         cli_notice("the mesh overlaps itself: the union of its %zu triangles is bounded by %zu "

@@ -83,4 +83,11 @@ expect 2 'belong to --shape; sdmgen mesh --audit measures a mesh file' sdmgen ex
 expect 2 '--measure does not go with --points' sdmgen exact --shape torus --measure --points torus.ply
 expect 2 'it does not go with --params' sdmgen generate $model --measure --params rows.csv
 expect 3 'measure .diameter_a.: the diameters need three quarters of a turn' sdmgen exact --shape cochlea -O theta=4 --measure
+# Measures alone need no map, and no voxels; a map of the same shape is warned of.
+rod=(--shape linkage -O links=1 -O length=24 -O radius=0.15 -O tip=0.15 -O base=0.1)
+expect 0 - sdmgen exact "${rod[@]}" --measure -q
+has '^  volume +1\.[0-9]+ mm\^3$'
+if grep -q 'warning' err; then bad "a warning of voxels without a map: $(cat err)"; fi
+expect 0 'warning: .* too thin for voxels of' sdmgen exact "${rod[@]}" --measure -o rod.npy -q
+
 finish

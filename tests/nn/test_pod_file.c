@@ -305,8 +305,8 @@ static void quality_is_kept(void **state)
     assert_int_equal(sdm_model_check_use(m, SDM_USE_VOLUME_DERIVATIVE, &err), SDM_E_QUALITY);
     assert_string_equal(err.text,
                         "derivatives of volumes of its maps are off by 50 % for the "
-                        "worst parameter, more than 20 %; those of exact maps are right if the "
-                        "shape has the same triangles for all parameters");
+                        "worst parameter, more than 20 %; take differences of volumes of the mesh "
+                        "(exact --measure): those of maps swing as faces cross planes of voxels");
     assert_int_equal(sdm_model_check_use(m, SDM_USE_SURFACE_VOLUME, &err), SDM_E_QUALITY);
     assert_string_equal(err.text, "volumes inside the surfaces of its maps are off by 2.02 %, more "
                                   "than 2 %: they cut edges and thin walls between the voxels");

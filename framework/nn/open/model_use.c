@@ -45,21 +45,24 @@ sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error 
     if (use == SDM_USE_DISTANCE) return check_distances(info, err);
     static const char worst[] = " for the worst parameter",
                       slopes[] = "; those of exact maps are right if the shape has the same "
-                                 "triangles for all parameters";
+                                 "triangles for all parameters",
+                      volume_slopes[] = "; take differences of volumes of the mesh (exact "
+                                        "--measure): those of maps swing as faces cross planes of "
+                                        "voxels";
     const struct {
         const char *name, *worst;
         double error, bad;
         const char *remedy;
-    } figures[] =
-        {[SDM_USE_VOLUME] = {"volumes of its maps", "", q->volume_error, SDM_VOLUME_BAD,
-                             "; those of exact maps are right"},
-         [SDM_USE_SURFACE_VOLUME] = {"volumes inside the surfaces of its maps", "",
-                                     q->surface_volume_error, SDM_VOLUME_BAD,
-                                     ": they cut edges and thin walls between the voxels"},
-         [SDM_USE_DERIVATIVE] = {"derivatives of its maps", worst, q->derivative_error,
-                                 SDM_DERIVATIVE_BAD, slopes},
-         [SDM_USE_VOLUME_DERIVATIVE] = {"derivatives of volumes of its maps", worst,
-                                        q->volume_derivative_error, SDM_DERIVATIVE_BAD, slopes}},
+    } figures[] = {[SDM_USE_VOLUME] = {"volumes of its maps", "", q->volume_error, SDM_VOLUME_BAD,
+                                       "; those of exact maps are right"},
+                   [SDM_USE_SURFACE_VOLUME] =
+                       {"volumes inside the surfaces of its maps", "", q->surface_volume_error,
+                        SDM_VOLUME_BAD, ": they cut edges and thin walls between the voxels"},
+                   [SDM_USE_DERIVATIVE] = {"derivatives of its maps", worst, q->derivative_error,
+                                           SDM_DERIVATIVE_BAD, slopes},
+                   [SDM_USE_VOLUME_DERIVATIVE] = {"derivatives of volumes of its maps", worst,
+                                                  q->volume_derivative_error, SDM_DERIVATIVE_BAD,
+                                                  volume_slopes}},
       *f = &figures[use];
     if (isnan(f->error))
         return sdm_fail(err, SDM_E_UNSUPPORTED, "the training did not measure the errors of %s",

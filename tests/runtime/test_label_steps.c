@@ -1,5 +1,7 @@
 /* Deviations of fits to labels of a box whose faces are parallel to the voxels, or nearly: the
- * labels show each face to a voxel only, however many voxels the face has. Tests: label_steps.c */
+ * labels show each face to a voxel only, however many voxels the face has; and of a rod along an
+ * axis of the voxels, whose wall may err alike on all sides. Tests: label_steps.c, matching_steps.c
+ */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -7,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "fit/trust/matching_steps.h"
 #include "oracle/exact_meshes.h"
 #include "oracle/fit_tools.h"
 
@@ -161,10 +164,80 @@ static void test_oblique_faces(void **state)
     assert_true(found.widest < 0.2);
 }
 
+static const sdm_param rod_params[] = {{"radius", "mm", 1, 5, 2.5, "radius of the rod"},
+                                       {"length", "mm", 5, 20, 10, "length without the caps"}};
+
+/* Fits a rod with this radius, 10 mm long, to its labels with voxels of 1 mm. Its axis lies along
+ * z, off the centre of a voxel by `off` (mm) along x and y. Returns the error of the radius in
+ * deviations. */
+static double rod_error(double radius, double off)
+{
+    sdm_shape rod = *sdm_registry_find(registry, "capsule", NULL);
+    sdm_instance *shape = NULL;
+    rod.params = rod_params;
+    if (sdm_instance_create(&rod, &(sdm_named_text){"edge", "0.1"}, 1, NULL, &shape, NULL)) abort();
+    enum { ACROSS = 13, ALONG = 25 };
+    const sdm_grid g =
+        sdm_grid_centred((int64_t[3]){ACROSS, ACROSS, ALONG}, 1, (double[3]){0, 0, 0});
+    const sdm_fit_source source = {.shape = shape, .grid = g};
+    float v[ALONG][ACROSS][ACROSS];
+    for (int z = 0; z < ALONG; z++)
+        for (int y = 0; y < ACROSS; y++)
+            for (int x = 0; x < ACROSS; x++)
+                v[z][y][x] = hypot(hypot(x - ACROSS / 2 - off, y - ACROSS / 2 - off),
+                                   fmax(fabs((double)(z - ALONG / 2)) - 5, 0)) < radius;
+    const sdm_fit_target t = {.kind = SDM_FIT_LABEL, .grid = g, .values = v[0][0]};
+    sdm_fit_opts o = sdm_fit_defaults_for(1);
+    sdm_fit_result r;
+    sdm_error err = {0};
+    const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);
+    if (s && s != SDM_E_QUALITY) fail_msg("%s", err.text);
+    const double error = (r.params[0] - radius) / r.sd[0];
+    sdm_fit_dispose(&r);
+    sdm_instance_free(shape);
+    return error;
+}
+
+/* The labels of the first two rods have 13 and 21 voxels in each layer, as many as the areas of
+ * circles with radii of 2.03 and 2.59 mm. With independent errors of the four sides their radii are
+ * 2.4 and 3 deviations off. */
+static void test_rod_along_an_axis(void **state)
+{
+    (void)state;
+    assert_true(fabs(rod_error(2.23, 0)) < 2);
+    assert_true(fabs(rod_error(2.3, 0)) < 2);
+    assert_true(fabs(rod_error(2.4, 0.2)) < 2);
+}
+
+// variance of the mean of four pieces with these places, beyond that of independent pieces
+static double missing_variance(const double place[4])
+{
+    const double score = 0.25;
+    double work, variance = 0;
+    fit_matching_step list[4];
+    for (int i = 0; i < 4; i++)
+        list[i] = (fit_matching_step){.place = place[i], .sd = 2, .weight = 3, .score = &score};
+    sdm_fit_matching_steps(list, 4, 1, &work, &variance);
+    return variance;
+}
+
+/* Pieces at the same part of a voxel have one common error; whole voxels between them change
+ * nothing. */
+static void test_pieces_that_match(void **state)
+{
+    (void)state;
+    assert_float_equal(missing_variance((double[4]){0.4, 0.4, 0.4, 0.4}), 4 - 4. / 4, 1e-12);
+    assert_float_equal(missing_variance((double[4]){0.4, 1.4, -0.6, 2.4}), 4 - 4. / 4, 1e-12);
+    assert_float_equal(missing_variance((double[4]){0, 0.25, 0.5, 0.75}), 0, 1e-12);
+    // two pairs: variance 4 / 2 instead of 4 / 4
+    assert_float_equal(missing_variance((double[4]){0, 0, 0.5, 0.5}), 1, 1e-12);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_faces_parallel_to_the_voxels),
-                                       cmocka_unit_test(test_faces_nearly_parallel),
-                                       cmocka_unit_test(test_oblique_faces)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_pieces_that_match), cmocka_unit_test(test_rod_along_an_axis),
+        cmocka_unit_test(test_faces_parallel_to_the_voxels),
+        cmocka_unit_test(test_faces_nearly_parallel), cmocka_unit_test(test_oblique_faces)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -5,6 +5,7 @@
 
 #include "fit/data/samples.h"
 #include "fit/data/step_phase.h"
+#include "matching_steps.h"
 #include "sdm/internal/heap.h"
 
 // least component of the normal along an axis of the image on a face parallel to the voxels
@@ -23,6 +24,10 @@ enum { MODES = 3 };
 #define ONE_STEP 0.75
 // variance of the unit normals of a piece from which on it counts as curved
 #define CURVED 0.1
+// the same of a piece together with the pieces in the layers above and below, from which on its
+// place within a voxel is known: that of a flat face fits best half-way between two layers,
+// wherever the face lies
+#define BENT 0.03
 
 /* The surface next to a sample, where it is nearly parallel to the voxels. */
 typedef struct place {
@@ -99,15 +104,25 @@ static void piece_add(piece *q, size_t n, const place *at, double weight, const 
     }
 }
 
+// variance of the unit normals of n pieces: 1 - squared length of their mean
+static double normal_variance(const piece *list, size_t n)
+{
+    double normal[3] = {0}, all = 0, length2 = 0;
+    for (size_t i = 0; i < n; i++) {
+        all += list[i].phase.all;
+        for (int a = 0; a < 3; a++) normal[a] += list[i].normal[a];
+    }
+    for (int a = 0; a < 3; a++) length2 += normal[a] * normal[a] / (all * all);
+    return 1 - length2;
+}
+
 // sd[MODES] of a piece in voxels, as a whole and at its ends
 static void piece_deviations(const piece *q, double sd[MODES])
 {
     const double all = q->phase.all, mean = q->first / all,
                  even = (q->second / all - mean * mean) / (FIT_STEP_SD * FIT_STEP_SD),
                  hidden = fmin(fmax((1 - even) / (1 - ONE_STEP * ONE_STEP), 0), 1);
-    double normal2 = 0;
-    for (int a = 0; a < 3; a++) normal2 += q->normal[a] * q->normal[a] / (all * all);
-    const double flat = fmin(fmax(1 - (1 - normal2) / CURVED, 0), 1),
+    const double flat = fmin(fmax(1 - normal_variance(q, 1) / CURVED, 0), 1),
                  whole = hypot(q->phase.turn[0], q->phase.turn[1]) / all;
     sd[0] = FIT_STEP_SD * (flat * fmax(hidden, whole) + (1 - flat) * whole);
     sd[1] = sd[2] = sqrt(TILT_VARIANCE) * flat * hidden;
@@ -116,7 +131,6 @@ static void piece_deviations(const piece *q, double sd[MODES])
 // adds the covariance caused by a piece with voxels of this edge, mm
 static void piece_covariance(piece *q, size_t n, double edge, double *out)
 {
-    if (!(q->phase.all > 0)) return;
     double sd[MODES];
     piece_deviations(q, sd);
     for (size_t mode = 0; mode < MODES; mode++) {
@@ -134,14 +148,45 @@ static void piece_covariance(piece *q, size_t n, double edge, double *out)
     }
 }
 
+// a piece as a step that may err together with others; near: of the n pieces in its layer and in
+// those next to it
+static fit_matching_step piece_step(const piece *q, const piece *near, size_t n, bool above,
+                                    double edge)
+{
+    const double whole = hypot(q->phase.turn[0], q->phase.turn[1]) / q->phase.all,
+                 bent = fmin(fmax(normal_variance(near, n) / BENT, 0), 1),
+                 within = atan2(q->phase.turn[1], q->phase.turn[0]) / 6.283185307179586;
+    return (fit_matching_step){.place = above ? within : -within,
+                               .sd = edge * FIT_STEP_SD * whole * bent,
+                               .weight = q->phase.all * whole * bent,
+                               .score = q->score};
+}
+
+// adds the covariance caused by the pieces of one side, by layer, and appends their steps
+static size_t side_covariance(piece *list, size_t layers, size_t n, bool above, double edge,
+                              fit_matching_step *steps, double *out)
+{
+    size_t n_steps = 0;
+    for (size_t i = 0; i < layers; i++) {
+        if (!(list[i].phase.all > 0)) continue;
+        const size_t from = i > 0 ? i - 1 : 0, to = i + 1 < layers ? i + 1 : i;
+        const fit_matching_step step =
+            piece_step(&list[i], list + from, to + 1 - from, above, edge);
+        if (step.sd > 0) steps[n_steps++] = step;
+        piece_covariance(&list[i], n, edge, out);
+    }
+    return n_steps;
+}
+
 sdm_status sdm_fit_label_steps(const fit_problem *p, const fit_neighbours *v, double *out,
                                sdm_error *err)
 {
     const fit_field field = sdm_fit_maps_distances(&p->maps);
     const size_t n = v->n_unknowns;
-    size_t first[3], layers[3], count = 0, all = 0;
+    size_t first[3], layers[3], count = 0, all = 0, n_steps = 0;
     piece *list = NULL;
     double *score = NULL;
+    fit_matching_step *steps = NULL;
     // pieces: by axis, by side, by layer of voxels
     for (int a = 0; a < 3; a++) {
         first[a] = all;
@@ -149,7 +194,8 @@ sdm_status sdm_fit_label_steps(const fit_problem *p, const fit_neighbours *v, do
         all += 2 * layers[a];
     }
     sdm_status s = SDM_ALLOC(&list, all, "covariance of the score", err);
-    if (!s) s = SDM_ALLOC(&score, all * MODES * n, "covariance of the score", err);
+    if (!s) s = SDM_ALLOC(&score, (all * MODES + 1) * n, "covariance of the score", err);
+    if (!s) s = SDM_ALLOC(&steps, all, "covariance of the score", err);
     for (size_t i = 0; i < all && !s; i++) list[i].score = score + i * MODES * n;
     for (size_t i = 0; i < p->samples.n && !s; i++) {
         place at;
@@ -162,10 +208,13 @@ sdm_status sdm_fit_label_steps(const fit_problem *p, const fit_neighbours *v, do
         piece *q = &list[first[at.axis] + (at.above ? layers[at.axis] : 0) + (size_t)layer];
         piece_add(q, n, &at, weight * weight, v->model_score + number * n);
     }
-    for (size_t i = 0; i < all && !s; i++) {
-        const int axis = i < first[1] ? 0 : i < first[2] ? 1 : 2;
-        piece_covariance(&list[i], n, p->target->grid.spacing[axis], out);
+    for (size_t side = 0; side < 6 && !s; side++) {
+        const size_t a = side / 2, above = side % 2;
+        n_steps += side_covariance(list + first[a] + above * layers[a], layers[a], n, above,
+                                   p->target->grid.spacing[a], steps + n_steps, out);
     }
+    if (!s) sdm_fit_matching_steps(steps, n_steps, n, score + all * MODES * n, out);
+    sdm_free(steps);
     sdm_free(list);
     sdm_free(score);
     return s;

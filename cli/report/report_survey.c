@@ -538,7 +538,8 @@ static void tell_params(teller *t)
                      "(standard deviations) or none at all",
                      unit, params[k].name);
         if (sdm_survey_is_degree(&params[k]))
-            sdm_text_add(&other, "; mesh() must convert it before it calls cos() or sin()");
+            sdm_text_add(&other,
+                         "; mesh() must multiply it by 0.017453 before it calls cos() or sin()");
         tell(t, SDM_OK, &other);
     }
 }

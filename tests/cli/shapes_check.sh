@@ -246,7 +246,7 @@ for most in 3.1416 5 90; do
     sdmgen shapes check --plugin ./radians.so --samples 4 >out 2>err
     if [ $most != 3.1416 ]; then
         has "^note +the unit 'deg' of the parameter 'radius' is none that sdmgen knows"
-        [ $most = 5 ] || has 'none at all; mesh\(\) must convert it before it calls cos\(\) or sin\(\)$'
+        [ $most = 5 ] || has 'none at all; mesh\(\) must multiply it by 0.017453 before it calls cos\(\) or sin\(\)$'
     else
         has "^warning +the parameter 'radius' has the unit deg, but ranges from 0.5 to 3.1416: are these rad\? Then its unit is \"rad\"$"
     fi

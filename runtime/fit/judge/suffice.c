@@ -212,7 +212,8 @@ void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_r
         "standard deviations %s; exact maps with voxels of %.2g mm "
         "(sdm_fit_source.grid) show it",
         coarse.detail,
-        p->target->kind == SDM_FIT_POINTS ? "contain an estimate of this error" : "are too small",
+        p->target->kind == SDM_FIT_POINTS ? "contain an estimate of this error"
+                                          : "may be too small",
         coarse.advice);
 }
 

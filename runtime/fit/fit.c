@@ -322,17 +322,38 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
     return s;
 }
 
-/* Goes on with maps on a grid moved by half a voxel, too, where the place of the grid counts. */
+// whether the parameters lie within STEP_NEAR of their ranges of those of `state`
+static bool stays_near(const fit_problem *p, const fit_state *state)
+{
+    bool near = true;
+    for (size_t k = 0; k < p->n_params; k++)
+        near = near &&
+               fabs(p->state.params[k] - state->params[k]) <= STEP_NEAR * (p->high[k] - p->low[k]);
+    return near;
+}
+
+/* Goes on with maps on a grid moved by half a voxel, too, where the place of the grid counts. If
+ * steps with both grids do not converge, and lead nowhere else, the first grid alone decides. */
 static sdm_status maximise_between(fit_problem *p, fit_newton_opts *newton, fit_newton_end *end,
                                    size_t max_iterations, double eps, sdm_error *err)
 {
+    const fit_state state = p->state;
+    const fit_newton_end first = *end;
+    const fit_recent recent = p->recent;
     bool added;
     if (!end->converged && !(end->step <= STEP_BETWEEN)) return SDM_OK;
-    const sdm_status s = sdm_fit_between_add(p, &added, err);
+    sdm_status s = sdm_fit_between_add(p, &added, err);
     if (s || !added) return s;
     newton->max_iterations = max_iterations;
     newton->eps = eps;
-    return maximise_settled(p, newton, end, err);
+    s = maximise_settled(p, newton, end, err);
+    if (s || end->converged || !first.converged || !stays_near(p, &state)) return s;
+    sdm_fit_maps_between_end(&p->maps);
+    p->maps_params[0] = p->maps_blur = NAN;
+    p->state = state;
+    p->recent = recent;
+    *end = first;
+    return sdm_fit_evaluate(p, err);
 }
 
 /* Maximises with maps of one kind. Plain Newton steps come first, then steps with the averaged

@@ -73,6 +73,17 @@ static sdm_status fit_exchanged(const cli_fit *f, bool *fits, sdm_error *err)
     return s == SDM_E_NOMEM || s == SDM_E_CANCELLED ? s : SDM_OK;
 }
 
+/* Whether the refused fit itself has exchanged them on its way, and found the shape. */
+static bool has_exchanged(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    const double inside = f->opts.appearance.inside[0].mean,
+                 outside = f->opts.appearance.outside[0].mean, in = r->appearance.inside[0].mean,
+                 out = r->appearance.outside[0].mean;
+    return r->evidence > SDM_FIT_PREFERRED && fabs(in - outside) < fabs(in - inside) &&
+           fabs(out - inside) < fabs(out - outside);
+}
+
 /* Makes exchanged values the only reason of the refusal. a, b: the image within the start shape and
  * around it; fitted: a fit with the exchanged values has shown it. */
 static void name_exchange(cli_fit *f, double a, double b, bool fitted)
@@ -115,7 +126,8 @@ sdm_status cli_fit_explain_contrast(cli_fit *f, sdm_error *err)
     if (!(fabs(b - inside) < fabs(b - outside))) return SDM_OK;
     bool exchanged = (a - b) / (outside - inside) > CONTRAST_MIN, fitted = false;
     // a thin shape that begins beside its place holds as much of both tissues as its surroundings
-    if (!exchanged) s = fit_exchanged(f, &fitted, err);
+    if (!exchanged) fitted = has_exchanged(f);
+    if (!exchanged && !fitted) s = fit_exchanged(f, &fitted, err);
     if (!s && (exchanged || fitted)) name_exchange(f, a, b, fitted);
     return s;
 }

@@ -1,7 +1,6 @@
 /* The verdict on a training: the decision from given figures, the measured parts, and that
  * following the advice makes the error smaller. Tests: judge.c verdict.c verdict_unfit.c
- * pod_parts.c tree_pass.c
- * surface_check.c derivative_check.c volume_check.c history.c progress.c */
+ * pod_parts.c tree_pass.c history.c progress.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,27 +12,13 @@
 
 #include <cmocka.h>
 
+#include "capsule_training.h"
 #include "data/surface_check.h"
 #include "sdm/internal/text.h"
-#include "sdm/map.h"
-#include "sdm/memory.h"
 #include "sdm/model.h"
 #include "state/history.h"
 #include "state/judge.h"
 #include "state/progress.h"
-#include "train_tools.h"
-
-static const char base[] =
-    "shape: {name: capsule}\n"
-    "grid: {size: [28, 24, 22], spacing: 0.5}\n"
-    "network: {kind: pod, depth: 2, width: 32, rank: 8, modes: 64, degree: 2, input_degree: 3}\n"
-    "data: {static: 0, start: 200, online: 0, holdout: 16, memory_gb: 0.5}\n"
-    "train: {steps: 1000, batch: 64, refine: 0, learning_rate: 0.01, average: 0.99}\n";
-
-static sdm_config config_of(const char *const *overrides, size_t n)
-{
-    return parse_config(base, overrides, n);
-}
 
 /* A good model with a voxel of 0.8 mm, an error of 0.01 mm and no cause. */
 static sdm_verdict figures(void)
@@ -489,64 +474,6 @@ static void evaluations_are_due(void **state)
     assert_true(trainer_evaluation_due(&t, 110.1));
 }
 
-/* A sphere with the given radius on a grid with the given spacing around it, and, unless it is 0,
- * another sphere on the same grid. */
-static surface_check check_sphere(double radius, double spacing, double other)
-{
-    sdm_instance *sphere;
-    sdm_error e = {0};
-    const sdm_named_text fine[] = {{"edge", "0.1"}};
-    if (sdm_instance_create(sdm_registry_find(registry, "ellipsoid", NULL), fine, 1, NULL, &sphere,
-                            &e))
-        fail_msg("%s", e.text);
-    double p[6] = {radius, radius, radius, other, other, other};
-    const int64_t n = (int64_t)ceil(2 * radius / spacing) + 6;
-    const double first = -0.5 * spacing * (double)(n - 1) + 0.13 * spacing;
-    const sdm_grid grid = {.n = {n, n, n},
-                           .spacing = {spacing, spacing, spacing},
-                           .origin = {first, first, first},
-                           .dir = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-    const dataset d = {.shape = sphere,
-                       .grid = &grid,
-                       .n_params = 3,
-                       .seed = 5,
-                       .n_holdout = other > 0 ? 2 : 1,
-                       .holdout_params = p};
-    surface_check check[2];
-    for (int threads = 1; threads <= 2; threads++)
-        if (trainer_surface_check(&d, threads, &check[threads - 1], &e)) fail_msg("%s", e.text);
-    assert_memory_equal(&check[0], &check[1], sizeof *check);
-    sdm_instance_free(sphere);
-    return check[0];
-}
-
-// Trilinear interpolation overestimates a distance on average by spacing^2 / 12 times the sum of
-// its second derivatives, which is 2 / radius for a sphere.
-static void surface_of_a_sphere(void **state)
-{
-    (void)state;
-    const surface_check large = check_sphere(3, 0.5, 0);
-    const double mean = 0.5 * 0.5 / (6 * 3);
-    assert_true(large.rms_mm > mean && large.rms_mm < 1.3 * mean);
-    assert_true(large.thin == 0);
-    // a ball of one voxel does not fit into a sphere of 0.8 voxels
-    const surface_check small = check_sphere(1, 1.25, 0);
-    assert_true(small.thin == 1 && small.rms_mm > 0.1);
-    // the margin of the grid is between 2.5 and 3.5 voxels
-    assert_true(large.cut == 0 && small.cut == 0);
-    assert_true(check_sphere(3, 0.5, 3.2).cut == 0 && check_sphere(2, 0.5, 3.9).cut == 0.5);
-}
-
-static sdm_train_report train(const char *const *overrides, size_t n)
-{
-    const sdm_config c = config_of(overrides, n);
-    sdm_train_report r;
-    sdm_error e = {0};
-    run_files_remove();
-    if (sdm_train(&c, capsule, folder, false, NULL, &r, &e)) fail_msg("%s", e.text);
-    return r;
-}
-
 // The parts add up to the mean square error, for whatever is refined and however weights are
 // stored.
 static void parts_add_up(void **state)
@@ -567,145 +494,6 @@ static void parts_add_up(void **state)
         // floats are not rounded
         if (i == 1) assert_true(fabs(part[SDM_CAUSE_ROUNDING]) < 1e-3 * r.accuracy.mse_mm2);
     }
-}
-
-// Largest relative error of the volumes of the model's maps of capsules, which have a formula.
-static double volume_error_of(const char *path)
-{
-    sdm_model *m;
-    if (sdm_model_open(path, &m, NULL)) fail_msg("%s", path);
-    const sdm_model_info *info = sdm_model_get_info(m);
-    const sdm_model_param *param = info->params;
-    float *map = calloc(sdm_grid_count(&info->grid), sizeof *map);
-    void *scratch = NULL;
-    if (!map || sdm_alloc(&scratch, sdm_model_scratch_bytes(m, 1), 1, "test", NULL)) abort();
-    assert_int_equal(info->n_params, 2);
-    double largest = 0;
-    for (int i = 0; i < 9; i++) {
-        // capsules of a radius of three voxels and more that lie within the grid
-        const double share[2] = {0.4 + 0.1 * (i % 3), 0.1 + 0.2 * (i / 3)};
-        double p[2], volume;
-        for (int k = 0; k < 2; k++) p[k] = param[k].min + share[k] * (param[k].max - param[k].min);
-        const double length = p[sdm_model_param_index(m, "length")],
-                     radius = p[sdm_model_param_index(m, "radius")],
-                     exact = acos(-1) * radius * radius * (length + 4 * radius / 3);
-        sdm_model_forward(m, p, 1, map, scratch);
-        assert_int_equal(sdm_map_volume(&info->grid, map, 1, &volume, NULL), SDM_OK);
-        largest = fmax(largest, fabs(volume / exact - 1));
-    }
-    sdm_free(scratch);
-    free(map);
-    sdm_model_free(m);
-    return largest;
-}
-
-// A trained network holds volumes and derivatives, one of linear polynomials does not, and the
-// figures say so; the model file keeps them.
-static void volumes_and_derivatives(void **state)
-{
-    (void)state;
-    for (int linear = 0; linear < 2; linear++) {
-        static const char *const set[] = {"network.depth=0", "network.degree=1", "network.rank=2"};
-        const sdm_train_report r = train(set, linear ? 3 : 0);
-        const sdm_verdict *v = &r.verdict;
-        const double seen = volume_error_of(r.model_path);
-        if (linear ? !(v->volume_error > 0.02) || !(v->derivative_error > 0.15)
-                   : !(v->volume_error < 0.01) || !(v->derivative_error < 0.1))
-            fail_msg("linear %d: volumes %g, derivatives %g", linear, v->volume_error,
-                     v->derivative_error);
-        assert_true(v->volume_error > 0 && v->volume_error_max >= v->volume_error);
-        if (linear ? !(seen > 0.02) : !(seen < 0.03)) fail_msg("linear %d: %g", linear, seen);
-        assert_true((v->volume_derivative_error > 0.1) == (linear == 1));
-        assert_true(!strcmp(v->derivative_by, "length") || !strcmp(v->derivative_by, "radius"));
-        sdm_model *m;
-        assert_int_equal(sdm_model_open(r.model_path, &m, NULL), SDM_OK);
-        const sdm_model_quality *q = &sdm_model_get_info(m)->quality;
-        assert_true(fabs(q->volume_error / v->volume_error - 1) < 1e-6);
-        assert_true(fabs(q->derivative_error / v->derivative_error - 1) < 1e-6);
-        assert_true(fabs(q->surface_volume_error / v->surface_volume_error - 1) < 1e-6);
-        assert_true(fabs(q->far_error_mm / v->far_largest_mm - 1) < 1e-6);
-        // all held-out shapes that the grid does not cut, also beside them
-        assert_true(v->derivative_shapes >= 12 && v->derivative_shapes <= 16);
-        assert_true(fabs(q->volume_derivative_error / v->volume_derivative_error - 1) < 1e-6);
-        sdm_model_free(m);
-    }
-}
-
-// The parameters whose derivatives are too wrong are listed, the worst first; those that hardly
-// change the volume with their own size, and where the sign may be wrong.
-static void lists_of_derivatives(void **state)
-{
-    (void)state;
-    static const sdm_param p[] = {{.name = "a"}, {.name = "b"}, {.name = "c"},
-                                  {.name = "d"}, {.name = "e"}, {.name = "f"}};
-    char text[SDM_VERDICT_LIST];
-    trainer_list_derivatives(p, (double[]){0.3, NAN, 0.1, 0.4, 0.3}, 5, text);
-    assert_string_equal(text, "d: off by 40 %; by a: off by 30 %; by e: off by 30 %");
-    trainer_list_derivatives(p, (double[]){NAN, 0.2}, 2, text);
-    assert_string_equal(text, "");
-    trainer_list_small(p, (double[]){NAN, 0.2}, 2, text);
-    assert_string_equal(text, "");
-    trainer_list_small(p, (double[]){0.1, 0.35}, 2, text);
-    assert_string_equal(text,
-                        "b: off by 35 % of their own size: these parameters hardly change the "
-                        "volume");
-    trainer_list_small(p, (double[]){0.3, INFINITY, 1.4, 0.9, 0.8, 0.7}, 6, text);
-    assert_string_equal(text,
-                        "b: off by over 1000 % of their own size; by c: off by 140 %; by d: off by "
-                        "90 %; by e: off by 80 %; ...: these parameters hardly change the volume, "
-                        "and the sign may be wrong");
-}
-
-// A joint that turns hardly changes the volume: the derivative by it is named with its own size,
-// also in the model.
-static void small_changes_of_the_volume(void **state)
-{
-    (void)state;
-    static const char text[] = "shape: {name: linkage, options: {links: 1}}\n"
-                               "grid: {size: [28, 16, 16], spacing: 0.6, centre: [1, 0, 0]}\n"
-                               "network: {kind: template, depth: 0}\n"
-                               "data: {start: 60, online: 0, holdout: 8, memory_gb: 0.5}\n"
-                               "train: {steps: 10, batch: 64, refine: 0}\n";
-    static const sdm_named_text option = {"links", "1"};
-    static const char begin[] = "q1: off by ";
-    const sdm_config c = parse_config(text, NULL, 0);
-    sdm_instance *shape;
-    sdm_train_report r;
-    sdm_model *m;
-    sdm_error e = {0};
-    run_files_remove();
-    if (sdm_instance_create(sdm_registry_find(registry, "linkage", NULL), &option, 1, NULL, &shape,
-                            &e) ||
-        sdm_train(&c, shape, folder, false, NULL, &r, &e))
-        fail_msg("%s", e.text);
-    const sdm_verdict *v = &r.verdict;
-    if (strncmp(v->volume_derivatives_small, begin, sizeof begin - 1) ||
-        !strstr(v->volume_derivatives_small, "and the sign may be wrong"))
-        fail_msg("%s", v->volume_derivatives_small);
-    assert_string_equal(v->volume_derivatives_bad, "");
-    assert_int_equal(sdm_model_open(r.model_path, &m, NULL), SDM_OK);
-    assert_non_null(
-        strstr(sdm_model_get_info(m)->quality.unfit, "derivatives of the volume by q1: off by "));
-    sdm_model_free(m);
-    sdm_instance_free(shape);
-}
-
-// On coarse voxels a surface encloses too little while its map holds the volume, which the uses
-// tell with the spacing that mends it.
-static void surfaces_lose_volume(void **state)
-{
-    (void)state;
-    static const char *const set[] = {"grid.spacing=1.2", "grid.size=[12,10,10]"};
-    char lines[SDM_MODEL_UNFIT];
-    const sdm_train_report r = train(set, 2);
-    const sdm_verdict *v = &r.verdict;
-    const double spacing = sdm_verdict_spacing(v);
-    sdm_verdict_unfit(v, lines);
-    if (!(v->surface_volume_error > 0.02) || !(v->surface_volume_error > 2 * v->volume_error) ||
-        !strstr(lines, "volumes of surfaces (.stl): off by"))
-        fail_msg("maps %g, surfaces %g: %s", v->volume_error, v->surface_volume_error, lines);
-    assert_true(v->surface_volume_error_max >= v->surface_volume_error);
-    assert_true(spacing < 1.2 && spacing > 0.2);
 }
 
 // Each limit is provoked, named, and the advice followed: the error becomes smaller.
@@ -789,7 +577,6 @@ int main(int argc, char **argv)
         cmocka_unit_test(grid_limits),
         cmocka_unit_test(grades),
         cmocka_unit_test(few_heldout_shapes),
-        cmocka_unit_test(few_heldout_shapes),
         cmocka_unit_test(uses_and_spacing),
         cmocka_unit_test(triangles_change),
         cmocka_unit_test(grid_cuts),
@@ -797,12 +584,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(parts_too_thin_for_the_grid),
         cmocka_unit_test(error_falls_in_the_last_third),
         cmocka_unit_test(evaluations_are_due),
-        cmocka_unit_test(surface_of_a_sphere),
         cmocka_unit_test(parts_add_up),
-        cmocka_unit_test(volumes_and_derivatives),
-        cmocka_unit_test(lists_of_derivatives),
-        cmocka_unit_test(small_changes_of_the_volume),
-        cmocka_unit_test(surfaces_lose_volume),
         cmocka_unit_test(progress_is_true),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -86,7 +86,7 @@ static bool is_from(const char *origin, const char *plugin)
     return is;
 }
 
-/* Tells if none of the plug-ins of the command holds the shape of the configuration. */
+/* Prints a notice if none of the files of --plugin holds the shape that the configuration names. */
 static void tell_other_plugins(const cli_args *args, const sdm_registry *r, const sdm_config *c)
 {
     const char *origin = "";

@@ -187,8 +187,8 @@ static double group_volume(const sdm_part_audit *a, size_t group)
     return volume;
 }
 
-/* Appends "part 2 of 9 (...) " or "parts 2 (...), 3 (...) and 5 more of 9 ": the parts of a group.
- * Returns how many there are. */
+/* Appends the names of the parts of a group, "part 2 of 9 (...) " or "parts 2 (...), 3 (...) and 5
+ * more of 9 ". Returns the number of parts of the group. */
 static size_t add_group(const sdm_part_audit *a, size_t group, sdm_text *text)
 {
     size_t n = 0, told = 0;

@@ -289,11 +289,10 @@ static sdm_status give_verdict(const check *c, sdm_error *err)
                left.data ? "; not tested for want of time: " : "", left.data ? left.data : "");
     const sdm_survey_count *apart = &c->survey.found.apart;
     if (!failed && apart->shapes)
-        printf(
-            "but %zu of %zu shapes have groups of parts that meet no other part (the note above "
-            "names "
-            "one): if they are meant to be apart, nothing is to be done; else let them overlap\n",
-            apart->shapes, c->survey.found.n - c->survey.found.untested);
+        printf("but %zu of %zu shapes have groups of parts that meet no other part (the note above "
+               "names one): if they are meant to be apart, nothing is to be done; else let them "
+               "overlap\n",
+               apart->shapes, c->survey.found.n - c->survey.found.untested);
     sdm_text_dispose(&left);
     return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the verdict") : SDM_OK;
 }

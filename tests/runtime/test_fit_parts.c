@@ -378,7 +378,7 @@ static void test_unknowns_cost(void **state)
     // 1e6 independent samples: an unknown costs at most log(1e6) / 2 = 6.9
     const double pose = 6 * 0.5 * log(1e6), separate = log(10) + 0.125 + log(5);
     assert_true(fabs(sdm_fit_unknowns_cost(p, &r, 1e6) - pose - separate) < 1e-9);
-    // correlated: the determinant counts
+    // if their estimates are correlated, the cost follows from the determinant of the covariance
     covariance[1] = covariance[9] = 0.8 * 0.1 * 0.2;
     const double both = separate - 0.5 * log(1 - 0.64);
     assert_true(fabs(sdm_fit_unknowns_cost(p, &r, 1e6) - pose - both) < 1e-9);

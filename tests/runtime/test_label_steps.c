@@ -213,11 +213,11 @@ static void test_rod_along_an_axis(void **state)
 static double missing_variance(const double place[4])
 {
     const double score = 0.25;
-    double work, variance = 0;
+    double work[5], variance = 0;
     fit_matching_step list[4];
     for (int i = 0; i < 4; i++)
         list[i] = (fit_matching_step){.place = place[i], .sd = 2, .weight = 3, .score = &score};
-    sdm_fit_matching_steps(list, 4, 1, &work, &variance);
+    sdm_fit_matching_steps(list, 4, 1, work, &variance);
     return variance;
 }
 

@@ -102,8 +102,8 @@ static void add_keys(sdm_text *out, const sdm_grid *g)
     add_three(out, g->origin);
 }
 
-/* Refuses a spacing that makes more voxels than COUNT_LIMIT in the box of the
- * shapes: most often it is in metres. */
+/* Refuses a spacing that makes more voxels than COUNT_LIMIT in the box of the shapes: most often it
+ * is in metres. */
 static sdm_status check_spacing(const sdm_config *config, const family *f, sdm_error *err)
 {
     const double *h = config->grid.spacing;

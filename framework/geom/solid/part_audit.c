@@ -171,16 +171,21 @@ static void count_shared_edge(job *j, const sdm_edge *e)
     }
 }
 
+bool sdm_part_is_within(const sdm_part *a, const sdm_part *b)
+{
+    bool within = true;
+    for (int d = 0; d < 3; d++) within = within && a->min[d] >= b->min[d] && a->max[d] <= b->max[d];
+    return within;
+}
+
 size_t sdm_part_around(const sdm_part_audit *a, size_t index)
 {
-    const sdm_part *p = &a->part[index];
     size_t around = a->n;
     for (size_t i = 0; i < a->n; i++) {
         const sdm_part *q = &a->part[i];
-        bool holds = i != index && q->state == SDM_PART_SOLID;
-        for (int d = 0; d < 3; d++)
-            holds = holds && q->min[d] <= p->min[d] && q->max[d] >= p->max[d];
-        if (holds && (around == a->n || fabs(q->volume) < fabs(a->part[around].volume))) around = i;
+        if (i != index && q->state == SDM_PART_SOLID && sdm_part_is_within(&a->part[index], q) &&
+            (around == a->n || fabs(q->volume) < fabs(a->part[around].volume)))
+            around = i;
     }
     return around;
 }

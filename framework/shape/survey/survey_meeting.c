@@ -13,14 +13,6 @@ typedef struct entry {
     bool meets;
 } entry;
 
-/* Does the box of part a lie within that of part b? */
-static bool is_within(const sdm_part *a, const sdm_part *b)
-{
-    bool within = true;
-    for (int d = 0; d < 3; d++) within = within && a->min[d] >= b->min[d] && a->max[d] <= b->max[d];
-    return within;
-}
-
 void sdm_survey_contacts(const sdm_part_audit *a, survey_contacts *out)
 {
     const size_t n = a->n < SDM_PART_MEETS ? a->n : SDM_PART_MEETS;
@@ -29,8 +21,8 @@ void sdm_survey_contacts(const sdm_part_audit *a, survey_contacts *out)
         const sdm_part *p = &a->part[i];
         out->meets[i] = p->meets;
         for (size_t k = 0; k < n; k++)
-            if (k != i && !(p->meets >> k & 1) && !is_within(p, &a->part[k]) &&
-                !is_within(&a->part[k], p))
+            if (k != i && !(p->meets >> k & 1) && !sdm_part_is_within(p, &a->part[k]) &&
+                !sdm_part_is_within(&a->part[k], p))
                 out->apart[i] |= (uint32_t)1 << k;
     }
 }

@@ -135,7 +135,8 @@ static patches find_patches(const cloud *strays, double spacing)
     return found;
 }
 
-/* Adds the finding about strays in patches; bare: share of the surface without points. */
+/* Adds the check `patch`: the share of the points that lie away from the shape and form another
+ * surface. stray: share of all points away from it; bare: share of its surface without points. */
 static void judge_patches(const fit_problem *p, const patches *found, size_t n_points, double stray,
                           double bare, sdm_fit_verdict *v)
 {

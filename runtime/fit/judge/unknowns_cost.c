@@ -23,7 +23,7 @@ static double params_cost(const fit_problem *p, const sdm_fit_result *r, size_t 
         // without a prior it is uniform over the range
         const double off =
             p->opts->prior_sd > 0 ? (r->params[list[i]] - sdm_fit_prior_mean(p, list[i])) / sd : 0;
-        // the estimate of a parameter at a bound may have a larger deviation than its prior
+        // at a bound the deviation may exceed that of the prior: the parameter then costs nothing
         cost += fmin(fmax(log(sd / left), 0) + 0.5 * off * off, most);
     }
     return cost;

@@ -148,8 +148,8 @@ static void piece_covariance(piece *q, size_t n, double edge, double *out)
     }
 }
 
-// a piece as a step that may err together with others; near: of the n pieces in its layer and in
-// those next to it
+// the piece *q, described as a step whose error others may share; near[n]: this piece and those of
+// its side in the layers next to it
 static fit_matching_step piece_step(const piece *q, const piece *near, size_t n, bool above,
                                     double edge)
 {
@@ -194,7 +194,7 @@ sdm_status sdm_fit_label_steps(const fit_problem *p, const fit_neighbours *v, do
         all += 2 * layers[a];
     }
     sdm_status s = SDM_ALLOC(&list, all, "covariance of the score", err);
-    if (!s) s = SDM_ALLOC(&score, (all * MODES + 1) * n, "covariance of the score", err);
+    if (!s) s = SDM_ALLOC(&score, (all * MODES + 1) * n + all, "covariance of the score", err);
     if (!s) s = SDM_ALLOC(&steps, all, "covariance of the score", err);
     for (size_t i = 0; i < all && !s; i++) list[i].score = score + i * MODES * n;
     for (size_t i = 0; i < p->samples.n && !s; i++) {

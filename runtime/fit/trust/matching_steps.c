@@ -31,16 +31,16 @@ static double missing_sd(const fit_matching_step *list, size_t count, size_t i)
 void sdm_fit_matching_steps(const fit_matching_step *list, size_t count, size_t n, double *work,
                             double *out)
 {
+    double *sum = work, *missing = work + n;
+    for (size_t i = 0; i < count; i++) missing[i] = missing_sd(list, count, i);
     for (size_t i = 0; i < count; i++) {
-        for (size_t k = 0; k < n; k++) work[k] = 0;
+        for (size_t k = 0; k < n; k++) sum[k] = 0;
         for (size_t j = 0; j < count; j++) {
             const double k_ij = likeness(&list[i], &list[j]);
             if (!(k_ij > 0)) continue;
-            const double factor = k_ij * missing_sd(list, count, j);
-            for (size_t k = 0; k < n; k++) work[k] += factor * list[j].score[k];
+            for (size_t k = 0; k < n; k++) sum[k] += k_ij * missing[j] * list[j].score[k];
         }
-        const double sd = missing_sd(list, count, i);
         for (size_t a = 0; a < n; a++)
-            for (size_t b = 0; b < n; b++) out[a * n + b] += sd * list[i].score[a] * work[b];
+            for (size_t b = 0; b < n; b++) out[a * n + b] += missing[i] * list[i].score[a] * sum[b];
     }
 }

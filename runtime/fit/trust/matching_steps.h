@@ -7,7 +7,7 @@
 
 #include <stddef.h>
 
-/* A piece of a curved surface that is nearly parallel to the voxels. */
+/* A piece of a curved surface that is nearly parallel to the planes of voxels. */
 typedef struct fit_matching_step {
     /* place of the surface within a voxel, counted outwards, in turns: 1 is one voxel */
     double place;
@@ -17,7 +17,8 @@ typedef struct fit_matching_step {
     const double *score;
 } fit_matching_step;
 
-/* Adds to out[n][n] the part of the covariance by which pieces at the same part of a voxel exceed
- * pieces that err independently. work[n]: scratch memory. */
+/* The errors of pieces that lie at the same part of a voxel are equal, so the score varies more
+ * than if they were independent. Adds this difference to its covariance out[n][n]. work[n + count]:
+ * scratch memory. */
 void sdm_fit_matching_steps(const fit_matching_step *list, size_t count, size_t n, double *work,
                             double *out);

@@ -98,6 +98,9 @@ void sdm_mesh_sums(const sdm_mesh *m, double *volume, double *area);
  * of its vertices lie among those of another one, or the engine refuses one side. [any thread] */
 double sdm_part_gap(const sdm_mesh *m, const sdm_part_audit *a, size_t index);
 
+/* Whether the bounding box of part a lies within that of part b. */
+bool sdm_part_is_within(const sdm_part *a, const sdm_part *b);
+
 /* Index of the smallest solid part whose box holds that of part `index`; a->n: there is none. */
 size_t sdm_part_around(const sdm_part_audit *a, size_t index);
 

@@ -43,7 +43,7 @@ typedef enum sdm_cause {
     SDM_CAUSES
 } sdm_cause;
 
-/* Size of a list of parameters in a verdict. */
+/* Bytes of a text that lists parameters with their errors. */
 enum { SDM_VERDICT_LIST = 320 };
 
 typedef struct sdm_verdict {

@@ -108,7 +108,7 @@ sdm_status cli_cohort_child(const cli_words *w, const char *folder, cli_cohort_f
     const pid_t parent = getpid();
     if (pipe(answer)) return sdm_fail(err, SDM_E_IO, "cannot make a pipe: %s", strerror(errno));
     fflush(stdout);
-    const pid_t child = fork();
+    const pid_t child = sdm_child_fork();
     if (child == 0) {
         close(answer[0]);
         sdm_child_ends_with(parent); // only the parent renews the lease of the case

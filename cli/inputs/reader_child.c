@@ -197,7 +197,7 @@ sdm_status cli_read_in_child(const char *path, const char *library, cli_reader *
     const task t = {path, library, read, user, limits_of(file_bytes)};
     int ends[2];
     if (pipe(ends)) return sdm_fail(err, SDM_E_IO, "%s: no pipe: %s", path, strerror(errno));
-    const pid_t parent = getpid(), pid = fork();
+    const pid_t parent = getpid(), pid = sdm_child_fork();
     if (pid == 0) {
         sdm_child_ends_with(parent);
         close(ends[0]);

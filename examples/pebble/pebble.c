@@ -110,7 +110,7 @@ static const sdm_shape SHAPE = {
     .abi = SDM_SHAPE_ABI,
     .size = sizeof(sdm_shape),
     .name = "pebble",
-    .summary = "egg-shaped pebble along the z axis",
+    .summary = "an egg along the z axis",
     SDM_PARAMS(PARAMS), // .params, and .n_params = the number of rows
     .mesh = pebble_mesh,
 };

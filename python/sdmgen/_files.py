@@ -20,6 +20,7 @@ from ._mesh import Mesh
 from ._model import Model
 
 IMAGES = (".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd")
+WRITTEN_IMAGES = (".nii", ".nii.gz", ".nrrd", ".mha")
 MESHES = (".ply", ".stl", ".obj", ".off", ".vtk", ".vtp")
 _TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64")
 
@@ -93,6 +94,9 @@ def write(
         what.write(path)
     elif isinstance(what, Map) and _ends(path, MESHES):
         what.surface().write(path)
+    elif isinstance(what, Map) and not _ends(path, (*WRITTEN_IMAGES, ".npy")):
+        known = " ".join((*WRITTEN_IMAGES, ".npy", ".vdb", *MESHES))
+        raise UnsupportedError("unsupported", f"write: {os.fspath(path)!r}: the name of a map's file must end in one of {known}")
     elif isinstance(what, Image):
         _write_image(path, what, text)
     else:

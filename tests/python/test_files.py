@@ -36,7 +36,7 @@ def test_images(map, tmp_path):
         assert np.array_equal(again.values, labels.values) and np.allclose(again.direction, TURN)
     with pytest.raises(sdmgen.ArgumentError, match="needs an array of shape"):
         sdmgen.Image(np.zeros((2, 2, 2)), turned)
-    with pytest.raises(sdmgen.UnsupportedError):
+    with pytest.raises(sdmgen.UnsupportedError, match=r"must end in one of .*\.vdb .*\.stl"):
         sdmgen.write(tmp_path / "map.png", map)
 
 

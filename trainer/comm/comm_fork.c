@@ -237,7 +237,7 @@ static sdm_status make_children(forked *f, sdm_error *err)
 {
     const pid_t parent = getpid();
     for (int r = 1; r < f->size; r++) {
-        const pid_t pid = fork();
+        const pid_t pid = sdm_child_fork();
         if (pid == 0) {
             begin_child(f, r, parent);
             return SDM_OK;

@@ -21,13 +21,13 @@ const char *sdm_cause_name(sdm_cause cause)
 const char *sdm_cause_text(sdm_cause cause)
 {
     static const char *const texts[] = {
-        "what the best coefficients of the bases leave of training maps",
-        "what the network leaves of training maps besides",
-        "what is larger on held-out maps than on training maps",
+        "error of the best coefficients of the bases, on training maps",
+        "further error of the network on training maps",
+        "further error on held-out maps, which the training has not seen",
         "rounding of the weights in the model file",
-        "what motion, warp and lattices of the template leave near the surface",
-        "what it leaves farther away, inside overlaps of parts and where parts are stretched",
-        "exact maps, interpolated between the voxels at the exact surface"};
+        "error of the template near the surface",
+        "its error elsewhere: far away, in overlaps of parts, in stretched parts",
+        "distance of the exact maps, interpolated between voxels, at the exact surface"};
     return (size_t)cause < SDM_CAUSES ? texts[cause] : "unknown";
 }
 

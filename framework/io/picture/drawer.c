@@ -99,7 +99,7 @@ sdm_status sdm_drawer_start(const char *path, sdm_drawer_part *part, sdm_error *
     *part = SDM_DRAWS_ITSELF;
     int ends[2];
     if (!child_wanted || pipe(ends)) return SDM_OK;
-    const pid_t parent = getpid(), pid = fork();
+    const pid_t parent = getpid(), pid = sdm_child_fork();
     if (pid == 0) {
         close(ends[0]);
         become_child(parent, ends[1]);

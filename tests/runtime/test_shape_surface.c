@@ -1,7 +1,8 @@
 /* Distances of points from the surface of a shape, without voxels: their derivatives and those of
  * the area against differences, on the surface and on a map; and fits to points of a hollow shape,
  * whose walls hold its ends at wrong places.
- * Tests: shape_surface.c map_area.c even_points.c map_bias.c network_bias.c averaged_gradient.c */
+ * Tests: shape_surface.c map_area.c even_points.c map_bias.c influence.c network_bias.c
+ * averaged_gradient.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -297,11 +298,16 @@ static void test_points_and_a_network(void **state)
     sdm_instance_free(ball);
 }
 
-// The derivative by the radius of a network that errs by a tenth.
+// The derivatives by the radius of networks that err by a tenth, and by a half.
 static double nine_tenths(const double x[3])
 {
     (void)x;
     return 0.9;
+}
+static double a_half(const double x[3])
+{
+    (void)x;
+    return 0.5;
 }
 
 static double radius_variance(const sdm_fit_result *r)
@@ -311,35 +317,44 @@ static double radius_variance(const sdm_fit_result *r)
     return c[0] + 0.2 * c[1] + 0.01 * c[size + 1];
 }
 
-/* A network whose map is that of a ball of 1.25 + 0.9 (radius - 1.25) mm takes points of one of 1.3
- * mm for one of 1.25 + 0.05 / 0.9 mm. Where the shape is known, the covariance holds the square of
- * this error. */
-static void test_the_error_of_a_network_is_measured(void **state)
+/* A network whose map is that of a ball of 1.25 + slope (radius - 1.25) mm takes points of one of
+ * 1.26 mm for one of about 1.25 + 0.01 / slope mm. Where the shape is known, the covariance holds
+ * the square of the difference to the fit with exact distances, however wrong the derivative of the
+ * network is. */
+static void network_error(double slope, double (*derivative)(const double[3]))
 {
-    (void)state;
     const sdm_grid grid = sdm_grid_centred((int64_t[3]){17, 17, 17}, 0.25, (double[3]){0, 0, 0});
-    const double p[2] = {1.3, 0}, error = 0.05 / 0.9 - 0.05;
+    const double p[2] = {1.26, 0};
     sdm_instance *ball = instance_of(&ball_shape);
-    sdm_model *model = ball_model("bulge", &grid, nine_tenths);
-    double *x = points_on(ball, p, POINTS, ERROR, 23, 0), variance[2];
+    sdm_model *model = ball_model("bulge", &grid, derivative);
+    double *x = points_on(ball, p, POINTS, ERROR, 23, 0), variance[3], radius[3];
+    const sdm_fit_source source[3] = {
+        {.model = model}, {.model = model, .shape = ball}, {.shape = ball, .grid = grid}};
     const sdm_fit_target target = {.kind = SDM_FIT_POINTS, .points = x, .n_points = POINTS};
-    for (int known = 0; known < 2; known++) {
-        const sdm_fit_source source = {.model = model, .shape = known ? ball : NULL};
+    for (int i = 0; i < 3; i++) {
         const sdm_fit_opts o = sdm_fit_defaults();
         sdm_fit_result r;
         sdm_error err = {0};
-        const sdm_status s = sdm_fit(&source, &target, &o, &r, &err);
+        const sdm_status s = sdm_fit(&source[i], &target, &o, &r, &err);
         if (s && s != SDM_E_QUALITY) fail_msg("%s", err.text);
-        assert_true(fabs(ball_radius(r.params) - 1.3 - error) < 0.001);
-        assert_true(known == !isnan(r.network_error_sd));
-        variance[known] = radius_variance(&r);
+        assert_true((i == 1) == !isnan(r.network_error_sd));
+        radius[i] = ball_radius(r.params);
+        variance[i] = radius_variance(&r);
         sdm_fit_dispose(&r);
     }
-    const double found = sqrt(variance[1] - variance[0]);
-    if (!(fabs(found - error) < 0.1 * error)) fail_msg("%g mm, not %g mm", found, error);
+    assert_true(fabs(radius[1] - 1.25 - 0.01 / slope) < 0.001 / slope);
+    const double found = sqrt(variance[1] - variance[0]), error = radius[1] - radius[2];
+    if (!(fabs(found - error) < 0.05 * error)) fail_msg("%g mm, not %g mm", found, error);
     free(x);
     sdm_model_free(model);
     sdm_instance_free(ball);
+}
+
+static void test_the_error_of_a_network_is_measured(void **state)
+{
+    (void)state;
+    network_error(0.9, nine_tenths);
+    network_error(0.5, a_half);
 }
 
 int main(void)

@@ -8,7 +8,7 @@
 
 #include "fit/solver/open_motions.h"
 #include "fit/solver/prior.h"
-#include "fit/solver/solve.h"
+#include "influence.h"
 #include "map_bias.h"
 #include "network_bias.h"
 #include "pose_params.h"
@@ -18,60 +18,6 @@
 // edge of the cubes within which the error of a network's map or of labels is assumed constant, in
 // voxels
 #define MODEL_STEPS 5.0
-
-// list[]: indices of the unknowns that were estimated; returns their number
-static size_t free_unknowns(const fit_problem *p, size_t *list)
-{
-    const sdm_fit_opts *o = p->opts;
-    size_t count = 0;
-    for (size_t i = 0; i < p->information.n_unknowns; i++) {
-        const size_t n = p->n_params;
-        const bool kept = i < n       ? fit_param_is_kept(p, i)
-                          : i < n + 6 ? o->keep_pose
-                          : i > n + 6 ? fit_mean_is_kept(p, i)
-                                      : o->keep_blur || !p->maps.share;
-        if (!kept) list[count++] = i;
-    }
-    return count;
-}
-
-// out[m][m]: the rows and columns of a[n][n] in the list
-static void submatrix(size_t n, const double *a, size_t m, const size_t *list, double *out)
-{
-    for (size_t i = 0; i < m; i++)
-        for (size_t j = 0; j < m; j++) out[i * m + j] = a[list[i] * n + list[j]];
-}
-
-/* influence[n][n]: inverse of the information of the unknowns that were estimated, 0 for the
- * others. Inverts the observed information where it is positive definite, else the complete one.
- * work: 3 n n numbers. False: neither is positive definite. */
-static bool influence_compute(const fit_problem *p, bool with_priors, double *influence,
-                              double *work)
-{
-    const size_t n = p->information.n_unknowns;
-    size_t list[FIT_UNKNOWNS_MAX];
-    const size_t m = free_unknowns(p, list);
-    double *information = work, *small = work + n * n, *factor = work + 2 * n * n,
-           scale[FIT_UNKNOWNS_MAX];
-    memset(influence, 0, n * n * sizeof *influence);
-    for (int complete = 0; complete < 2; complete++) {
-        memcpy(information, complete ? p->information.complete : p->information.observed,
-               n * n * sizeof *information);
-        if (with_priors) (void)sdm_fit_prior(p, &p->state, NULL, information, NULL);
-        sdm_fit_add_weak_prior(p, information);
-        sdm_fit_open_motions_stop(p, information);
-        submatrix(n, information, m, list, small);
-        if (!sdm_fit_cholesky(m, small, factor, scale)) continue;
-        for (size_t j = 0; j < m; j++) {
-            double column[FIT_UNKNOWNS_MAX] = {0};
-            column[j] = 1;
-            sdm_fit_solve(m, factor, scale, column);
-            for (size_t i = 0; i < m; i++) influence[list[i] * n + list[j]] = column[i];
-        }
-        return true;
-    }
-    return false;
-}
 
 // element (i, j) of influence * scatter * influence
 static double sandwich(size_t n, const double *influence, const double *scatter, size_t i, size_t j)
@@ -144,8 +90,8 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
     size_t list[FIT_UNKNOWNS_MAX];
     // lost: share of the degrees of freedom that the fit of points uses up; residuals about a fit
     // are smaller than about the truth (MacKinnon and White 1985)
-    const double lost = points ? fmin((double)free_unknowns(p, list) * scatter->noise_factor /
-                                          fmax((double)p->samples.n, 1),
+    const double lost = points ? fmin((double)sdm_fit_free_unknowns(p, list) *
+                                          scatter->noise_factor / fmax((double)p->samples.n, 1),
                                       0.5)
                                : 0;
     // the score of a prior with weight w has the variance w^2 / sd^2; sdm_fit_prior() gives w /
@@ -185,7 +131,7 @@ sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *no
 {
     const size_t n = p->information.n_unknowns;
     size_t list[FIT_UNKNOWNS_MAX];
-    const size_t m = free_unknowns(p, list);
+    const size_t m = sdm_fit_free_unknowns(p, list);
     fit_score_covariance scatter;
     double *work = NULL;
     sdm_status s = sdm_fit_score_covariance_create(p, 0, NULL, &scatter, err);
@@ -194,7 +140,7 @@ sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *no
     s = SDM_ALLOC(&work, 4 * n * n, "matrices of the fit", err);
     if (!s) {
         double *influence = work + 3 * n * n;
-        const bool known = influence_compute(p, false, influence, work);
+        const bool known = sdm_fit_influence(p, false, influence, work);
         for (size_t i = 0; i < p->n_params + 6; i++) weight[i] = 1;
         for (size_t k = 0; k < m; k++) {
             const size_t i = list[k];
@@ -209,7 +155,7 @@ sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *no
     return s;
 }
 
-sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_error *err)
+sdm_status sdm_fit_posterior(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const size_t n = p->information.n_unknowns;
     out->model_error_mm = model_error(p);
@@ -219,7 +165,7 @@ sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_erro
     sdm_status s = SDM_ALLOC(&work, 5 * n * n, "matrices of the fit", err);
     if (s) return s;
     double *influence = work + 3 * n * n, *bias = work + 4 * n * n, change[FIT_UNKNOWNS_MAX];
-    const bool known = influence_compute(p, true, influence, work);
+    const bool known = sdm_fit_influence(p, true, influence, work);
     s = sdm_fit_score_covariance_create(p, model_mm, known ? influence : NULL, &scatter, err);
     out->noise_factor = scatter.noise_factor;
     memset(bias, 0, n * n * sizeof *bias);
@@ -227,7 +173,7 @@ sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_erro
         s = sdm_fit_map_bias(p, influence, bias, err);
     bool measured = !s && known && !p->is_rival && sdm_fit_can_measure_network(p);
     if (measured) {
-        s = sdm_fit_network_bias(p, influence, change, err);
+        s = sdm_fit_network_bias(p, change, err);
         // a shape without a mesh here leaves the error unknown
         measured = !s;
         if (s != SDM_E_NOMEM && s != SDM_E_CANCELLED) s = SDM_OK;

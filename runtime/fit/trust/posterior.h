@@ -8,8 +8,9 @@
 #define FIT_BY_PRIOR 0.9
 
 /* Fills covariance, sd, correlation, noise_factor and model_error_mm of *out, whose arrays must be
-   allocated. SDM_E_QUALITY: the information is singular; the matrices then keep their values. */
-sdm_status sdm_fit_posterior(const fit_problem *p, sdm_fit_result *out, sdm_error *err);
+   allocated. The problem is as before, but for its counts of maps. SDM_E_QUALITY: the information
+   is singular; the matrices then keep their values. */
+sdm_status sdm_fit_posterior(fit_problem *p, sdm_fit_result *out, sdm_error *err);
 
 /* Error (mm, rms) near the surface of the maps of the fit: of the network, measured on its held-out
    data; 0 for exact maps. */

@@ -136,8 +136,9 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         printf("  trained     %.1f s, %s steps, %s exact maps", r->seconds,
                cli_format_count(r->steps, steps), cli_format_count(r->samples, maps));
     else
-        printf("  made        in %.1f s: this kind of network needs no training", r->seconds);
-    if (r->verdict.saved_seconds > 0)
+        printf("  made        in %.1f s%s: the kind of the network that is kept needs no training",
+               r->seconds, r->compared ? ", with the training of the other kind" : "");
+    if (r->verdict.saved_seconds > 0 && r->steps)
         printf("; train.patience saved %.0f s", r->verdict.saved_seconds);
     printf("\n  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within %g mm of the surface "
            "%.5f mm, largest %.5f mm\n",

@@ -99,6 +99,9 @@ void cli_print_far(const cli_args *args, const sdm_train_report *r, double minut
         sdm_text_add(&price, "auto has %s it, too: within a voxel of the surface ",
                      r->compared ? "trained" : "tried");
         add_error(&price, r->other_voxel_mm, v->rmse_voxel_mm);
+        if (r->compared && r->other_voxel_mm > SDM_GRADE_GOOD_VOXELS * v->voxel_mm)
+            sdm_text_add(&price, " (not good, over %g voxels; look at its derivatives, too)",
+                         SDM_GRADE_GOOD_VOXELS);
         sdm_text_add(&price, "; everywhere ");
         add_error(&price, r->other.rmse_mm, v->rmse_mm);
         if (!r->compared) sdm_text_add(&price, " (a trial, which training improves)");

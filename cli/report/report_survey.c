@@ -144,7 +144,12 @@ static void tell_inside_out(teller *t)
         add_params(t->s, c->worst, SIZE_MAX, &text);
         sdm_text_add(&text, "; parts are inside out ");
         add_share(t->s, c, &text);
-        sdm_text_add(&text, "); " CLI_MEND_SHAPE);
+        // a part that is right elsewhere turns over where a size becomes negative
+        const bool all = c->shapes == t->s->found.n - t->s->found.untested;
+        sdm_text_add(&text, "); %s",
+                     all ? CLI_MEND_SHAPE
+                         : "in the other shapes the vertices are in the right order: a size "
+                           "becomes negative there; narrow the ranges, or limit it in mesh()");
         tell(t, SDM_E_QUALITY, &text);
     }
     sdm_part_audit_dispose(&audit);

@@ -71,8 +71,9 @@ static void print_derivatives(const sdm_verdict *v)
     if (isfinite(v->volume_derivative_error))
         printf(", of volumes by %s %% (by %s%s)", percent(v->volume_derivative_error, text),
                v->volume_derivative_by,
-               v->volume_derivatives_small[0] ? "; where they change by less than 5 %, of 5 %"
-                                              : "");
+               v->volume_derivatives_small[0]
+                   ? "; a parameter that changes the volume by less than 5 % counts as if by 5 %"
+                   : "");
     printf("\n");
 }
 

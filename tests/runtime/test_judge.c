@@ -389,6 +389,9 @@ static void test_surfaces_without_each_other_are_told(void **state)
         if (*covered->text)
             assert_true(!strstr(covered->text, " of the points lie away from the surface") ==
                         !cases[k].n_more);
+        // half of the ellipsoid is bare
+        if (covered->grade == SDM_FIT_DOUBTFUL)
+            assert_non_null(strstr(covered->text, " has no points near it, about ("));
         const bool refused = cases[k].patch == SDM_FIT_FAILED || cases[k].covered == SDM_FIT_FAILED;
         assert_int_equal(s, refused ? SDM_E_QUALITY : SDM_OK);
         sdm_fit_dispose(&r);

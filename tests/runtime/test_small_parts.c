@@ -157,8 +157,8 @@ static void test_small_parts_leave_doubt(void **state)
         assert_int_equal(f->grade, SDM_FIT_DOUBTFUL);
         // figure and limit are those that decide
         assert_true(f->figure > f->limit && f->figure < 0.05 && f->limit < 0.01);
-        assert_non_null(strstr(f->text, hole ? "inside the shape do not have the label"
-                                             : "with the label lie outside of the shape"));
+        assert_non_null(strstr(f->text, hole ? "the data may lack a part of the shape"
+                                             : "the data may have a part that the shape lacks"));
         sdm_fit_dispose(&r);
     }
 }

@@ -124,6 +124,14 @@ static void length_of_the_training(void **state)
     assert_string_equal(v.key, "network.width");
     assert_true(v.minutes == 3);
     assert_non_null(strstr(v.sentence, "train.minutes from 1.5 to 3 for a larger network"));
+    // a template without a correction is not trained: more voxels need no more minutes
+    timed.network.kind = SDM_NETWORK_TEMPLATE;
+    const verdict_input untrained = {.config = &timed, .budget = 1.5};
+    v = figures();
+    v.part_mm2[SDM_CAUSE_TEMPLATE] = 1e-4;
+    trainer_verdict_decide(&untrained, &v);
+    assert_string_equal(v.key, "grid.spacing");
+    assert_true(v.minutes == 0 && !strstr(v.sentence, "train.minutes"));
 }
 
 // Where most of the maps in the time of the budget are those of the static grid, a smaller grid

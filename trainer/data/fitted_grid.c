@@ -21,6 +21,9 @@ static const double COUNT_LIMIT = 2e9;
 /* Most voxels of a grid that is proposed with the spacing of the configuration. */
 static const double PROPOSED_MAX = 2.5e6;
 
+/* A grid with more voxels has its spacing probably in metres. */
+static const double METRES = 1e11;
+
 /* The shapes of a configuration: the ranges of their parameters, and the box that holds them. */
 typedef struct family {
     double range[SDM_MAX_PARAMS][2], low[3], high[3];
@@ -197,6 +200,7 @@ sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance 
     add_keys(out, &grid);
     sdm_text_add(out, ")");
     if (voxels > PROPOSED_MAX && voxels < INFINITY)
-        sdm_text_add(out, ", coarser than yours: with your spacing it has %.3g voxels", voxels);
+        sdm_text_add(out, ", coarser than yours: with your spacing it has %.3g voxels%s", voxels,
+                     voxels > METRES ? "; was it given in metres? It needs mm" : "");
     return out->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
 }

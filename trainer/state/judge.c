@@ -162,7 +162,7 @@ static const char *advise_part(const verdict_input *in, sdm_verdict *v)
 static sdm_grade grade_of(const sdm_verdict *v)
 {
     const double voxels = v->rmse_voxel_mm / v->voxel_mm;
-    if (voxels <= 0.05 && v->dice >= 0.98 && v->cut <= 0.05) return SDM_GRADE_GOOD;
+    if (voxels <= SDM_GRADE_GOOD_VOXELS && v->dice >= 0.98 && v->cut <= 0.05) return SDM_GRADE_GOOD;
     return voxels <= 0.2 && v->dice >= 0.9 && v->cut <= SDM_CUT_POOR ? SDM_GRADE_USABLE
                                                                      : SDM_GRADE_POOR;
 }
@@ -203,6 +203,8 @@ static double minutes_for(const verdict_input *in, const sdm_verdict *v)
 {
     const sdm_config *c = in->config;
     double factor = 1;
+    // a template without a correction takes the seconds of the held-out maps
+    if (c->network.kind == SDM_NETWORK_TEMPLATE && in->steps < 1) return 0;
     if (!strcmp(v->key, "grid.spacing")) factor = pow(v->from / v->to, 3);
     if (v->limit == SDM_CAUSE_MAPS && !in->cut) factor = 2;
     if (v->limit == SDM_CAUSE_NETWORK && !strncmp(v->key, "network.", 8)) factor = 2;

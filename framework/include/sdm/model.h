@@ -87,7 +87,8 @@ typedef enum sdm_model_use {
     SDM_USE_SURFACE = 0,           /* surfaces and level sets: the grade is "poor" */
     SDM_USE_VOLUME = 1,            /* of maps: volume_error > SDM_VOLUME_BAD */
     SDM_USE_DERIVATIVE = 2,        /* of maps: derivative_error > SDM_DERIVATIVE_BAD */
-    SDM_USE_VOLUME_DERIVATIVE = 3, /* volume_derivative_error > SDM_DERIVATIVE_BAD */
+    SDM_USE_VOLUME_DERIVATIVE = 3, /* volume_derivative_error > SDM_DERIVATIVE_BAD: a parameter that
+                                      hardly changes the volume passes, see `unfit` */
     SDM_USE_DISTANCE = 4,          /* far from the surface: far_error_mm > a voxel */
     SDM_USE_SURFACE_VOLUME = 5     /* inside surfaces: surface_volume_error > SDM_VOLUME_BAD */
 } sdm_model_use;

@@ -106,8 +106,11 @@ static void name_cause(const fit_problem *p, const fit_misfit *m, const fit_susp
                  "sdm_fit_opts.tolerance)",
                  other->refused ? "another shape lies there"
                  : sdm_fit_is_image(p)
-                     ? "the fit stopped beside the best place, another shape or a part that this "
-                       "one lacks lies there, or the texture of the image is coarse"
+                     ? m->worst[1].more
+                           ? "the fit stopped beside the best place, another shape or a part that "
+                             "this one lacks lies there, or the texture of the image is coarse"
+                           : "the fit stopped beside the best place, the image lacks a part of the "
+                             "shape or shows another one, or its texture is coarse"
                      : "the data have errors of their own, the fit stopped beside the best place, "
                        "another shape lies there",
                  p->opts->kept ? ", a kept parameter has another value" : "");
@@ -127,9 +130,11 @@ void sdm_fit_beside_explain(const fit_problem *p, const fit_misfit *m, char text
     const fit_worst_place *worst = &m->worst[0];
     char place[FIT_PLACE_MAX];
     name_place(p, worst, place, sizeof place);
-    snprintf(text, FIT_CAUSE_MAX, "%s: look there at a picture of the fit; %s", place,
-             sdm_fit_is_image(p)
-                 ? "other things of the inside's material (sdm_fit_opts.cavity), or another shape"
-             : worst->more ? "the shape is too thin or too short, or the data show another one"
-                           : "the shape is too thick or too long, or the data show another one");
+    snprintf(
+        text, FIT_CAUSE_MAX, "%s: look there at a picture of the fit; %s", place,
+        sdm_fit_is_image(p)
+            ? "other things of the inside's material (sdm_fit_opts.cavity), sharp edges, which "
+              "blur of a voxel or more rounds in another way than maps do, or another shape"
+        : worst->more ? "the shape is too thin or too short, or the data show another one"
+                      : "the shape is too thick or too long, or the data show another one");
 }

@@ -218,6 +218,30 @@ static double find_bare(const cloud *surface, const cloud *on, const cloud *stra
     return surface->n ? (double)n / (double)surface->n : 0;
 }
 
+/* text[size] = where the bare places lie, by the one nearest to their mean; "": there are none. */
+static void name_bare(const fit_problem *p, const cloud *surface, const bool *bare, char *text,
+                      size_t size)
+{
+    double mean[3] = {0}, nearest = INFINITY, y[3];
+    size_t n = 0, at = 0;
+    for (size_t i = 0; i < surface->n; i++) {
+        for (int a = 0; a < 3 && bare[i]; a++) mean[a] += surface->x[i][a];
+        n += bare[i];
+    }
+    *text = '\0';
+    if (!n) return;
+    for (int a = 0; a < 3; a++) mean[a] /= (double)n;
+    for (size_t i = 0; i < surface->n; i++) {
+        double d2 = 0;
+        for (int a = 0; a < 3; a++) d2 += pow(surface->x[i][a] - mean[a], 2);
+        if (bare[i] && d2 < nearest) nearest = d2, at = i;
+    }
+    const double *x = surface->x[at];
+    sdm_fit_to_shape(&p->state, x, y);
+    snprintf(text, size, ", about (%.3g, %.3g, %.3g) mm, in the shape's frame (%.3g, %.3g, %.3g)",
+             x[0], x[1], x[2], y[0], y[1], y[2]);
+}
+
 /* Names the parameters that the points hardly determine and that move a surface which has no
    points: text[size]. Returns the largest share of such a surface without points; 0: there is none.
  */
@@ -280,7 +304,9 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
         const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
         judge_patches(p, &found, on.n + strays.n, stray, bare, v);
-        char names[200], unseen_text[300] = "", astray[80] = "";
+        char names[200], unseen_text[300] = "", astray[80] = "", where[120] = "";
+        if (bare > UNCOVERED_MAX && !grown && !other)
+            name_bare(p, &surface, bare_at, where, sizeof where);
         if (stray >= 0.005)
             snprintf(astray, sizeof astray, ", and %.0f %% of the points lie away from the surface",
                      100 * stray);
@@ -299,13 +325,14 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
             sdm_fit_judge_add(
                 v, SDM_FIT_CHECK_COVERED, covered,
                 grown || other ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, bare, UNCOVERED_MAX,
-                "%.0f %% of the fitted surface has no points near it%s: %s%s%s", 100 * bare, astray,
+                "%.0f %% of the fitted surface has no points near it%s%s: %s%s%s", 100 * bare,
+                where, astray,
                 grown   ? "a fit that stopped at a wrong shape; give a better start, or take the "
                           "strays out (sdm_fit_opts.tolerance allows more)"
                 : other ? "most of it, and half of the parameters or more end at their bounds: the "
                           "data show another shape, or their lengths are in another unit"
                 : unseen > 0 ? ""
-                             : "the data show a part of the shape only, or it is too large",
+                             : "the data lack a part of the shape, or it is too large",
                 (grown || other) && unseen > 0 ? "; " : "", unseen_text);
     }
     sdm_free(voxel);

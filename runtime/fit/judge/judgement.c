@@ -262,12 +262,13 @@ static void check_far_labels(const fit_problem *p, const fit_misfit *m, sdm_fit_
         if (far.depth[inside] > 0)
             snprintf(depth, sizeof depth, ", up to %.2g mm from its surface", far.depth[inside]);
         sdm_fit_judge_add(v, kind, false, SDM_FIT_DOUBTFUL, far.share[inside], far.limit,
-                          "%.0f voxels %s%s: the data may have a part that the shape has not, or "
-                          "lack one (sdm_fit_opts.tolerance accepts a difference)",
+                          "%.0f voxels far from the surface, those near it not counted, %s%s: the "
+                          "data may %s (sdm_fit_opts.tolerance accepts a difference)",
                           far.voxels[inside],
-                          inside ? "inside the shape do not have the label"
-                                 : "with the label lie outside of the shape",
-                          depth);
+                          inside ? "lie inside the shape and do not have the label"
+                                 : "have the label and lie outside of the shape",
+                          depth,
+                          inside ? "lack a part of the shape" : "have a part that the shape lacks");
     }
 }
 

@@ -10,10 +10,13 @@
 extern "C" {
 #endif
 
+/* The largest error within a voxel of the surface of a good model, in voxels. */
+#define SDM_GRADE_GOOD_VOXELS 0.05
+
 /* What a model is good for, by its error within a voxel of the surface, by its Dice overlap, and by
    the fraction of the shapes that the grid cuts. */
 typedef enum sdm_grade {
-    SDM_GRADE_GOOD = 0, /* at most a twentieth of a voxel, Dice at least 0.98, 5 % cut at most */
+    SDM_GRADE_GOOD = 0, /* at most SDM_GRADE_GOOD_VOXELS, Dice at least 0.98, 5 % cut at most */
     SDM_GRADE_USABLE,   /* at most a fifth of a voxel, Dice at least 0.9, half of the shapes cut */
     SDM_GRADE_POOR
 } sdm_grade;

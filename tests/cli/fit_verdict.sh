@@ -84,6 +84,11 @@ has "the mirror image of the shape fits better, by [0-9.]+ .*the other value of 
 expect 4 '^sdmgen: error: left.nii: ' $ear -O ear=right --mirror no --json
 grep -q '"mirror' out && bad '--mirror no fits no mirror image'
 
+# A point spread that reaches beyond the samples: no voxel lies deep outside, and mixed ones tell the noise there.
+expect 0 - sdmgen phantom --shape capsule --seed 5 --random-params --inside 1500,0 --outside -1000,0 --spacing 0.5 --blur 0.6 --noise 60 -o wide.nrrd -q
+expect 0 - sdmgen fit --shape capsule wide.nrrd --rotation 0,0,0 --inside 1500,50 --outside -1000,50 --blur 0.6 --margin 0.9 -q
+for check in beside residuals outside; do has "^  $check +passed "; done
+
 # An ellipsoid that covers a torus and its hole: half of what lies deep inside is not labelled, which is no noise.
 cat >hole.yaml <<'END'
 experiment: {title: a torus fitted by an ellipsoid, seed: 6, pictures: no}

@@ -130,11 +130,9 @@ void sdm_fit_beside_explain(const fit_problem *p, const fit_misfit *m, char text
     const fit_worst_place *worst = &m->worst[0];
     char place[FIT_PLACE_MAX];
     name_place(p, worst, place, sizeof place);
-    snprintf(
-        text, FIT_CAUSE_MAX, "%s: look there at a picture of the fit; %s", place,
-        sdm_fit_is_image(p)
-            ? "other things of the inside's material (sdm_fit_opts.cavity), sharp edges, which "
-              "blur of a voxel or more rounds in another way than maps do, or another shape"
-        : worst->more ? "the shape is too thin or too short, or the data show another one"
-                      : "the shape is too thick or too long, or the data show another one");
+    snprintf(text, FIT_CAUSE_MAX, "%s: look there at a picture of the fit; %s", place,
+             sdm_fit_is_image(p)
+                 ? "other things of the inside's material (sdm_fit_opts.cavity), or another shape"
+             : worst->more ? "the shape is too thin or too short, or the data show another one"
+                           : "the shape is too thick or too long, or the data show another one");
 }

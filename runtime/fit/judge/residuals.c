@@ -30,6 +30,9 @@
 #define BETWEEN_MAX 0.75
 // the spread inside is at most this factor above what the differences of neighbours say
 #define WIDER 1.5
+// images without voxels deep outside: voxels that measure the noise there; they lie side by side,
+// so that their noise is alike
+#define MIXED_MIN 2000
 // largest place along an axis; points farther away, in units of the radius, share a place
 #define PLACE_MAX 1e5
 // smallest square of the gradient of a distance that leads to the surface
@@ -127,31 +130,35 @@ static bool is_pure(const fit_residuals *r, size_t i, int side, double limit)
     return fabs(r->expected[i] - side) <= limit;
 }
 
-// the value of the inside at sample i, of which a part may lie outside
-static double inside_value(const fit_problem *p, const fit_residuals *r, size_t i)
+// the value of one side at sample i, of which a part may lie on the other side
+static double side_value(const fit_problem *p, const fit_residuals *r, size_t i, int side)
 {
-    const double a = r->expected[i], outside = r->middle[0] + outside_shift(p, i);
-    return ((double)p->samples.value[i] - (1 - a) * outside) / a;
+    const double a = r->expected[i], value = (double)p->samples.value[i];
+    if (!side) return (value - a * main_tissue(p, 1)->mean) / (1 - a);
+    return (value - (1 - a) * (r->middle[0] + outside_shift(p, i))) / a;
 }
 
 // middle and spread of the values on one side
 static void side_measure(const fit_problem *p, fit_residuals *r, int side, double *list)
 {
-    const bool unmix = side == 1 && !is_labels(p);
-    const size_t least = unmix ? INSIDE_MIN : DEEP_MIN;
+    const bool image = !is_labels(p);
+    size_t least = image && side == 1 ? INSIDE_MIN : DEEP_MIN;
     double limit = DEEP;
     size_t n = 0;
     for (size_t i = 0; i < r->n; i++) n += is_pure(r, i, side, limit);
+    if (image && side == 0 && n < least) least = MIXED_MIN;
     while (n < least && limit < NEARLY_DEEP) {
-        limit = unmix ? fmin(2 * limit, NEARLY_DEEP) : NEARLY_DEEP;
+        limit = image ? fmin(2 * limit, NEARLY_DEEP) : NEARLY_DEEP;
         n = 0;
         for (size_t i = 0; i < r->n; i++) n += is_pure(r, i, side, limit);
     }
+    // with a wide point spread no voxel near the shape may lie deep outside
+    const bool unmix = image && (side == 1 || limit > DEEP);
     const size_t step = n / VALUES_MAX + 1;
     size_t seen = 0, kept = 0;
     for (size_t i = 0; i < r->n; i++)
         if (is_pure(r, i, side, limit) && seen++ % step == 0)
-            list[kept++] = unmix ? inside_value(p, r, i) : (double)p->samples.value[i];
+            list[kept++] = unmix ? side_value(p, r, i, side) : (double)p->samples.value[i];
     r->n_deep[side] = n;
     r->deep[side] = unmix ? limit : DEEP;
     r->middle[side] = sdm_fit_shortest_half(list, kept, &r->spread[side]);

@@ -47,14 +47,15 @@ static bool make(const cli_survey *s, size_t index, sdm_mesh *mesh, sdm_error *e
     return !sdm_instance_mesh(s->shape, s->found.p + index * s->found.n_params, mesh, err);
 }
 
+static size_t count_tested(const cli_survey *s) { return s->found.n - s->found.untested; }
+
 /* "in 3 of 145 shapes" */
 static void add_share(const cli_survey *s, const sdm_survey_count *c, sdm_text *text)
 {
-    const size_t n = s->found.n - s->found.untested;
-    if (c->shapes == n)
+    if (c->shapes == count_tested(s))
         sdm_text_add(text, "in all %zu shapes", c->shapes);
     else
-        sdm_text_add(text, "in %zu of %zu shapes", c->shapes, n);
+        sdm_text_add(text, "in %zu of %zu shapes", c->shapes, count_tested(s));
 }
 
 /* "WHAT in 3 of 145 shapes, up to 12 at a=1 b=2" */
@@ -145,9 +146,9 @@ static void tell_inside_out(teller *t)
         sdm_text_add(&text, "; parts are inside out ");
         add_share(t->s, c, &text);
         // a part that is right elsewhere turns over where a size becomes negative
-        const bool all = c->shapes == t->s->found.n - t->s->found.untested;
         sdm_text_add(&text, "); %s",
-                     all ? CLI_MEND_SHAPE
+                     c->shapes == count_tested(t->s)
+                         ? CLI_MEND_SHAPE
                          : "in the other shapes the vertices are in the right order: a size "
                            "becomes negative there; narrow the ranges, or limit it in mesh()");
         tell(t, SDM_E_QUALITY, &text);

@@ -21,7 +21,7 @@ void sdm_child_ends_with(long parent) { (void)parent; }
 #include "sdm/internal/sanitized.h"
 
 #if defined(__linux__) && SDM_SANITIZED
-/* Is the thread with this number asleep? One that has ended is. */
+/* Tells whether the thread with this number sleeps. A thread that has ended counts as asleep. */
 static bool is_asleep(long thread)
 {
     char path[64], text[512] = "";
@@ -34,7 +34,7 @@ static bool is_asleep(long thread)
     return !name_end || strchr("SZX", name_end[1] ? name_end[2] : 'S');
 }
 
-/* Of all threads only the calling one is awake. */
+/* Tells whether all threads of the process but the calling one sleep. */
 static bool others_sleep(void)
 {
     DIR *threads = opendir("/proc/self/task");

@@ -53,6 +53,6 @@ has '^at radius=38 height=85 wall=8 reach=28, against the exact map$'
 [ "$(grep -c '^  wall .* truth 8.5212, off by [0-3]' out)" = 3 ] || bad "not three fits that find the wall"
 if python3 -c 'import numpy' 2>/dev/null; then # the same volumes and derivatives as the C program
     # after a training on a busy machine the C program says first that the model is not for derivatives of volumes
-    (cd work && PYTHONPATH=$PREFIX/lib/python3/dist-packages python3 use.py >use.txt && use/build/use runs/mug/model.sdm | grep -v 'derivatives of volumes' | cmp - use.txt) || bad "C and Python differ"
+    (cd work && PYTHONPATH=$PREFIX/lib/python3/dist-packages python3 use.py >use.txt && use/build/use runs/mug/model.sdm | sed '1{/: derivatives of volumes of its maps are off by /d}' | cmp - use.txt) || bad "C and Python differ"
 fi
 finish

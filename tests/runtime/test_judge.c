@@ -389,7 +389,7 @@ static void test_surfaces_without_each_other_are_told(void **state)
         if (*covered->text)
             assert_true(!strstr(covered->text, " of the points lie away from the surface") ==
                         !cases[k].n_more);
-        // half of the ellipsoid is bare
+        // half of the ellipsoid has no points: the text says where
         if (covered->grade == SDM_FIT_DOUBTFUL)
             assert_non_null(strstr(covered->text, " has no points near it, about ("));
         const bool refused = cases[k].patch == SDM_FIT_FAILED || cases[k].covered == SDM_FIT_FAILED;

@@ -21,7 +21,7 @@ static const double COUNT_LIMIT = 2e9;
 /* Most voxels of a grid that is proposed with the spacing of the configuration. */
 static const double PROPOSED_MAX = 2.5e6;
 
-/* A grid with more voxels has its spacing probably in metres. */
+/* A spacing that would give more voxels than this was probably meant in metres. */
 static const double METRES = 1e11;
 
 /* The shapes of a configuration: the ranges of their parameters, and the box that holds them. */

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "finding.h"
 #include "rival.h"
 
 // a larger empty share of the shape, or a larger volume of labels or points beside it: the fit lies
@@ -55,15 +56,11 @@ static bool has_inside_values(const fit_problem *p)
 // text[size] = where the data contradict the shape most, and how; "": no neighbourhood stands out
 static void name_place(const fit_problem *p, const fit_worst_place *worst, char *text, size_t size)
 {
-    const double *x = worst->world;
-    double y[3];
+    char place[FIT_PLACE_NAME];
     *text = '\0';
     if (!(worst->chi_square > 0)) return;
-    sdm_fit_to_shape(&p->state, x, y);
-    snprintf(text, size,
-             ", most at (%.3g, %.3g, %.3g) mm, in the shape's frame (%.3g, %.3g, %.3g), where the "
-             "data show %s than the shape%s",
-             x[0], x[1], x[2], y[0], y[1], y[2], worst->more ? "more" : "less",
+    snprintf(text, size, ", most at %s, where the data show %s than the shape%s",
+             sdm_fit_name_place(&p->state, worst->world, place), worst->more ? "more" : "less",
              worst->same > NEARLY_ALL ? ", as in nearly all places that deviate" : "");
 }
 

@@ -146,17 +146,15 @@ static void judge_patches(const fit_problem *p, const patches *found, size_t n_p
                  refused = bare > UNCOVERED_MAX ? fmin(PATCH_MAX_UNCOVERED, most) : most,
                  limit = fmax(fmax(p->opts->tolerance, PATCH_DOUBTFUL), BY_CHANCE * stray),
                  *x = found->world, d = sdm_fit_field_at(&field, &p->state, x);
-    double y[3];
-    sdm_fit_to_shape(&p->state, x, y);
+    char place[FIT_PLACE_NAME];
     sdm_fit_judge_add(v, SDM_FIT_CHECK_PATCH, share <= fmin(limit, refused),
                       share > refused ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, share,
                       fmin(limit, refused),
                       "%.2g %% of the points form a surface that the fitted shape does not "
-                      "have, densest at (%.3g, %.3g, %.3g) mm, in the shape's frame "
-                      "(%.3g, %.3g, %.3g), %.2g mm %s of its surface: another shape, or a fit "
+                      "have, densest at %s, %.2g mm %s of its surface: another shape, or a fit "
                       "that stopped at a wrong one; give a better start, or take other things out "
                       "of the data (sdm_fit_opts.tolerance allows more); failed above %.3g",
-                      100 * share, x[0], x[1], x[2], y[0], y[1], y[2], fabs(d),
+                      100 * share, sdm_fit_name_place(&p->state, x, place), fabs(d),
                       d < 0 ? "inside" : "outside", refused);
 }
 
@@ -218,28 +216,23 @@ static double find_bare(const cloud *surface, const cloud *on, const cloud *stra
     return surface->n ? (double)n / (double)surface->n : 0;
 }
 
-/* text[size] = where the bare places lie, by the one nearest to their mean; "": there are none. */
-static void name_bare(const fit_problem *p, const cloud *surface, const bool *bare, char *text,
-                      size_t size)
+/* The part of the surface without points: of its places, the one nearest to their mean. NULL: all
+ * of the surface has points. */
+static const double *middle_of_bare(const cloud *surface, const bool *bare)
 {
-    double mean[3] = {0}, nearest = INFINITY, y[3];
-    size_t n = 0, at = 0;
+    double mean[3] = {0}, nearest = INFINITY;
+    const double *middle = NULL;
+    size_t n = 0;
     for (size_t i = 0; i < surface->n; i++) {
         for (int a = 0; a < 3 && bare[i]; a++) mean[a] += surface->x[i][a];
         n += bare[i];
     }
-    *text = '\0';
-    if (!n) return;
-    for (int a = 0; a < 3; a++) mean[a] /= (double)n;
+    for (int a = 0; a < 3 && n; a++) mean[a] /= (double)n;
     for (size_t i = 0; i < surface->n; i++) {
-        double d2 = 0;
-        for (int a = 0; a < 3; a++) d2 += pow(surface->x[i][a] - mean[a], 2);
-        if (bare[i] && d2 < nearest) nearest = d2, at = i;
+        const double d2 = v3_dist2(surface->x[i], mean);
+        if (bare[i] && d2 < nearest) nearest = d2, middle = surface->x[i];
     }
-    const double *x = surface->x[at];
-    sdm_fit_to_shape(&p->state, x, y);
-    snprintf(text, size, ", about (%.3g, %.3g, %.3g) mm, in the shape's frame (%.3g, %.3g, %.3g)",
-             x[0], x[1], x[2], y[0], y[1], y[2]);
+    return middle;
 }
 
 /* Names the parameters that the points hardly determine and that move a surface which has no
@@ -304,9 +297,10 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
         const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
         judge_patches(p, &found, on.n + strays.n, stray, bare, v);
-        char names[200], unseen_text[300] = "", astray[80] = "", where[120] = "";
-        if (bare > UNCOVERED_MAX && !grown && !other)
-            name_bare(p, &surface, bare_at, where, sizeof where);
+        char names[200], unseen_text[300] = "", astray[80] = "";
+        char place[FIT_PLACE_NAME] = "";
+        const double *middle = grown || other ? NULL : middle_of_bare(&surface, bare_at);
+        if (middle) sdm_fit_name_place(&p->state, middle, place);
         if (stray >= 0.005)
             snprintf(astray, sizeof astray, ", and %.0f %% of the points lie away from the surface",
                      100 * stray);
@@ -325,8 +319,8 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
             sdm_fit_judge_add(
                 v, SDM_FIT_CHECK_COVERED, covered,
                 grown || other ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, bare, UNCOVERED_MAX,
-                "%.0f %% of the fitted surface has no points near it%s%s: %s%s%s", 100 * bare,
-                where, astray,
+                "%.0f %% of the fitted surface has no points near it%s%s%s: %s%s%s", 100 * bare,
+                middle ? ", about " : "", place, astray,
                 grown   ? "a fit that stopped at a wrong shape; give a better start, or take the "
                           "strays out (sdm_fit_opts.tolerance allows more)"
                 : other ? "most of it, and half of the parameters or more end at their bounds: the "

@@ -60,3 +60,12 @@ void sdm_fit_judge_add(sdm_fit_verdict *v, sdm_fit_check_kind kind, bool passed,
     va_end(args);
     sdm_fit_verdict_add(v, &f);
 }
+
+const char *sdm_fit_name_place(const fit_state *s, const double x[3], char text[FIT_PLACE_NAME])
+{
+    double y[3];
+    sdm_fit_to_shape(s, x, y);
+    snprintf(text, FIT_PLACE_NAME, "(%.3g, %.3g, %.3g) mm, in the shape's frame (%.3g, %.3g, %.3g)",
+             x[0], x[1], x[2], y[0], y[1], y[2]);
+    return text;
+}

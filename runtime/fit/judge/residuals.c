@@ -30,8 +30,9 @@
 #define BETWEEN_MAX 0.75
 // the spread inside is at most this factor above what the differences of neighbours say
 #define WIDER 1.5
-// images without voxels deep outside: voxels that measure the noise there; they lie side by side,
-// so that their noise is alike
+// images whose wide point spread leaves no voxel near the shape fully outside: so many voxels that
+// lie mostly outside measure the noise there. They must be many, because neighbouring voxels have
+// correlated noise
 #define MIXED_MIN 2000
 // largest place along an axis; points farther away, in units of the radius, share a place
 #define PLACE_MAX 1e5

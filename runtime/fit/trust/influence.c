@@ -1,4 +1,4 @@
-/* The inverse of the information of the unknowns that were estimated. */
+/* The inverse of the information matrix, for the unknowns that a fit estimates. */
 #include "influence.h"
 
 #include <string.h>

@@ -10,7 +10,8 @@
 extern "C" {
 #endif
 
-/* The largest error within a voxel of the surface of a good model, in voxels. */
+/* A model is good only if its root mean square error, at voxels within one voxel of the surface, is
+   at most this many voxels. */
 #define SDM_GRADE_GOOD_VOXELS 0.05
 
 /* What a model is good for, by its error within a voxel of the surface, by its Dice overlap, and by

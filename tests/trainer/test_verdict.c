@@ -124,6 +124,17 @@ static void length_of_the_training(void **state)
     assert_string_equal(v.key, "network.width");
     assert_true(v.minutes == 3);
     assert_non_null(strstr(v.sentence, "train.minutes from 1.5 to 3 for a larger network"));
+    // less the time that patience has saved
+    v = figures();
+    v.part_mm2[SDM_CAUSE_NETWORK] = 1e-4;
+    v.saved_seconds = 36;
+    trainer_verdict_decide(&in_time, &v);
+    assert_true(fabs(v.minutes - 2.4) < 1e-9);
+    v = figures();
+    v.part_mm2[SDM_CAUSE_NETWORK] = 1e-4;
+    v.saved_seconds = 90;
+    trainer_verdict_decide(&in_time, &v);
+    assert_true(v.minutes == 0 && !strstr(v.sentence, "train.minutes"));
     // a template without a correction is not trained: more voxels need no more minutes
     timed.network.kind = SDM_NETWORK_TEMPLATE;
     const verdict_input untrained = {.config = &timed, .budget = 1.5};
@@ -132,6 +143,39 @@ static void length_of_the_training(void **state)
     trainer_verdict_decide(&untrained, &v);
     assert_string_equal(v.key, "grid.spacing");
     assert_true(v.minutes == 0 && !strstr(v.sentence, "train.minutes"));
+}
+
+// Where patience has ended the training the verdict does not say that its time was too short: the
+// half of the budget for the maps may have been.
+static void patience_left_time(void **state)
+{
+    (void)state;
+    const char *overrides[] = {"train.steps=0", "train.minutes=2"};
+    const sdm_config c = config_of(overrides, 2);
+    for (int early = 0; early < 2; early++) {
+        sdm_verdict v = figures();
+        v.part_mm2[SDM_CAUSE_MAPS] = 1e-4;
+        verdict_input in = {.config = &c,
+                            .maps = 128,
+                            .steps = 1500,
+                            .cut = true,
+                            .ended_early = early,
+                            .budget = 2};
+        trainer_verdict_decide(&in, &v);
+        assert_true(!strcmp(v.key, "train.minutes") && v.to == 4);
+        assert_int_equal(!strstr(v.sentence, "which the time for them limits"), early);
+        assert_int_equal(strstr(v.sentence, "half of the budget is for them, and was too short for "
+                                            "data.start, though train.patience ended the steps "
+                                            "early (100 % of") != NULL,
+                         early);
+        // few steps, but patience ended them
+        v = figures();
+        v.part_mm2[SDM_CAUSE_NETWORK] = 1e-4;
+        in.steps = 60;
+        trainer_verdict_decide(&in, &v);
+        assert_string_equal(v.key, early ? "train.patience" : "train.minutes");
+        if (early) assert_non_null(strstr(v.sentence, "raise train.patience from 0.3 to 0.6"));
+    }
 }
 
 // Where most of the maps in the time of the budget are those of the static grid, a smaller grid
@@ -580,6 +624,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(largest_part_limits),
         cmocka_unit_test(length_of_the_training),
+        cmocka_unit_test(patience_left_time),
         cmocka_unit_test(static_grid_took_the_time),
         cmocka_unit_test(error_far_from_the_surface),
         cmocka_unit_test(grid_limits),

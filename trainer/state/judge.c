@@ -86,6 +86,9 @@ static const char *advise_network(const verdict_input *in, sdm_verdict *v)
     }
     const bool few = in->steps<FEW_STEPS, falls = v->fall> STILL_FALLING && !in->ended_early;
     if ((few || falls) && grid_took_time(in)) return advise_static(in, v);
+    // time was left: a longer budget alone makes patience end the steps a little later
+    if (few && in->ended_early && advise_double(v, "train.patience", c->train.patience, 1))
+        return "train.patience ended the training after few steps";
     if (few) {
         advise_budget(in, v);
         return "The training was too short";
@@ -113,7 +116,10 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
     if (grid_took_time(in)) return advise_static(in, v);
     if (in->cut) {
         advise_budget(in, v);
-        return "The number of maps limits it, which the time for them limits";
+        return in->ended_early
+                   ? "The number of maps limits it: half of the budget is for them, and was too "
+                     "short for data.start, though train.patience ended the steps early"
+                   : "The number of maps limits it, which the time for them limits";
     }
     if (in->full) {
         advise_double(v, "data.memory_gb", c->data.memory_gb, INFINITY);
@@ -208,7 +214,10 @@ static double minutes_for(const verdict_input *in, const sdm_verdict *v)
     if (!strcmp(v->key, "grid.spacing")) factor = pow(v->from / v->to, 3);
     if (v->limit == SDM_CAUSE_MAPS && !in->cut) factor = 2;
     if (v->limit == SDM_CAUSE_NETWORK && !strncmp(v->key, "network.", 8)) factor = 2;
-    return c->train.minutes > 0 && factor > 1 ? ceil(10 * factor * in->budget) / 10 : 0;
+    if (!(c->train.minutes > 0) || !(factor > 1)) return 0;
+    // the time that train.patience has saved is there already
+    const double minutes = ceil(10 * (factor * in->budget - v->saved_seconds / 60)) / 10;
+    return minutes > in->budget ? minutes : 0;
 }
 
 /* The sentence, with the other keys that must change together with v->key. */

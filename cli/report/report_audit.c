@@ -13,9 +13,7 @@
 /* Parts in the table, in JSON and in a line of text. */
 enum { ROWS = 20, JSON_PARTS = 1000, NAMED = 4 };
 
-/* Whether the vertices of a part's triangles are to be reversed. Where maps turn the whole mesh for
- * the larger parts, these are, not the ones that are subtracted then. */
-static bool inside_out(const sdm_part_audit *a, size_t i)
+bool cli_part_inside_out(const sdm_part_audit *a, size_t i)
 {
     const sdm_part *p = &a->part[i];
     if (p->state == SDM_PART_INSIDE_OUT) return !(p->volume > 0);
@@ -39,7 +37,7 @@ static const char *state_name(const sdm_part_audit *a, size_t i)
                                         [SDM_PART_INSIDE_OUT] = "subtracted",
                                         [SDM_PART_FLAT] = "flat",
                                         [SDM_PART_OPEN] = "open"};
-    return inside_out(a, i) ? "inside out" : names[a->part[i].state];
+    return cli_part_inside_out(a, i) ? "inside out" : names[a->part[i].state];
 }
 
 static void print_parts(const sdm_part_audit *a)
@@ -67,7 +65,7 @@ void cli_print_audit(const sdm_part_audit *audit)
     printf("parts                %zu\n", audit->n);
     printf("closed               %s\n", a->closed ? "yes" : "no");
     printf("manifold             %s\n", a->manifold ? "yes" : "no");
-    const size_t wrong = count_parts(audit, inside_out);
+    const size_t wrong = count_parts(audit, cli_part_inside_out);
     if (wrong > 0 && audit->n > 1)
         printf("inside out           %zu of %zu parts\n", wrong, audit->n);
     else
@@ -123,7 +121,7 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
 {
     sdm_json_real(json, "union_volume_mm3", a->union_volume);
     sdm_json_real(json, "union_area_mm2", a->union_area);
-    sdm_json_int(json, "parts_inside_out", (int64_t)count_parts(a, inside_out));
+    sdm_json_int(json, "parts_inside_out", (int64_t)count_parts(a, cli_part_inside_out));
     sdm_json_text(json, "verdict", cli_verdict_name(cli_audit_verdict(a, "", NULL)));
     sdm_json_open(json, "parts", '[');
     for (size_t i = 0; i < a->n && i < JSON_PARTS; i++) {
@@ -290,7 +288,7 @@ void cli_describe_inside_out(const sdm_part_audit *a, sdm_text *text)
     while (first < a->n && !is_lost(a, first)) first++;
     if (first == a->n) return;
     if (a->part[first].volume > 0) {
-        const size_t n = add_parts(a, inside_out, false, text);
+        const size_t n = add_parts(a, cli_part_inside_out, false, text);
         sdm_text_add(text,
                      "%s inside out and larger than the rest: maps turn the whole mesh for %s, and "
                      "subtract ",

@@ -19,6 +19,10 @@ void cli_warn_audit(const sdm_audit *a);
 /* Appends "part 2 of 3 (12 triangles, vertices 8 .. 15, box ...) ". */
 void cli_name_part(const sdm_part_audit *a, size_t index, sdm_text *text);
 
+/* Are the vertices of the triangles of part i to be reversed? Where maps turn the whole mesh for
+ * the larger parts, theirs are, not those of the ones that are subtracted then. */
+bool cli_part_inside_out(const sdm_part_audit *a, size_t i);
+
 /* Appends "part 2 of 2 (...) lies 2.2 mm from the others; ..." about the smallest part that meets
  * no other, or that it lies inside one; appends nothing if there is none. */
 void cli_describe_apart(const sdm_mesh *mesh, const sdm_part_audit *audit, sdm_text *text);

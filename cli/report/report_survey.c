@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "part_turns.h"
 #include "report_audit.h"
 #include "sdm/internal/box.h"
 #include "sdm/internal/shape_box.h"
@@ -132,6 +133,33 @@ static void tell_open(teller *t)
     sdm_part_audit_dispose(&audit);
 }
 
+/* Appends where a part turns over that is right in other shapes: by itself, a length that becomes
+ * negative does that. */
+static void add_turn(const teller *t, size_t wrong, const sdm_part_audit *audit, sdm_text *text)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    cli_part_turn turn;
+    sdm_text_add(text, "in the other shapes the vertices are in the right order: ");
+    if (!cli_find_part_turn(t->s->shape, f, wrong, audit, &turn)) {
+        sdm_text_add(text, "a length of the part becomes negative here; narrow the ranges, or "
+                           "limit the length in mesh()");
+        return;
+    }
+    const bool one = turn.param < f->n_params;
+    const char *name = one ? sdm_instance_params(t->s->shape, NULL)[turn.param].name : "";
+    if (one) {
+        sdm_text_add(text, "here part %zu turns over where '%s' %s about %.3g", turn.part + 1, name,
+                     turn.above ? "rises above" : "falls below", turn.value);
+    } else {
+        sdm_text_add(text, "part %zu turns over on the way here from ", turn.part + 1);
+        add_params(t->s, turn.right, SIZE_MAX, text);
+    }
+    sdm_text_add(text,
+                 ": a length of this part becomes negative there; narrow the range%s%s%s, or "
+                 "limit the length in mesh()",
+                 one ? " of '" : "s", name, one ? "'" : "");
+}
+
 static void tell_inside_out(teller *t)
 {
     const sdm_survey_count *c = &t->s->found.inside_out;
@@ -145,12 +173,11 @@ static void tell_inside_out(teller *t)
         add_params(t->s, c->worst, SIZE_MAX, &text);
         sdm_text_add(&text, "; parts are inside out ");
         add_share(t->s, c, &text);
-        // a part that is right elsewhere turns over where a size becomes negative
-        sdm_text_add(&text, "); %s",
-                     c->shapes == count_tested(t->s)
-                         ? CLI_MEND_SHAPE
-                         : "in the other shapes the vertices are in the right order: a size "
-                           "becomes negative there; narrow the ranges, or limit it in mesh()");
+        sdm_text_add(&text, "); ");
+        if (c->shapes == count_tested(t->s))
+            sdm_text_add(&text, CLI_MEND_SHAPE);
+        else
+            add_turn(t, c->worst, &audit, &text);
         tell(t, SDM_E_QUALITY, &text);
     }
     sdm_part_audit_dispose(&audit);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen shapes check, and what mesh, exact, config and train say about a shape with faults (tests/shape/faulty_shape.h): one line each.
-# Tests: report_survey.c report_audit.c grid_hits.c shapes_check.c cmd_mesh.c crash_guard.c callback.c
+# Tests: report_survey.c report_audit.c part_turns.c grid_hits.c shapes_check.c cmd_mesh.c crash_guard.c callback.c
 . "$(dirname "$0")/common.sh"
 plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
 
@@ -43,7 +43,7 @@ faulty() {
 }
 inside_out='part 2 of 2 \(12 triangles, vertices 8 \.\. 15, box 2 -0\.25 -0\.25 \.\. 4 0\.25 0\.25 mm\) is inside out and overlaps another'
 faulty handle 4 "^warning +$inside_out.*\(at size=[0-9.]+ reach=[0-9.]+; parts are inside out in all 21 shapes\); reverse the vertices"
-faulty late 4 "^warning +part [12] of 2 .* is inside out.*; parts are inside out in [0-9]+ of 21 shapes\); in the other shapes the vertices are in the right order: a size becomes negative there; narrow the ranges"
+faulty late 4 "^warning +part [12] of 2 .* is inside out.*; parts are inside out in [0-9]+ of 21 shapes\); in the other shapes the vertices are in the right order: here part 2 turns over where 'size' rises above about 2: a length of this part becomes negative there; narrow the range of 'size', or limit the length in mesh\(\)\$"
 faulty body 4 '^warning +part 1 of 2 .* is inside out and larger than the rest: maps turn the whole mesh for it, and subtract part 2 of 2 from what that overlaps \(at size=[0-9.]+ reach=[0-9.]+; parts are inside out in all 21 shapes\)'
 if grep -q 'the exact engine turns' out; then bad "the parts that maps turn are told beside those that they lose: $(cat out)"; fi
 expect 4 'is inside out and larger' sdmgen mesh --shape faulty -O fault=body --plugin "$plugin" --audit

@@ -1,0 +1,21 @@
+/* Finds where a part of a shape turns inside out. */
+#pragma once
+
+#include "sdm/internal/shape_survey.h"
+
+/* A part that is inside out in one shape of a survey and right in another. */
+typedef struct cli_part_turn {
+    size_t part;  /* index of the part, in all meshes */
+    size_t right; /* index of the shape in which it is right */
+    /* The parameter that turns it over by itself, while the others are those of the shape in which
+     * it is inside out: n_params if no single one does. Around `value` it turns: above it the part
+     * is inside out, or (above: false) below. */
+    size_t param;
+    double value;
+    bool above;
+} cli_part_turn;
+
+/* *out = about the first part that is inside out in shape `wrong` of the survey, of which `audit`
+ * is the audit. false: no other shape was found in which it is right. */
+bool cli_find_part_turn(const sdm_instance *shape, const sdm_shape_survey *found, size_t wrong,
+                        const sdm_part_audit *audit, cli_part_turn *out);

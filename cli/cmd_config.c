@@ -44,6 +44,10 @@ static void tell_template(const sdm_config *c)
 static void tell_vain_keys(const sdm_config *c)
 {
     const sdm_network_kind kind = c->network.kind;
+    if (c->dropped[0])
+        cli_notice("the kind of network on the command line has no such keys, so these of %s have "
+                   "no effect: %s",
+                   c->file, c->dropped);
     if (kind == SDM_NETWORK_TEMPLATE) {
         tell_template(c);
         return;

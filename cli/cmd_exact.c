@@ -20,6 +20,7 @@
 #include "report/terminal.h"
 #include "sdm/exact.h"
 #include "sdm/internal/block_border.h"
+#include "sdm/internal/box.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/methods.h"
@@ -278,10 +279,17 @@ static void warn_torn(const job *j)
 }
 
 /* A warning, or a notice for grids of one voxel along an axis: probes and slices may miss. */
-static void tell_nothing_inside(const sdm_grid *g)
+static void tell_nothing_inside(const sdm_grid *g, const sdm_audit *a)
 {
-    static const char *const text =
-        "no voxel of the grid is inside the surface: does the grid cover the shape?";
+    char text[400];
+    const sdm_box box = sdm_box_of_grid(g);
+    snprintf(
+        text, sizeof text,
+        "no voxel of the grid is inside the surface: does the grid cover the shape? It reaches "
+        "from (%.4g, %.4g, %.4g) to (%.4g, %.4g, %.4g) mm, the grid from (%.4g, %.4g, %.4g) "
+        "to (%.4g, %.4g, %.4g) mm",
+        a->min[0], a->min[1], a->min[2], a->max[0], a->max[1], a->max[2], box.min[0], box.min[1],
+        box.min[2], box.max[0], box.max[1], box.max[2]);
     if (g->n[0] > 1 && g->n[1] > 1 && g->n[2] > 1)
         cli_warn("%s", text);
     else
@@ -320,7 +328,7 @@ static void notice_mesh(job *j)
     }
     // a part that is too thin, told above, is the cause of both
     if (map && !j->thin && inside) warn_torn(j);
-    if (!j->thin && !inside) tell_nothing_inside(&j->grid);
+    if (!j->thin && !inside) tell_nothing_inside(&j->grid, a);
     if (inside && a->closed && map)
         cli_tell_hits(&j->mesh, &j->grid, writes_labels(j->args), !j->args->like);
     if (j->report.unioned)

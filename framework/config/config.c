@@ -210,7 +210,7 @@ void sdm_config_changed_keys(const sdm_config *c, const char *section, const cha
 void sdm_config_strip(sdm_config *c)
 {
     c->threads = c->data.workers = 0;
-    c->file[0] = c->output.folder[0] = '\0';
+    c->file[0] = c->output.folder[0] = c->dropped[0] = '\0';
 }
 
 const char *sdm_config_where(const sdm_config *c, sdm_mark mark, char *buf)

@@ -3,6 +3,7 @@
 
 #include <stddef.h>
 #include <stdio.h>
+#include <string.h>
 
 bool sdm_kind_has(const sdm_field *f, int kind) { return !f->kinds || (f->kinds >> kind & 1); }
 
@@ -60,6 +61,16 @@ static bool bytes_refused(int kind)
     return kind != SDM_NETWORK_POD && kind != SDM_NETWORK_TEMPLATE && kind != SDM_NETWORK_AUTO;
 }
 
+/* Forgets a key of the file that the kind of an override does not have, and notes its name. */
+static void drop(sdm_reader *r, const char *section, const char *key, sdm_given *g)
+{
+    char *list = r->config->dropped;
+    const size_t size = sizeof r->config->dropped, used = strlen(list);
+    if (sdm_mark_is_set(g->mark))
+        snprintf(list + used, size - used, "%s%s.%s", used ? ", " : "", section, key);
+    *g = (sdm_given){0};
+}
+
 void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
 {
     const int kind = (int)r->config->network.kind;
@@ -74,7 +85,8 @@ void sdm_kinds_settle(sdm_reader *r, sdm_mark place)
             // a key of the file that does not fit the kind set by an override counts as not given
             const bool fits = sdm_kind_has(f, kind) &&
                               !(f->offset == offsetof(sdm_config, network.weights) && bytes);
-            if (!fits && kind != r->file_kind && g->mark.override == 0) *g = (sdm_given){0};
+            if (!fits && kind != r->file_kind && g->mark.override == 0)
+                drop(r, r->sections[s].name, f->key, g);
             if (!sdm_kind_has(f, kind) && sdm_mark_is_set(g->mark))
                 sdm_mistakes_add(
                     r->mistakes, g->mark, "%s.%s: a network of kind %s has no such key, only %s",

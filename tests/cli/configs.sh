@@ -33,6 +33,13 @@ vain() {
 [ "$(vain train.refine=0 train.refine_batch=8 train.refine_rate=1e-4)" = 'train.refine is 0, so these keys have no effect: train.refine_batch, train.refine_rate' ] || bad "refinement in vain: $(cat told)"
 [ "$(vain network.kind=pod network.depth=0 network.width=64)" = 'network.depth is 0, so these keys have no effect: network.width' ] || bad "width in vain: $(cat told)"
 vain network.kind=template network.rank=12 | grep -q '^these keys are for the correction of a template, .* no effect: network.rank$' || bad "rank of a template: $(cat told)"
+echo 'shape: {name: ellipsoid}
+network: {kind: sdmnn, channels: 16, dropout: 0.1, depth: 3}
+train: {minutes: 1}' >other.yaml
+sdmgen config other.yaml network.kind=pod >out 2>err || bad "other.yaml: $(cat err)"
+grep -q '^sdmgen: the kind of network on the command line has no such keys, so these of other\.yaml have no effect: network\.channels, network\.dropout$' err || bad "dropped keys: $(cat err)"
+sdmgen config other.yaml 2>err || bad "other.yaml: $(cat err)"
+if grep -q 'no effect' err; then bad "keys of its own kind: $(cat err)"; fi
 expect 0 - sdmgen config --keys
 has 'network\.depth'
 expect 0 - sdmgen config --keys --markdown

@@ -169,7 +169,7 @@ sdmgen exact --mesh cube.off "${between[@]:0:4}" --origin "$(grep -oE 'origin -[
 if grep -q planes err; then bad "the origin proposed has faces on planes: $(cat err)"; fi
 
 # A grid beside the shape: a warning, which --quiet does not hide; probes and slices may lie there. A slice cuts every shape.
-expect 0 '^sdmgen: warning: no voxel of the grid is inside the surface' sdmgen exact --mesh cube.off --origin 900,0,0 --size 4,4,4 --spacing 0.5 --quiet -o x.npy
+expect 0 '^sdmgen: warning: no voxel of the grid is inside the surface: .* It reaches from \(-[0-9., -]+\) to \([0-9., ]+\) mm, the grid from \(900, 0, 0\) to \(901\.5, 1\.5, 1\.5\) mm$' sdmgen exact --mesh cube.off --origin 900,0,0 --size 4,4,4 --spacing 0.5 --quiet -o x.npy
 expect 0 - sdmgen exact --mesh cube.off --origin 900,0,0 --size 1,4,4 --spacing 0.5 --quiet -o x.npy
 expect 0 - sdmgen exact --mesh cube.off --origin -4,-4,0 --size 17,17,1 --spacing 0.5 --quiet -o x.npy
 expect 3 '`sdmgen mesh --mesh FILE --audit` checks it' sdmgen verify cube.off

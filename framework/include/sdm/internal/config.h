@@ -193,6 +193,9 @@ typedef struct sdm_config {
     } output;
     uint64_t seed; /* default 1 */
     int threads;   /* 0: all; default 0 */
+    /* keys of the file, "network.channels, network.dropout", that count as not given, because an
+     * override chose a kind of network without them; cut where they are too many */
+    char dropped[240];
 } sdm_config;
 
 /* Reads a configuration file (at most 1 MiB, one document, no anchors, aliases or tags, at most 32

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "files.h"
+#include "report/files.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/npy.h"

@@ -44,7 +44,7 @@ static void print_model(const char *path, const sdm_model *model)
         "accuracy     on %lld held-out shapes: MSE %.3g mm^2, RMSE %.5f mm, mean %.5f mm, largest "
         "%.5f mm\n",
         (long long)a->samples, a->mse_mm2, a->rmse_mm, a->mae_mm, a->max_abs_mm);
-    cli_print("             RMSE within %g mm of the surface %.5f mm\n", a->near_mm,
+    cli_print("             RMSE within two voxels (%g mm) of the surface %.5f mm\n", a->near_mm,
               a->rmse_near_mm);
     cli_print(
         "             RMSE of single maps: 50 %% below %.5f mm, 90 %% below %.5f mm, 99 %% below "

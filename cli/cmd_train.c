@@ -74,15 +74,18 @@ static void print_ranks(const cli_ranks_use *use)
            use->by, 1e-6 * (double)least, 1e-6 * (double)most, 1e-6 * (double)all);
 }
 
-/* Tells of the kind that network.kind: auto has trained and not kept, and what it was better at. */
+/* Tells of the kind that network.kind: auto has trained and not chosen, and what it was better at.
+ */
 static void print_other(const sdm_train_report *r)
 {
-    printf("  auto        trained %s, too: RMSE %.5f mm, within a voxel of the surface %.5f mm, "
-           "%.3g ms a map; not kept",
-           kind_name(r->other_kind), r->other.rmse_mm, r->other_voxel_mm, r->other_ms);
-    if (r->other_voxel_mm < r->verdict.rmse_voxel_mm)
-        printf(": better at the surface, but worse elsewhere (network.kind=%s keeps it)",
-               kind_name(r->other_kind));
+    printf(
+        "  auto        trained %s, too (%s): RMSE %.5f mm, within a voxel of the surface %.5f mm, "
+        "%.3g ms a map%s",
+        kind_name(r->other_kind), sdm_grade_name(r->other_grade), r->other.rmse_mm,
+        r->other_voxel_mm, r->other_ms,
+        r->other_voxel_mm < r->verdict.rmse_voxel_mm ? "; better at the surface, worse elsewhere"
+                                                     : "");
+    if (r->other_path[0]) printf("; its model is %s", r->other_path);
     printf("\n");
 }
 
@@ -119,6 +122,8 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
             sdm_json_real(&j, "rmse_near_mm", r->other.rmse_near_mm);
             sdm_json_real(&j, "rmse_voxel_mm", r->other_voxel_mm);
             sdm_json_real(&j, "ms_network", r->other_ms);
+            sdm_json_text(&j, "grade", sdm_grade_name(r->other_grade));
+            sdm_json_text(&j, "model", r->other_path);
             sdm_json_close(&j, '}');
         }
         if (isfinite(before)) sdm_json_real(&j, "before_rmse_mm", before);
@@ -140,21 +145,22 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
                r->seconds, r->compared ? ", with the training of the other kind" : "");
     if (r->verdict.saved_seconds > 0 && r->steps)
         printf("; train.patience saved %.0f s", r->verdict.saved_seconds);
-    printf("\n  held out    %lld shapes: MSE %.3g mm^2, RMSE %.5f mm, within %g mm of the surface "
-           "%.5f mm, largest %.5f mm\n",
-           (long long)a->samples, a->mse_mm2, a->rmse_mm, a->near_mm, a->rmse_near_mm,
-           a->max_abs_mm);
+    const sdm_verdict *v = &r->verdict;
+    printf(
+        "\n  held out    %lld shapes: RMSE %.5f mm (%.4f voxels), MSE %.3g mm^2; within a voxel of "
+        "the surface %.5f mm (%.4f voxels); Dice %.4f, smallest %.4f\n",
+        (long long)a->samples, a->rmse_mm, a->rmse_mm / v->voxel_mm, a->mse_mm2, v->rmse_voxel_mm,
+        v->rmse_voxel_mm / v->voxel_mm, v->dice, v->dice_min);
     cli_print_two("  time        ", times);
     if (use->n > 1) print_ranks(use);
     if (r->compared) print_other(r);
     cli_print_verdict(&r->verdict);
     if (isfinite(before)) cli_print_before(before, a->rmse_mm);
-    cli_print_far(args, r, minutes);
+    cli_print_pod(args, r, times, minutes);
     cli_print_next(args, r, r->chosen ? kind_name(r->kind) : NULL, times->ms_network);
     if (cli_warnings() > 0)
         printf("  warnings    %zu, at the beginning of the output%s\n", cli_warnings(),
-               r->verdict.cut > 0 || r->verdict.inside_out > 0 || r->verdict.triangles_by[0] ||
-                       sdm_verdict_lacks_part(&r->verdict)
+               v->cut > 0 || v->inside_out > 0 || v->triangles_by[0] || sdm_verdict_lacks_part(v)
                    ? ""
                    : ": the verdict does not know what they name, mend it first");
     return SDM_OK;

@@ -8,6 +8,9 @@
 #include "args/shell_word.h"
 #include "sdm/internal/text.h"
 
+/* A template saves little time if exact maps take less than this many times as long. */
+#define SLOW 3.0
+
 /* Appends an option and its value to a command. */
 static void add_option(sdm_text *command, const char *option, const char *value)
 {
@@ -89,34 +92,75 @@ static void add_error(sdm_text *text, double error, double own)
         sdm_text_add(text, ", the same");
 }
 
-void cli_print_far(const cli_args *args, const sdm_train_report *r, double minutes)
+/* Does the template err far from the surface alone, so that another kind is a choice? */
+static bool is_far(const sdm_verdict *v)
 {
-    // the verdict, with the changes of the other kind: none but the minutes
-    const sdm_verdict *v = &r->verdict, pod = {.minutes = minutes};
-    sdm_text command = {0}, price = {0};
-    if (!v->limited || v->limit != SDM_CAUSE_FAR || v->cut > 0 || v->inside_out > 0) return;
-    if (r->compared || r->tried) {
-        sdm_text_add(&price, "auto has %s it, too: within a voxel of the surface ",
+    return v->limited && v->limit == SDM_CAUSE_FAR && !(v->cut > 0) && !(v->inside_out > 0);
+}
+
+/* The line `far away`. Returns whether pod may help. */
+static bool print_far(const sdm_train_report *r)
+{
+    const sdm_verdict *v = &r->verdict;
+    sdm_text price = {0};
+    if (r->compared && !(r->other.rmse_mm < v->rmse_mm)) {
+        sdm_text_add(&price, "pod is no better there, as auto has trained it, too: everywhere ");
+        add_error(&price, r->other.rmse_mm, v->rmse_mm);
+    } else if (r->compared || r->tried) {
+        sdm_text_add(&price, "pod; auto has %s it, too: within a voxel of the surface ",
                      r->compared ? "trained" : "tried");
         add_error(&price, r->other_voxel_mm, v->rmse_voxel_mm);
-        if (r->compared && r->other_voxel_mm > SDM_GRADE_GOOD_VOXELS * v->voxel_mm)
-            sdm_text_add(&price, " (not good, over %g voxels; look at its derivatives, too)",
-                         SDM_GRADE_GOOD_VOXELS);
         sdm_text_add(&price, "; everywhere ");
         add_error(&price, r->other.rmse_mm, v->rmse_mm);
         if (!r->compared) sdm_text_add(&price, " (a trial, which training improves)");
     } else {
-        sdm_text_add(&price, "this run has not measured it: near the surface it may be worse");
+        sdm_text_add(&price, "pod; this run has not measured it: near the surface it may be worse");
+    }
+    if (!price.failed)
+        printf("  far away    where distances far from the surface matter: %s\n", price.data);
+    sdm_text_dispose(&price);
+    return !r->compared || r->other.rmse_mm < v->rmse_mm;
+}
+
+/* The line `slow`. Returns whether pod may help. */
+static bool print_slow(const sdm_train_report *r, const cli_timing *times)
+{
+    const bool known = r->compared || r->tried;
+    const double other = known ? r->other_ms : NAN;
+    // a little less time is worth no other errors
+    if (r->kind != SDM_NETWORK_TEMPLATE || !(times->ms_exact < SLOW * times->ms_network) ||
+        other > 0.5 * times->ms_network)
+        return false;
+    printf(
+        "  slow        exact maps take only %.2g times as long as this template: the network saves "
+        "little time; pod ",
+        times->ms_exact / times->ms_network);
+    if (!known)
+        printf("may take far less; this run has not measured it\n");
+    else
+        printf("takes about %.2g ms, with RMSE %.2g mm, within a voxel of the surface %.2g mm%s\n",
+               other, r->other.rmse_mm, r->other_voxel_mm,
+               r->compared ? "" : " (a trial, which training improves)");
+    return true;
+}
+
+void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_timing *times,
+                   double minutes)
+{
+    // the verdict, with the changes of the other kind: none but the minutes
+    const sdm_verdict pod = {.minutes = minutes};
+    const bool far = is_far(&r->verdict) && print_far(r), slow = print_slow(r, times);
+    sdm_text command = {0};
+    if (!far && !slow) return;
+    if (r->compared && r->other_path[0]) {
+        printf("              pod is %s (%s)\n", r->other_path, sdm_grade_name(r->other_grade));
+        return;
     }
     if (args->files.n) {
         add_changes(&command, args, &pod, "pod");
         add_options(&command, args, r);
+        if (!command.failed) printf("              sdmgen train%s\n", command.data);
     }
-    if (!price.failed && !command.failed) {
-        printf("  far away    where distances far from the surface matter: pod; %s\n", price.data);
-        if (command.data) printf("              sdmgen train%s\n", command.data);
-    }
-    sdm_text_dispose(&price);
     sdm_text_dispose(&command);
 }
 

@@ -3,6 +3,7 @@
 
 #include "args/options.h"
 #include "sdm/internal/train.h"
+#include "study/evaluate.h"
 
 /* Prints the line `next` (of a good model `better`), or nothing where the verdict advises nothing.
    kind: that of the model, if network.kind was auto; the command states it, so that it trains the
@@ -10,7 +11,9 @@
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
                     double ms_map);
 
-/* Prints the line `far away` where the template errs far from the surface alone: the command that
-   trains `pod` with so many minutes (0: the configuration gives another budget), and what `auto`
-   has measured of it. */
-void cli_print_far(const cli_args *args, const sdm_train_report *r, double minutes);
+/* Prints the line `far away` where the template errs far from the surface alone, and `slow` where
+   it takes over a third of the time of an exact map: what `auto` has measured of `pod`, and where
+   its model is, or the command that trains it with so many minutes (0: the configuration gives
+   another budget). */
+void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_timing *times,
+                   double minutes);

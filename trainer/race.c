@@ -112,13 +112,13 @@ static void trial_report(void *user, size_t done, size_t all)
                     t->config->train.minutes, d->n_holdout + random, seconds);
 }
 
-/* *out = the errors of a trial. */
+/* *out = the errors of a trial, and the time of a map. */
 static sdm_status measure(const trainer *r, turn_figures *out, sdm_error *err)
 {
     sdm_accuracy accuracy = {0};
-    double rmse_voxel_mm = 0;
-    const sdm_status s = trainer_export_measure(r, &accuracy, &rmse_voxel_mm, err);
-    *out = (turn_figures){r->config->network.kind, accuracy.rmse_mm, rmse_voxel_mm};
+    double rmse_voxel_mm = 0, map_ms = NAN;
+    const sdm_status s = trainer_export_measure(r, &accuracy, &rmse_voxel_mm, &map_ms, err);
+    *out = (turn_figures){r->config->network.kind, accuracy.rmse_mm, rmse_voxel_mm, map_ms};
     return s;
 }
 

@@ -1,5 +1,6 @@
 /* A run: the choice of the kinds of network, one training or two, the better model. */
 #include <math.h>
+#include <string.h>
 
 #include "race.h"
 #include "sdm/internal/checksum.h"
@@ -127,6 +128,8 @@ static sdm_status keep_better(run *r, trainer *t, sdm_train_report *report, sdm_
     report->other = both[!best].accuracy;
     report->other_voxel_mm = both[!best].verdict.rmse_voxel_mm;
     report->other_ms = both[!best].map_ms;
+    report->other_grade = both[!best].verdict.grade;
+    memcpy(report->other_path, both[1].other_path, sizeof report->other_path);
     report->other_kind = r->turns.kind[!best];
     const sdm_status s =
         trainer_turns_record(&r->metrics, r->turns.kind[best], NULL, NULL, figures, 2, err);
@@ -168,6 +171,7 @@ static sdm_status train_all(run *r, trainer *t, sdm_train_report *report, sdm_er
             report->tried = true;
             report->other = (sdm_accuracy){.rmse_mm = r->turns.other.rmse_mm};
             report->other_voxel_mm = r->turns.other.rmse_voxel_mm;
+            report->other_ms = r->turns.other.map_ms;
             report->other_kind = r->turns.other.kind;
         }
         if (s || r->turns.n == 1) return s;

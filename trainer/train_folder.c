@@ -43,8 +43,9 @@ sdm_status sdm_train_check_folder(const char *folder, bool resume, bool force, s
 }
 
 /* The files of a run, which alone writes them. */
-static const char *const run_files[] = {"model.sdm",   "checkpoint.sdmc", "metrics.jsonl",
-                                        "config.yaml", "loss.png",        "slices.png"};
+static const char *const run_files[] = {"model.sdm",       "model-pod.sdm", "model-template.sdm",
+                                        "checkpoint.sdmc", "metrics.jsonl", "config.yaml",
+                                        "loss.png",        "slices.png"};
 
 static void path_in(const char *folder, const char *name, char path[SDM_PATH_TEXT_MAX + 300])
 {

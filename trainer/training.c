@@ -7,6 +7,7 @@
 
 #include "data/dataset_fill.h"
 #include "fine/fine_fit.h"
+#include "other_model.h"
 #include "sdm/internal/file.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
@@ -228,8 +229,9 @@ static sdm_status train_finish(trainer *t, sdm_outfile **config, sdm_train_repor
     t->phase = SDM_PHASE_EVALUATE;
     trainer_report(t, 1, true);
     sdm_status s = trainer_export_judge(t, report, err);
-    if (!s && trainer_writes(t) && (!is_second(t) || trainer_second_wins(t->turns, report)))
-        s = write_model(t, config, err);
+    const bool wins = !s && (!is_second(t) || trainer_second_wins(t->turns, report));
+    if (!s && trainer_writes(t) && is_second(t)) trainer_other_model_keep(t, wins, report);
+    if (wins && trainer_writes(t)) s = write_model(t, config, err);
     report->seconds = trainer_shared_seconds(t);
     s = sdm_comm_agree(t->hooks.comm, s, err);
     if (!s) {

@@ -75,7 +75,8 @@ void cli_print_quality(const sdm_model_info *m)
         cli_print("             derivatives of maps near the surface are off by %.3g %% for the "
                   "worst parameter\n",
                   100 * q->derivative_error);
-    if (!isnan(q->volume_derivative_error))
+    // the lines `not for` tell larger errors, of each parameter
+    if (!isnan(q->volume_derivative_error) && !strstr(q->unfit, "derivatives of the volume by"))
         cli_print(
             "             derivatives of volumes are off by %.3g %% for the worst parameter\n",
             100 * q->volume_derivative_error);

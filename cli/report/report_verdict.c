@@ -31,7 +31,8 @@ static void print_parts(const sdm_verdict *v)
 /* The error by the distance from the surface. */
 static void print_far(const sdm_verdict *v)
 {
-    printf("  by distance within %g mm of the surface %.5f mm", v->near_mm, v->rmse_near_mm);
+    printf("  by distance within two voxels (%g mm) of the surface %.5f mm", v->near_mm,
+           v->rmse_near_mm);
     if (isfinite(v->rmse_inside_mm)) printf(", farther inside %.5f", v->rmse_inside_mm);
     if (isfinite(v->rmse_outside_mm)) printf(", farther outside %.5f", v->rmse_outside_mm);
     printf("; the largest error, %.3g mm, lies %.3g mm %s\n", v->largest_mm, fabs(v->largest_at_mm),
@@ -68,22 +69,18 @@ static void print_derivatives(const sdm_verdict *v)
         "  derivatives by the parameters, of %d shapes: of maps near the surface off by %s %% (by "
         "%s, the worst one)",
         (int)v->derivative_shapes, percent(v->derivative_error, text), v->derivative_by);
-    if (isfinite(v->volume_derivative_error))
-        printf(", of volumes by %s %% (by %s%s)", percent(v->volume_derivative_error, text),
-               v->volume_derivative_by,
-               v->volume_derivatives_small[0]
-                   ? "; a parameter that changes the volume by less than 5 % counts as if by 5 %"
-                   : "");
+    if (v->volume_derivatives_bad[0] || v->volume_derivatives_small[0])
+        printf(", of volumes as `not for` says");
+    else if (isfinite(v->volume_derivative_error))
+        printf(", of volumes by %s %% (by %s)", percent(v->volume_derivative_error, text),
+               v->volume_derivative_by);
     printf("\n");
 }
 
 void cli_print_verdict(const sdm_verdict *v)
 {
-    const double voxel = v->voxel_mm;
     char text[SDM_GRADE_TEXT], few[SDM_GRADE_FEW], grade[48], unfit[SDM_MODEL_UNFIT];
     snprintf(grade, sizeof grade, "%s%s", sdm_grade_name(v->grade), sdm_grade_few(v->heldout, few));
-    printf("  in voxels   all %.4f, within a voxel of the surface %.4f; Dice %.4f, smallest %.4f\n",
-           v->rmse_mm / voxel, v->rmse_voxel_mm / voxel, v->dice, v->dice_min);
     printf("  %-11s %s\n", grade, sdm_grade_text(v, text));
     sdm_verdict_unfit(v, unfit);
     cli_print_unfit(unfit, "  not for", 13);
@@ -101,7 +98,7 @@ void cli_print_verdict(const sdm_verdict *v)
         const double grid = sqrt(v->part_mm2[SDM_CAUSE_GRID]);
         printf(
             "  grid        between its voxels exact maps miss the surface by %.5f mm (%.3f voxels)",
-            grid, grid / voxel);
+            grid, grid / v->voxel_mm);
         if (v->thin >= 0.005)
             printf("; %.0f %% of the surface is thinner than two voxels or has an edge",
                    100 * v->thin);

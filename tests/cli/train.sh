@@ -137,14 +137,29 @@ expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 --out 
 has "${pod}this run has not measured it: near the surface it may be worse\$"
 has '^              sdmgen train far\.yaml train\.minutes=0\.02 network\.kind=pod --out named-2$'
 
+# A template that saves little time against exact maps: the line names pod, and what is known of it.
+expect 0 - sdmgen train far.yaml network.kind=template shape.options.edge=2 shape.options.links=1 grid.spacing=0.05 data.holdout=2 --out large --quiet
+if grep -oE '[0-9.]+ times as long' out | head -1 | awk '{ exit !($1 < 2.99) }'; then
+    has '^  slow        exact maps take only [0-9.]+ times as long as this template: the network saves little time; pod may take far less; this run has not measured it$'
+    [ "$(grep -c 'network.kind=pod --out large-2' out)" -eq 1 ] || bad "the command for pod: $(cat out)"
+fi
+
 # auto: the command names the kind that was kept and the cost of its maps; that of the other kind is in its line and in the JSON.
 expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 data.holdout=12 --out both --quiet
-has '^  auto        trained (pod|template), too: RMSE .*, [0-9.e-]+ ms a map; not kept'
+has '^  auto        trained (pod|template), too \((good|usable|poor)\): RMSE .*, [0-9.e-]+ ms a map.*; its model is both/model-(pod|template)\.sdm$'
+other=$(sed -n 's/.*; its model is //p' out)
+present "$other"
+expect 0 - sdmgen info "$other" --quiet
+# each figure of the end stands there once
+sdmgen train link.yaml data.start=300 data.memory_gb=6 data.holdout=12 --out both --force --quiet >out 2>err || bad "both: $(cat err)"
+has '^  held out    12 shapes: RMSE [0-9.]+ mm \([0-9.]+ voxels\), MSE [0-9.e-]+ mm\^2; within a voxel of the surface [0-9.]+ mm \([0-9.]+ voxels\); Dice [0-9.]+, smallest [0-9.]+$'
+has '^  by distance within two voxels \(0\.68 mm\) of the surface [0-9.]+ mm, '
+has '^  derivatives by the parameters, of [0-9]+ shapes: .*, of volumes as `not for` says$'
 has '^  (next|better) +sdmgen train link.yaml .*network.kind=(pod|template) --out both-2$'
 has '^              \((pod|template) again, [0-9.e-]+ ms a map on this grid; network.kind=auto would choose anew\)$'
 rm -r both
 expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 --out both --quiet --json
-has '"other": \{"kind": "(pod|template)", .*"ms_network": [0-9]'
+has '"other": \{"kind": "(pod|template)", .*"ms_network": [0-9.e-]+, "grade": "[a-z]+", "model": "both/model-(pod|template)\.sdm"\}'
 sdmgen train link.yaml data.start=300 data.memory_gb=6 train.steps=0 train.minutes=0.0001 --out both --force >out 2>err || bad "hurried: $(cat err)"
 grep -Eq '^sdmgen: the run will take longer than train.minutes \(0.0001\): a trial of network.kind: auto makes at least [0-9]+ maps, which takes about ' err ||
     bad "no word about the trials ahead: $(cat err)"

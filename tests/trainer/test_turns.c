@@ -1,6 +1,6 @@
 /* network.kind: auto trains one kind or two: the better model is kept, with the same bits for any
  * number of threads and after a resume.
- * Tests: race.c train.c training.c turns.c trilinear.c */
+ * Tests: race.c train.c training.c turns.c trilinear.c other_model.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -92,6 +92,21 @@ static void assert_kind(const char *kind)
     assert_int_equal(c.network.kind, strcmp(kind, "pod") ? SDM_NETWORK_TEMPLATE : SDM_NETWORK_POD);
 }
 
+/* The model of the other kind is a file beside the one that is kept, with its error. */
+static void assert_other(const sdm_train_report *r)
+{
+    const bool pod = r->other_kind == SDM_NETWORK_POD;
+    sdm_model *m;
+    assert_string_equal(r->other_path, in_folder(pod ? "model-pod.sdm" : "model-template.sdm"));
+    assert_int_equal(sdm_model_open(r->other_path, &m, NULL), SDM_OK);
+    const sdm_model_info *info = sdm_model_get_info(m);
+    assert_string_equal(info->kind, pod ? "pod" : "template");
+    assert_true(info->accuracy.rmse_mm == r->other.rmse_mm);
+    assert_string_equal(info->quality.grade, sdm_grade_name(r->other_grade));
+    sdm_model_free(m);
+    assert_false(exists(pod ? "model-template.sdm" : "model-pod.sdm"));
+}
+
 // The model that is kept has the bits of a training of its kind alone: a template without a
 // correction leaves all steps to pod. The other kind has the larger error.
 static void better_is_kept(void **state)
@@ -119,6 +134,7 @@ static void better_is_kept(void **state)
             assert_true(r.compared && hypot(r.other_voxel_mm, 0.1 * r.other.rmse_mm) >
                                           hypot(r.verdict.rmse_voxel_mm, 0.1 * r.accuracy.rmse_mm));
             assert_int_equal(r.other_kind, which ? SDM_NETWORK_POD : SDM_NETWORK_TEMPLATE);
+            assert_other(&r);
             assert_true(r.accuracy.mse_mm2 == single.accuracy.mse_mm2);
             assert_int_equal(r.steps, single.steps);
             assert_string_equal(r.verdict.key, single.verdict.key);
@@ -188,9 +204,11 @@ static void resume_is_bit_exact(void **state)
             if (p.model) assert_kind("template");
             if (p.model && !p.checkpoint) assert_non_null(strstr(e.text, "model of kind template"));
             if (!p.checkpoint) continue;
-            if (sdm_train(&c, shape, folder, true, NULL, NULL, &e)) fail_msg("%s", e.text);
+            sdm_train_report r;
+            if (sdm_train(&c, shape, folder, true, NULL, &r, &e)) fail_msg("%s", e.text);
             assert_true(hash_of("model.sdm") == model && hash_of("metrics.jsonl") == metrics &&
                         hash_of("config.yaml") == config);
+            assert_other(&r);
         }
         sdm_instance_free(shape);
     }
@@ -285,6 +303,7 @@ static void template_remains(void **state)
     assert_non_null(strstr(said, "hardly any of the budget is left for pod"));
     assert_kind("template");
     assert_false(r.compared);
+    assert_true(!r.other_path[0] && !exists("model-pod.sdm") && !exists("model-template.sdm"));
 }
 
 // Thick parts that overlap: the verdict tells the error far inside from that near the surface, and

@@ -55,8 +55,9 @@ static inline sdm_config parse_config(const char *text, const char *const *overr
 /* Removes all files that a run writes. */
 static inline void run_files_remove(void)
 {
-    static const char *const names[] = {"model.sdm", "checkpoint.sdmc", "metrics.jsonl",
-                                        "config.yaml", "loss.png"};
+    static const char *const names[] = {"model.sdm",       "model-pod.sdm", "model-template.sdm",
+                                        "checkpoint.sdmc", "metrics.jsonl", "config.yaml",
+                                        "loss.png"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) remove(in_folder(names[i]));
 }
 

@@ -50,8 +50,11 @@ sdm_status trainer_checkpoint_remove(const trainer *t, sdm_error *err)
 
 sdm_status trainer_checkpoint_clear_folder(const trainer *t, sdm_error *err)
 {
-    const sdm_status s = trainer_checkpoint_remove(t, err);
-    return s ? s : remove_file(t, "model.sdm", err);
+    sdm_status s = trainer_checkpoint_remove(t, err);
+    if (!s) s = remove_file(t, "model.sdm", err);
+    if (!s) s = remove_file(t, trainer_turn_file(SDM_NETWORK_POD), err);
+    if (!s) s = remove_file(t, trainer_turn_file(SDM_NETWORK_TEMPLATE), err);
+    return s;
 }
 
 /* Writes the file; t has all weights. */
@@ -328,10 +331,12 @@ static bool report_is_sound(const sdm_train_report *r)
 {
     const sdm_verdict *v = &r->verdict;
     return r->steps >= 0 && r->seconds >= 0 && ends(r->model_path, sizeof r->model_path) &&
-           is_bool(&r->compared) && is_bool(&r->tried) && is_bool(&r->chosen) &&
-           is_bool(&v->limited) && (unsigned)v->grade <= SDM_GRADE_POOR &&
-           (unsigned)v->limit < SDM_CAUSES && ends(v->key, sizeof v->key) &&
-           ends(v->triangles_by, sizeof v->triangles_by) && ends(v->sentence, sizeof v->sentence);
+           ends(r->other_path, sizeof r->other_path) &&
+           (unsigned)r->other_grade <= SDM_GRADE_POOR && is_bool(&r->compared) &&
+           is_bool(&r->tried) && is_bool(&r->chosen) && is_bool(&v->limited) &&
+           (unsigned)v->grade <= SDM_GRADE_POOR && (unsigned)v->limit < SDM_CAUSES &&
+           ends(v->key, sizeof v->key) && ends(v->triangles_by, sizeof v->triangles_by) &&
+           ends(v->sentence, sizeof v->sentence);
 }
 
 /* Reads the turns of a run with two kinds. */

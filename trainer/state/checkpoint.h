@@ -3,7 +3,7 @@
 
 #include "trainer.h"
 
-/* Removes checkpoint and model of an older run from the folder. */
+/* Removes checkpoint and models of an older run from the folder. */
 sdm_status trainer_checkpoint_clear_folder(const trainer *t, sdm_error *err);
 
 /* Removes the checkpoint of a finished run. */

@@ -295,7 +295,7 @@ static sdm_status model_open(const trainer *t, const char *path, const descripti
 }
 
 sdm_status trainer_export_measure(const trainer *t, sdm_accuracy *out, double *rmse_voxel_mm,
-                                  sdm_error *err)
+                                  double *map_ms, sdm_error *err)
 {
     model_errors more = {0};
     description *d = NULL;
@@ -303,6 +303,7 @@ sdm_status trainer_export_measure(const trainer *t, sdm_accuracy *out, double *r
     sdm_status s = description_create(t, &d, err);
     if (!s) s = model_open(t, "model", d, &model, err);
     if (!s) s = measure_model(t, model, t->data.n_holdout, out, &more, err);
+    if (!s) s = trainer_map_time(&t->data, model, map_ms, err);
     *rmse_voxel_mm = more.rmse_voxel_mm;
     sdm_model_free(model);
     description_free(d);
@@ -329,7 +330,7 @@ sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err)
 
 void trainer_export_path(const trainer *t, char path[SDM_PATH_TEXT_MAX])
 {
-    snprintf(path, SDM_PATH_TEXT_MAX, "%.*s/model.sdm", SDM_PATH_TEXT_MAX - 16, t->folder);
+    snprintf(path, SDM_PATH_TEXT_MAX, "%.*s/model.sdm", SDM_PATH_TEXT_MAX - 24, t->folder);
 }
 
 /* What the model file keeps of the verdict. */
@@ -415,13 +416,11 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
     return s;
 }
 
-sdm_status trainer_export_model(const trainer *t, sdm_error *err)
+sdm_status trainer_export_to(const trainer *t, const char *path, sdm_error *err)
 {
     description *d = NULL;
     uint8_t *bytes = NULL;
     size_t size = 0;
-    char path[SDM_PATH_TEXT_MAX];
-    trainer_export_path(t, path);
     sdm_status s = description_create(t, &d, err);
     if (!s) {
         d->info.accuracy = t->accuracy;
@@ -430,10 +429,18 @@ sdm_status trainer_export_model(const trainer *t, sdm_error *err)
     }
     if (!s) s = sdm_container_write(path, bytes, size, err);
     sdm_free(bytes);
+    description_free(d);
+    return s;
+}
+
+sdm_status trainer_export_model(const trainer *t, sdm_error *err)
+{
+    char path[SDM_PATH_TEXT_MAX];
     sdm_error picture = {0};
+    trainer_export_path(t, path);
+    const sdm_status s = trainer_export_to(t, path, err);
     if (!s && curve_write(t, &picture))
         // a failed picture is no reason to lose the network: a notice only
         trainer_message(t, "%s", picture.text);
-    description_free(d);
     return s;
 }

@@ -27,11 +27,14 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
 /* Writes model.sdm, with the accuracy that trainer_export_judge() has measured, and loss.png. */
 sdm_status trainer_export_model(const trainer *t, sdm_error *err);
 
+/* Writes the model alone, under another name. */
+sdm_status trainer_export_to(const trainer *t, const char *path, sdm_error *err);
+
 /* *out = errors of the model with the present averaged weights on all held-out shapes;
-   *rmse_voxel_mm = root mean square error of the voxels within a voxel of the surface. Writes
-   nothing. */
+   *rmse_voxel_mm = root mean square error of the voxels within a voxel of the surface; *map_ms =
+   processor time of a map. Writes nothing. */
 sdm_status trainer_export_measure(const trainer *t, sdm_accuracy *out, double *rmse_voxel_mm,
-                                  sdm_error *err);
+                                  double *map_ms, sdm_error *err);
 
 /* *seconds = expected duration of the measurement in trainer_export_model(), from one map. */
 sdm_status trainer_export_time(trainer *t, double *seconds, sdm_error *err);

@@ -50,9 +50,14 @@ const char *trainer_turn_name(sdm_network_kind kind)
     return kind == SDM_NETWORK_POD ? "pod" : "template";
 }
 
+const char *trainer_turn_file(sdm_network_kind kind)
+{
+    return kind == SDM_NETWORK_POD ? "model-pod.sdm" : "model-template.sdm";
+}
+
 turn_figures trainer_turn_figures(sdm_network_kind kind, const sdm_train_report *r)
 {
-    return (turn_figures){kind, r->accuracy.rmse_mm, r->verdict.rmse_voxel_mm};
+    return (turn_figures){kind, r->accuracy.rmse_mm, r->verdict.rmse_voxel_mm, r->map_ms};
 }
 
 double trainer_score(const turn_figures *f) { return hypot(f->rmse_voxel_mm, 0.1 * f->rmse_mm); }

@@ -8,6 +8,7 @@
 typedef struct turn_figures {
     sdm_network_kind kind;
     double rmse_mm, rmse_voxel_mm; /* of all voxels; of those within a voxel of the surface */
+    double map_ms;                 /* processor time of a map; decides nothing */
 } turn_figures;
 
 typedef struct training_turns {
@@ -36,6 +37,9 @@ double trainer_turns_left(const training_turns *r, const sdm_config *asked);
 
 /* "pod" or "template". */
 const char *trainer_turn_name(sdm_network_kind kind);
+
+/* The file that keeps the model of this kind in the folder of a run that chose the other one. */
+const char *trainer_turn_file(sdm_network_kind kind);
 
 turn_figures trainer_turn_figures(sdm_network_kind kind, const sdm_train_report *r);
 

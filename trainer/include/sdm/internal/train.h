@@ -77,20 +77,24 @@ typedef struct sdm_train_report {
     bool chosen;           /* by network.kind: auto */
     double map_ms; /* processor time of one map; NaN: not measured, as only one kind was trained */
     /* network.kind: auto has trained another kind, too, which was worse; its accuracy, its root
-       mean square error of the voxels within a voxel of the surface, and its map_ms. */
+       mean square error of the voxels within a voxel of the surface, its map_ms, its grade and its
+       model file, model-KIND.sdm beside model_path; "": it could not be written. */
     bool compared;
     sdm_network_kind other_kind;
     sdm_accuracy other;
     double other_voxel_mm, other_ms;
-    /* It has only tried another kind, in a short trial: other_kind, other.rmse_mm and
-       other_voxel_mm are of this. */
+    sdm_grade other_grade;
+    char other_path[SDM_PATH_TEXT_MAX];
+    /* It has only tried another kind, in a short trial: other_kind, other.rmse_mm, other_voxel_mm
+       and other_ms are of this. */
     bool tried;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled
    in), metrics.jsonl, checkpoint.sdmc (removed at the end of the run), model.sdm, loss.png.
    network.kind: auto may train two kinds, one after the other: model.sdm is first that of the
-   first, at the end that of the better one, and so are config.yaml and loss.png. resume: continues
+   first, at the end that of the better one, and so are config.yaml and loss.png; model-pod.sdm or
+   model-template.sdm is the other one. resume: continues
    from the checkpoint in `folder`; SDM_E_CONFIG if the checkpoint's configuration differs in more
    than budget and output. hooks and report may be NULL. SDM_E_UNSUPPORTED: the ranks
    differ in program, configuration or processor. */

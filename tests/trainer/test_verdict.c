@@ -164,9 +164,11 @@ static void patience_left_time(void **state)
         trainer_verdict_decide(&in, &v);
         assert_true(!strcmp(v.key, "train.minutes") && v.to == 4);
         assert_int_equal(!strstr(v.sentence, "which the time for them limits"), early);
-        assert_int_equal(strstr(v.sentence, "half of the budget is for them, and was too short for "
-                                            "data.start, though train.patience ended the steps "
-                                            "early (100 % of") != NULL,
+        assert_int_equal(strstr(v.sentence,
+                                "Half of the budget, which is for the maps, was too "
+                                "short for data.start, though train.patience ended "
+                                "the steps early; the number of maps limits it (100 % "
+                                "of the mean square error): raise train.minutes") != NULL,
                          early);
         // few steps, but patience ended them
         v = figures();

@@ -117,8 +117,8 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
     if (in->cut) {
         advise_budget(in, v);
         return in->ended_early
-                   ? "The number of maps limits it: half of the budget is for them, and was too "
-                     "short for data.start, though train.patience ended the steps early"
+                   ? "Half of the budget, which is for the maps, was too short for data.start, "
+                     "though train.patience ended the steps early; the number of maps limits it"
                    : "The number of maps limits it, which the time for them limits";
     }
     if (in->full) {

@@ -46,9 +46,8 @@ static void print_table(const char *file, const sdm_model_info *info, const cli_
             e->n, (unsigned long long)of->seed);
     printf("  %-22s %10.3g mm^2\n", "MSE", e->mse_mm2);
     printf("  %-22s %10.5f mm\n", "RMSE", e->rmse_mm);
-    char near[48];
-    snprintf(near, sizeof near, "RMSE within %.3g mm", sdm_grid_near(&info->grid));
-    printf("  %-22s %10.5f mm\n", near, e->rmse_near_mm);
+    printf("  %-22s %10.5f mm (%.3g mm of the surface)\n", "RMSE within 2 voxels", e->rmse_near_mm,
+           sdm_grid_near(&info->grid));
     printf("  %-22s %10.5f mm\n", "mean absolute error", e->mae_mm);
     printf("  %-22s %10.5f mm\n", "largest error", e->max_abs_mm);
     printf("  %-22s %10.5f (smallest %.5f)\n", "Dice", e->dice, e->dice_min);

@@ -111,6 +111,7 @@ present pictures/worst.png pictures/median.png
 expect 0 - sdmgen eval $model --samples 3 --naive 0 --json --quiet --threads 1
 [ "$mse" = "$(json mse_mm2)" ] || bad 'eval depends on the number of threads'
 expect 0 - sdmgen eval $model --samples 2 --naive 0 --quiet
+has '^  RMSE within 2 voxels +[0-9.]+ mm \(1\.8 mm of the surface\)$'
 has '^  RMSE +[0-9.]+ mm$'
 # one shape: the figures of its map against the exact one, computed from files
 expect 0 - sdmgen generate $model -p a=4.2 -o n.npy --quiet

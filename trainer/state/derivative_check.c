@@ -59,9 +59,9 @@ typedef struct shape_beside {
 
 /* Sums over the shapes, for one parameter. */
 typedef struct slope_sums {
-    double error, size;               // squares: of maps
-    double volume_error, volume_size; // of volumes
-    double volume_own, volume_scale;  // exact derivatives; volumes over the range
+    double error, size;              // squares: of maps
+    double volume_error;             // of volumes
+    double volume_own, volume_scale; // exact derivatives; volumes over the range
 } slope_sums;
 
 /* Memory of one check. */
@@ -188,9 +188,8 @@ static void add_slopes(const trainer *t, const check_memory *c, size_t k, double
         sums->size += exact * exact;
     }
     const double exact = (high->volume - low->volume) / over,
-                 scale = 0.5 * (high->volume + low->volume) / range, least = VOLUME_CHANGE * scale;
+                 scale = 0.5 * (high->volume + low->volume) / range;
     sums->volume_error += (volume - exact) * (volume - exact);
-    sums->volume_size += fmax(exact * exact, least * least);
     sums->volume_own += exact * exact;
     sums->volume_scale += scale * scale;
 }
@@ -222,10 +221,12 @@ static sdm_status check_slopes(const trainer *t, const sdm_model *m, const doubl
 static void take_largest(const slope_sums *sums, size_t n, derivative_check *out)
 {
     for (size_t k = 0; k < n; k++) {
+        // of a parameter that changes the volume enough this is the figure of the list, too
         const double slope = sqrt(sums[k].error / sums[k].size),
-                     volume = sqrt(sums[k].volume_error / sums[k].volume_size);
+                     least = VOLUME_CHANGE * VOLUME_CHANGE * sums[k].volume_scale,
+                     volume = sqrt(sums[k].volume_error / fmax(sums[k].volume_own, least)),
+                     change = sqrt(sums[k].volume_own / sums[k].volume_scale);
         out->slopes[k] = slope, out->volume_slopes[k] = volume;
-        const double change = sqrt(sums[k].volume_own / sums[k].volume_scale);
         // of a parameter that changes nothing any error is infinitely large
         const double none = volume > SDM_DERIVATIVE_BAD ? INFINITY : NAN;
         out->volume_own[k] =

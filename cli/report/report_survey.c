@@ -450,8 +450,10 @@ static void tell_thin(teller *t)
     sdm_text text = {0};
     sdm_mesh mesh = {0};
     sdm_part_audit audit = {0};
-    // tell_unit() explains shapes in another unit
-    if (!c->shapes || t->s->found.scale.odd_size || t->s->found.scale.odd_speed) return;
+    // tell_tiny() and tell_unit() explain parts and shapes in another unit
+    if (!c->shapes || t->s->found.tiny.shapes >= c->shapes || t->s->found.scale.odd_size ||
+        t->s->found.scale.odd_speed)
+        return;
     if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
         cli_describe_thin(&audit, sdm_part_audit_thinnest(&audit), sdm_grid_coarsest(t->s->grid),
                           &text);
@@ -469,6 +471,31 @@ static void tell_thin(teller *t)
     sdm_mesh_dispose(&mesh);
 }
 
+/* One line about parts a thousand times shorter than others. */
+static void tell_tiny(teller *t)
+{
+    const sdm_survey_count *c = &t->s->found.tiny;
+    sdm_text text = {0};
+    sdm_part_audit audit;
+    size_t part[2] = {0};
+    if (!c->shapes) return;
+    if (audit_worst(t, c, &audit) && sdm_survey_part_lengths(&audit, &part[0], &part[1]) > 0) {
+        cli_name_part(&audit, part[0], &text);
+        sdm_text_add(&text, "is %.0f times smaller than ", c->amount);
+        cli_name_part(&audit, part[1], &text);
+        sdm_text_add(&text, "at ");
+        add_params(t->s, c->worst, SIZE_MAX, &text);
+        sdm_text_add(&text, " (");
+        add_share(t->s, c, &text);
+        sdm_text_add(
+            &text,
+            "): are the vertices of one of them in another unit than mm? Multiply "
+            "those in m by 1000, those in um by 0.001; if it is a leftover speck, remove it");
+        tell(t, SDM_E_QUALITY, &text);
+    }
+    sdm_part_audit_dispose(&audit);
+}
+
 /* One line about parts without thickness. */
 static void tell_flat(teller *t)
 {
@@ -477,8 +504,10 @@ static void tell_flat(teller *t)
     sdm_mesh mesh = {0};
     sdm_part_audit audit = {0};
     size_t i = 0;
-    // tell_unit() and tell_params() explain lengths in m
-    if (!c->shapes || t->s->found.narrow || t->s->found.scale.odd_size) return;
+    // tell_tiny(), tell_unit() and tell_params() explain lengths in m
+    if (!c->shapes || t->s->found.tiny.shapes >= c->shapes || t->s->found.narrow ||
+        t->s->found.scale.odd_size)
+        return;
     if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
         while (i + 1 < audit.n && !sdm_survey_part_is_flat(&audit, i)) i++;
         if (audit.part[i].state == SDM_PART_FLAT)
@@ -504,7 +533,8 @@ static void tell_unit(teller *t)
 {
     const sdm_survey_scale *c = &t->s->found.scale;
     sdm_text text = {0};
-    if (!c->odd_size && !c->odd_speed) return;
+    // the size and the speed are those of a part in another unit: tell_tiny() has told it
+    if ((!c->odd_size && !c->odd_speed) || t->s->found.tiny.shapes) return;
     if (c->odd_size) sdm_text_add(&text, "the shape is %.3g mm in size", c->size);
     if (c->odd_speed)
         sdm_text_add(&text, "%s1 mm of the parameter '%s' moves its vertices by %.2g mm",
@@ -738,6 +768,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_turned(&t);
     tell_wound(&t);
     tell_folded(&t);
+    tell_tiny(&t);
     tell_flat(&t);
     tell_sizes(&t);
     tell_jumps(&t);

@@ -175,12 +175,22 @@ static sdm_status print_json(const check *c, sdm_error *err)
     const struct {
         const char *key;
         const sdm_survey_count *count;
-    } counts[] = {
-        {"failed", &f->failed},       {"open", &f->open},         {"inside_out", &f->inside_out},
-        {"turned", &f->turned},       {"folded", &f->folded},     {"resized", &f->resized},
-        {"rewired", &f->rewired},     {"overlaps", &f->overlaps}, {"degenerate", &f->degenerate},
-        {"duplicate", &f->duplicate}, {"cut", &f->cut},           {"thin", &f->thin},
-        {"apart", &f->apart},         {"flat", &f->flat},         {"wound", &f->wound}};
+    } counts[] = {{"failed", &f->failed},
+                  {"open", &f->open},
+                  {"inside_out", &f->inside_out},
+                  {"turned", &f->turned},
+                  {"folded", &f->folded},
+                  {"resized", &f->resized},
+                  {"rewired", &f->rewired},
+                  {"overlaps", &f->overlaps},
+                  {"degenerate", &f->degenerate},
+                  {"duplicate", &f->duplicate},
+                  {"cut", &f->cut},
+                  {"thin", &f->thin},
+                  {"apart", &f->apart},
+                  {"flat", &f->flat},
+                  {"wound", &f->wound},
+                  {"tiny", &f->tiny}};
     sdm_json j = {0};
     sdm_json_open(&j, NULL, '{');
     sdm_json_text(&j, "shape", sdm_instance_shape(c->survey.shape)->name);

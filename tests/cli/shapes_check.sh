@@ -63,6 +63,12 @@ faulty behind 4 "^warning +mesh\(\) reads p\[3\], but the last parameter is p\[1
 
 faulty open 3 '^broken +open or badly oriented edges in all 21 shapes, up to 3 at .*: part 2 of 2 \(11 triangles, vertices 8 \.\. 15, .* has 3 edges .*, the first at [0-9.]+ -?[0-9.]+ -?[0-9.]+ mm: add the triangles'
 faulty metres 4 '^warning +the shape is 0\.008 mm in size, 1 mm of the parameter .size. moves its vertices by 0\.0017 mm; the unit of sdmgen is mm: if the vertices are in m, multiply them by 1000$'
+# A part in metres beside one in millimetres: named with its size, and no other line explains it.
+faulty crumb 4 '^warning +part 3 of 3 \(12 triangles, vertices 16 \.\. 23, box 0\.01 0\.01 0\.01 \.\. 0\.015 0\.015 0\.015 mm\) is 1200 times smaller than part 1 of 3 \(.*\) at size=3 reach=[0-9.]+ \(in all 21 shapes\): are the vertices of one of them in another unit than mm\? Multiply those in m by 1000, those in um by 0\.001; if it is a leftover speck, remove it$'
+expect 4 mend sdmgen shapes check faulty -O fault=crumb --plugin "$plugin" --samples 4 --json
+has '"tiny": \{"shapes": 9, "most": 12[0-9.]+, "at": '
+faulty small 4 '^warning +part 2 of 2 \(.*\) is [0-9]+ times smaller than part 1 of 2 \('
+if grep -q 'are its vertices in m?' out; then bad "a part in metres is told twice: $(cat out)"; fi
 faulty fail 3 "^broken +no mesh in [0-9]+ of 21 shapes: shape 'faulty' at size=2\.5 reach=1\.5: too large"
 faulty wall 4 '^warning +walls pass through each other in [0-9]+ of the [0-9]+ shapes that were followed from the default shape: on the way from the default shape to size=1 reach=[12] [0-9]+ % of the surface turns over, at about size=1\.[78][0-9]* reach='
 faulty step 4 '^warning +vertex (9|1[0-5]) jumps by 1 mm at reach=1\.75'

@@ -20,7 +20,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
-     "meets|groups",
+     "meets|groups|crumb",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -112,7 +112,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         return none;
     }
     const int groups = !strcmp(fault, "groups"); // body and mast, handle and knob
-    const size_t boxes = groups ? 4 : !strcmp(fault, "sizes") && is_large ? 3 : 2;
+    const int crumb = !strcmp(fault, "crumb");   // a part in m, which lies inside the body
+    const size_t boxes = groups ? 4 : crumb || (!strcmp(fault, "sizes") && is_large) ? 3 : 2;
     const size_t less = !strcmp(fault, "open");
     const int failed = host->reserve(host, out, 8 * boxes, 12 * boxes - less);
     if (failed) return failed;
@@ -147,7 +148,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         faulty_box(out, 3, mast[0], mast[1], 0);
     }
     if (boxes == 3) {
-        const double far[2][3] = {{10, 10, 10}, {11, 11, 11}};
+        const double unit = crumb ? 0.001 : 1, edge = crumb ? 15 * unit : 11;
+        const double far[2][3] = {{10 * unit, 10 * unit, 10 * unit}, {edge, edge, edge}};
         faulty_box(out, 2, far[0], far[1], 0);
     }
     faulty_box(out, 0, body[0], body[1], !strcmp(fault, "body"));

@@ -202,12 +202,21 @@ static void a_part_in_metres(void **state)
     (void)state;
     sdm_shape_survey s = survey("none");
     assert_true(s.slow == 0 && s.apart.shapes == 0 && fabs(s.speed[1] - 1) < 1e-6);
+    assert_int_equal(s.tiny.shapes, 0);
     sdm_shape_survey_dispose(&s);
     s = survey("small");
     assert_true(!s.scale.odd_size && !s.scale.odd_speed && s.slow == 1);
     assert_true(fabs(s.speed[0] - sqrt(3)) < 1e-6 && fabs(s.speed[1] - 1e-3) < 1e-8);
     assert_int_equal(s.apart.shapes, s.n);
     assert_int_equal((size_t)s.apart.amount, 2); // the body, too
+    assert_int_equal(s.tiny.shapes, s.n);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    sdm_shape_survey_dispose(&s);
+    // a cube of 0.005 mm beside a body of 6 mm; no parameter moves it, and it is as thick as long
+    s = survey("crumb");
+    assert_true(!s.slow && !s.flat.shapes && !s.scale.odd_size && !s.scale.odd_speed);
+    assert_int_equal(s.tiny.shapes, s.n);
+    assert_true(fabs(s.tiny.amount - 1200) < 1e-6 && s.p[2 * s.tiny.worst] == 3);
     assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
     sdm_shape_survey_dispose(&s);
 }

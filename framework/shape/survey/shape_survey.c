@@ -36,6 +36,7 @@ typedef struct finding {
     uint64_t crc_vert, crc_tri;
     size_t open, inside_out, turned, apart, flat, overlaps, crossed, degenerate, duplicate;
     double volume, area, min[3], max[3];
+    double times;        /* of sdm_survey_part_lengths() */
     double winding;      /* the largest of sdm_survey_part_winding() */
     double turned_over;  /* the largest of sdm_part.folded */
     double thick;        /* of the thinnest part, mm; NaN: not known */
@@ -88,6 +89,18 @@ bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i)
     return p->state == SDM_PART_FLAT || p->thick < SDM_SURVEY_FLAT * size;
 }
 
+double sdm_survey_part_lengths(const sdm_part_audit *a, size_t *shortest, size_t *longest)
+{
+    double least = INFINITY, most = 0;
+    for (size_t i = 0; i < a->n; i++) {
+        double length = 0;
+        for (int d = 0; d < 3; d++) length = fmax(length, a->part[i].max[d] - a->part[i].min[d]);
+        if (length > 0 && length < least) least = length, *shortest = i;
+        if (length > most) most = length, *longest = i;
+    }
+    return most > least ? most / least : 0;
+}
+
 double sdm_survey_part_winding(const sdm_part_audit *a, size_t i)
 {
     const sdm_part *p = &a->part[i];
@@ -122,6 +135,8 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
         out->winding = fmax(out->winding, sdm_survey_part_winding(&audit, i));
         out->turned_over = fmax(out->turned_over, audit.part[i].folded);
     }
+    size_t shortest, longest;
+    out->times = sdm_survey_part_lengths(&audit, &shortest, &longest);
     sdm_survey_contacts(&audit, &out->contacts);
     out->thick = sdm_part_audit_thickness(&audit);
     out->apart = audit.bodies > 1 ? audit.bodies : 0;
@@ -288,6 +303,7 @@ static void sum_up(survey *v)
         count(&s->turned, i, (double)f->turned);
         count(&s->apart, i, (double)f->apart);
         count(&s->flat, i, (double)f->flat);
+        if (f->times >= SDM_SURVEY_TINY) count(&s->tiny, i, f->times);
         count(&s->overlaps, i, (double)f->overlaps);
         count(&s->degenerate, i, (double)f->degenerate);
         count(&s->duplicate, i, (double)f->duplicate);
@@ -579,8 +595,8 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
     bool bad = s->inside_out.shapes || s->crossing.shapes || sdm_survey_winds_wrongly(s) ||
                s->folded.shapes || s->turned.shapes || s->resized.shapes || s->rewired.shapes ||
-               s->cut.shapes || s->thin.shapes || s->flat.shapes || s->narrow || s->repeat.unlike ||
-               s->surplus > SDM_SURVEY_SURPLUS_MAX ||
+               s->cut.shapes || s->thin.shapes || s->flat.shapes || s->tiny.shapes || s->narrow ||
+               s->repeat.unlike || s->surplus > SDM_SURVEY_SURPLUS_MAX ||
                s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
                s->scale.odd_speed || s->scale.odd_angle || s->scale.swings;
     for (size_t k = 0; k < s->n_params && s->jump; k++)

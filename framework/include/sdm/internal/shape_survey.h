@@ -143,6 +143,9 @@ typedef struct sdm_shape_survey {
     /* parts that enclose nothing, or are thinner than SDM_SURVEY_FLAT times the longest edge of the
      * box of the shape: two walls of a part lie on each other */
     sdm_survey_count flat;
+    /* parts whose box is SDM_SURVEY_TINY times shorter than that of the longest part, or more: one
+     * of both is likely to be in another unit; amount: how many times, of the shortest part */
+    sdm_survey_count tiny;
     size_t narrow; /* parameters whose range does nothing: sdm_survey_is_narrow() */
 
     /* the samples whose vertices lie beyond the centres of the outer voxels; amount: mm beyond */
@@ -198,6 +201,10 @@ bool sdm_survey_has_twins(const sdm_shape_survey *s);
 /* Does part i of an audited mesh count for sdm_shape_survey.flat? */
 bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i);
 
+/* The parts whose boxes have the shortest and the longest edge of all. Returns how many times
+ * longer the longest edge of the second is; 0: there are not two parts with a length. */
+double sdm_survey_part_lengths(const sdm_part_audit *a, size_t *shortest, size_t *longest);
+
 /* How often part i of an audited mesh winds around its inside, at least and on average: its volume
  * by the divergence theorem, divided by that of its box or, where it is known and smaller, by that
  * of the union. 0: the part is not solid. It counts above SDM_SURVEY_WOUND; the turns of a spiral
@@ -212,7 +219,8 @@ bool sdm_survey_winds_wrongly(const sdm_shape_survey *s);
 
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
  * are usable, but a training or derivatives would suffer: parts that are inside out (also those
- * that the engine turns), parts without thickness, walls that pass through each other or outlines
+ * that the engine turns), parts without thickness or a
+ * thousand times smaller than others, walls that pass through each other or outlines
  * that cross themselves or wind more than once, sizes, triangles or vertices that jump, a grid that
  * cuts, is too coarse for a part or far too large, wrong velocities, results that differ from call
  * to call, or an odd size or speed (another unit than mm, or a parameter that does nothing). Else
@@ -230,6 +238,10 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 
 /* A part that is thinner than this share of the longest edge of the box shows on no grid. */
 #define SDM_SURVEY_FLAT 1e-3
+
+/* So many voxels along the longest part would show the shortest one as a single voxel. Parts of one
+ * length, one in m and one in mm, differ 1000 times. */
+#define SDM_SURVEY_TINY 300.0
 
 /* velocity_error above this is wrong. */
 #define SDM_SURVEY_VELOCITY_LIMIT 1e-3

@@ -9,6 +9,7 @@
 #include "inputs/points_file.h"
 #include "inputs/points_unit.h"
 #include "inputs/setup.h"
+#include "measure/map_memory.h"
 #include "measure/measures.h"
 #include "measure/points_table.h"
 #include "report/exact_layers.h"
@@ -141,7 +142,10 @@ static bool blocks_suffice(const job *j)
 static sdm_status make_blocks(job *j, const sdm_exact *engine, sdm_error *err)
 {
     double band;
-    sdm_status s = cli_blocks_band(&j->grid, j->args, &band, err);
+    // the numbers of the tiles, which every band has
+    const double bytes = 4.0 / SDM_BLOCK_VOXELS * (double)sdm_grid_count(&j->grid);
+    sdm_status s = cli_check_map_memory(&j->grid, bytes, err);
+    if (!s) s = cli_blocks_band(&j->grid, j->args, &band, err);
     if (!s) s = sdm_exact_map_blocks(engine, &j->grid, band, &j->blocks, err);
     if (!s && sdm_blocks_reach_border(&j->blocks)) sdm_blocks_dispose(&j->blocks);
     return s;
@@ -170,7 +174,10 @@ static sdm_status run_engine(job *j, sdm_error *err)
     if (s || measures_alone(j->args)) return s;
     if (blocks_suffice(j)) s = make_blocks(j, j->engine, err);
     if (!s && !j->blocks.tile) {
-        s = cli_allocate_map(&j->grid, &j->values, err);
+        const double bytes = sizeof *j->values + cli_layers_bytes(&j->layers, j->args);
+        s = cli_check_map_memory(&j->grid, bytes * (double)sdm_grid_count(&j->grid), err);
+        if (!s) s = cli_tell_large_map(j->engine, &j->grid, bytes, err);
+        if (!s) s = cli_allocate_map(&j->grid, &j->values, err);
         if (!s) s = cli_layers_map(&j->layers, j->args, j->engine, &j->grid, j->values, err);
     }
     j->ms_build = 1e3 * (built - start);

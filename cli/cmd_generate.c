@@ -9,6 +9,7 @@
 #include "inputs/points_file.h"
 #include "inputs/points_unit.h"
 #include "inputs/setup.h"
+#include "measure/map_memory.h"
 #include "measure/measures.h"
 #include "measure/points_table.h"
 #include "report/files.h"

@@ -18,18 +18,6 @@ static const char *format_bytes(double bytes, char buf[32])
     return buf;
 }
 
-/* Writes a time as "12 s", "3.5 min" or "2.1 h" into buf; returns buf. */
-static const char *format_seconds(double seconds, char buf[32])
-{
-    if (seconds < 120)
-        snprintf(buf, 32, "%.3g s", seconds);
-    else if (seconds < 7200)
-        snprintf(buf, 32, "%.3g min", seconds / 60);
-    else
-        snprintf(buf, 32, "%.3g h", seconds / 3600);
-    return buf;
-}
-
 static double total_seconds(const sdm_train_work *w, int nodes, int cores)
 {
     sdm_train_plan plan;
@@ -68,7 +56,7 @@ static void print_stages(const sdm_config *config, const sdm_train_work *w, cons
             snprintf(words, sizeof words, "%.20s %s", cli_format_count((int64_t)n, count),
                      i == SDM_PLAN_TRIALS || i == SDM_PLAN_MAPS ? "maps" : "steps");
         printf("  %-8s %-16s %10s  %-18s  %s\n", sdm_plan_stage_name((sdm_plan_stage)i), words,
-               format_seconds(p->seconds[i], time), format_bytes(p->received[i], bytes),
+               cli_format_seconds(p->seconds[i], time), format_bytes(p->received[i], bytes),
                stage_text((sdm_plan_stage)i));
     }
     char sum[96] = "the sum of these lines";
@@ -76,9 +64,9 @@ static void print_stages(const sdm_config *config, const sdm_train_work *w, cons
     const bool longer = budget > 0 && p->all_seconds > 1.01 * budget;
     if (longer)
         snprintf(sum, sizeof sum, "train.minutes ends the run; the sum of these lines is %s",
-                 format_seconds(p->all_seconds, time));
+                 cli_format_seconds(p->all_seconds, time));
     printf("  %-8s %-16s %10s  %-18s  %s\n", "total", "",
-           format_seconds(longer ? budget : p->all_seconds, time),
+           cli_format_seconds(longer ? budget : p->all_seconds, time),
            format_bytes(p->all_received, bytes), sum);
 }
 
@@ -96,13 +84,13 @@ static void print_budget(const sdm_config *c, const sdm_train_work *w, const sdm
         printf(
             "  budget   train.minutes is %.4g: the maps before training take %s of it, the rest is "
             "for as many steps as fit\n",
-            c->train.minutes, format_seconds(seconds, a));
+            c->train.minutes, cli_format_seconds(seconds, a));
         return;
     }
     printf(
         "  budget   the training begins after half of train.minutes (%s), with %s of the %s maps: "
         "raise train.minutes to %.4g for all of them, or lower data.start or data.static\n",
-        format_seconds(half, a), cli_format_count((int64_t)(before * half / seconds), made),
+        cli_format_seconds(half, a), cli_format_count((int64_t)(before * half / seconds), made),
         cli_format_count((int64_t)before, all), ceil(10 * seconds / 30) / 10);
 }
 
@@ -128,9 +116,9 @@ static void print_text(const sdm_config *config, const sdm_train_work *w, const 
     printf("  files    model %s, checkpoint up to %s; all maps would take %s if they were kept "
            "(sdmgen dataset)\n",
            format_bytes(p->model, a), format_bytes(p->checkpoint, b), format_bytes(p->dataset, c));
-    printf("  nodes    1: %s", format_seconds(total_seconds(w, 1, cores), a));
+    printf("  nodes    1: %s", cli_format_seconds(total_seconds(w, 1, cores), a));
     for (int n = 2; n <= 2 * pays && n <= NODES_MAX; n *= 2)
-        printf(", %d: %s", n, format_seconds(total_seconds(w, n, cores), a));
+        printf(", %d: %s", n, cli_format_seconds(total_seconds(w, n, cores), a));
     if (pays == 1)
         printf("; more than one does not pay: two are less than 1.5 times as fast\n");
     else

@@ -10,7 +10,6 @@
 #include "report/files.h"
 #include "report/terminal.h"
 #include "sdm/builtin_shapes.h"
-#include "sdm/internal/heap.h"
 #include "sdm/internal/isolation.h"
 #include "sdm/internal/model_hash.h"
 #include "sdm/internal/skipped.h"
@@ -405,20 +404,6 @@ void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm
     char buf[32];
     for (size_t i = 0; i < n; i++)
         sdm_text_add(out, "%s%s=%s", i ? " " : "", params[i].name, sdm_format_real(values[i], buf));
-}
-
-/* ---- grids ---- */
-
-sdm_status cli_allocate_map(const sdm_grid *grid, float **values, sdm_error *err)
-{
-    const size_t n = sdm_grid_count(grid);
-    const sdm_status s = sdm_alloc_unset((void **)values, n, sizeof **values, "distance map", NULL);
-    if (!s) return SDM_OK;
-    return sdm_fail(err, s,
-                    "no memory for a map of %lld x %lld x %lld voxels, %.3g GB: a larger --spacing "
-                    "or a smaller --size makes fewer",
-                    (long long)grid->n[0], (long long)grid->n[1], (long long)grid->n[2],
-                    1e-9 * (double)n * sizeof **values);
 }
 
 sdm_status cli_read_mesh(const char *path, sdm_mesh *out, sdm_error *err)

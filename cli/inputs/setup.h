@@ -93,10 +93,6 @@ bool cli_clamp(const char *begin, const sdm_param *params, size_t n, double *val
 /* Appends the values as "a=4.4 alpha=0.5". */
 void cli_add_params(const sdm_param *params, size_t n, const double *values, sdm_text *out);
 
-/* *values = new memory for a map of the grid, to be freed with sdm_free(); its values are not set.
- * SDM_E_NOMEM: names the voxels and the options that make fewer. */
-sdm_status cli_allocate_map(const sdm_grid *grid, float **values, sdm_error *err);
-
 /* *out = the grid of the file that --like names, a model or an image. SDM_E_ARG: --size or another
  * option that states a grid is given, too, or the file has another type; errors of sdm_model_open()
  * and sdm_volume_read(). */

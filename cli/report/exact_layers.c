@@ -25,6 +25,15 @@ bool cli_layers_wanted(const cli_args *args)
     return args->closest || args->normal || args->triangle || args->jacobian;
 }
 
+double cli_layers_bytes(const cli_layers *l, const cli_args *args)
+{
+    const double per_voxel[N_LAYERS] = {12, 12, 4, 4 * (double)l->n_params};
+    double sum = 0;
+    for (int i = 0; i < N_LAYERS; i++)
+        if (path_of(args, i)) sum += per_voxel[i];
+    return sum;
+}
+
 sdm_status cli_layers_check(const cli_args *args, sdm_error *err)
 {
     sdm_status s = SDM_OK;

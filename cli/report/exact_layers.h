@@ -17,6 +17,9 @@ typedef struct cli_layers {
 /* True when the command line has one of the four options. */
 bool cli_layers_wanted(const cli_args *args);
 
+/* Bytes of the requested layers for each voxel; after cli_layers_velocity(). */
+double cli_layers_bytes(const cli_layers *l, const cli_args *args);
+
 /* Before any work: checks the types and paths of these files and of the other outputs, and the
  * options that they require. SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_layers_check(const cli_args *args, sdm_error *err);

@@ -272,6 +272,17 @@ sdm_status cli_print_text(sdm_text *text, sdm_error *err)
     return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the text") : SDM_OK;
 }
 
+const char *cli_format_seconds(double seconds, char buf[32])
+{
+    if (seconds < 120)
+        snprintf(buf, 32, "%.3g s", seconds);
+    else if (seconds < 7200)
+        snprintf(buf, 32, "%.3g min", seconds / 60);
+    else
+        snprintf(buf, 32, "%.3g h", seconds / 3600);
+    return buf;
+}
+
 const char *cli_format_count(int64_t n, char buf[32])
 {
     char digits[32];

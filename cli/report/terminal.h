@@ -85,5 +85,8 @@ sdm_status cli_print_json(sdm_json *json, sdm_error *err);
 /* Prints a text on stdout and frees it. SDM_E_NOMEM: it is incomplete. */
 sdm_status cli_print_text(sdm_text *text, sdm_error *err);
 
+/* Writes a time as "12 s", "3.5 min" or "2.1 h" into buf; returns buf. */
+const char *cli_format_seconds(double seconds, char buf[32]);
+
 /* Writes n into buf with commas between groups of three digits; returns buf. */
 const char *cli_format_count(int64_t n, char buf[32]);

@@ -462,9 +462,11 @@ static void tell_thin(teller *t)
         sdm_text_add(&text, "; parts are too thin ");
         add_share(t->s, c, &text);
         sdm_text_add(&text, ")");
-        if (t->s->config)
-            sdm_text_add(&text, "; use grid: {spacing: %.2g}",
-                         0.5 * sdm_part_audit_thickness(&audit));
+        if (t->s->config) {
+            const double spacing = 0.5 * sdm_part_audit_thickness(&audit);
+            sdm_text_add(&text, "; use grid: {spacing: %.2g}", spacing);
+            sdm_train_add_price(t->s->config, t->s->found.n_params, t->s->grid, spacing, &text);
+        }
         tell(t, SDM_E_QUALITY, &text);
     }
     sdm_part_audit_dispose(&audit);

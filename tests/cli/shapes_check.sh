@@ -106,7 +106,10 @@ expect 0 "^sdmgen: warning: $large$" sdmgen config good.yaml 'grid.size=[62,78,7
 # The handle is 0.5 mm thick.
 thin='part 2 of 2 \(box [^a-z]* mm\) is 0\.5 mm thick, too thin for voxels of 0\.5 mm: it will be missing or broken in surfaces; a spacing of at most 0\.25 mm shows it'
 expect 4 mend sdmgen shapes check good.yaml grid.spacing=0.5 grid.size=[25,17,17] --plugin "$plugin" --samples 16
-has "^warning +$thin \(the thinnest of all, at size=.*; parts are too thin in all 21 shapes\); use grid: \{spacing: 0\.25\}$"
+has "^warning +$thin \(the thinnest of all, at size=.*; parts are too thin in all 21 shapes\); use grid: \{spacing: 0\.25\} \(about 0\.058 million voxels, 8 times as many, which take as many times longer; maps of up to [0-9.]+ GB in memory\)$"
+# What it costs, where the memory for maps is too small.
+expect 4 mend sdmgen shapes check good.yaml grid.spacing=0.5 grid.size=[25,17,17] data.memory_gb=0.05 --plugin "$plugin" --samples 4
+has 'use grid: .* GB in memory: raise data.memory_gb, which is 0\.05\)$'
 expect 0 "^sdmgen: warning: $thin" sdmgen config good.yaml grid.spacing=0.5 grid.size=[25,17,17] --plugin "$plugin" -q
 expect 0 "^sdmgen: warning: $thin$" sdmgen exact --shape faulty --plugin "$plugin" --spacing 0.5 -o thin.nrrd -q
 
@@ -115,7 +118,7 @@ cat >rod.yaml <<'YAML'
 shape: {name: linkage, options: {links: 1, length: 24, radius: 0.15, tip: 0.15, base: 0.1}, ranges: {q1: [0, 0.1]}}
 train: {minutes: 0.02}
 YAML
-expect 0 'voxels of 0\.13 mm in place of .*; no more than two voxels across it, as the longest edge has over 96; still finer with grid: \{spacing: 0\.087\}$' sdmgen shapes check rod.yaml --samples 8
+expect 0 'voxels of 0\.13 mm in place of .*; no more than two voxels across it, as the longest edge has over 96; still finer with grid: \{spacing: 0\.087\} \(about 0\.2 million voxels, 3\.3 times as many, .* GB in memory\)$' sdmgen shapes check rod.yaml --samples 8
 has '^fine: the shape can be trained$'
 
 # More maps than the memory for them holds: refused, or a warning where a template may do with fewer.

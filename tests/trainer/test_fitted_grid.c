@@ -247,6 +247,7 @@ static void test_thinner(void **state)
                                  : "; no more than two voxels across it, as the longest edge has "
                                    "over 96; still finer with grid: {spacing: 0.1"))
             fail_msg("%s", line.data);
+        assert_non_null(strstr(line.data, " times as many, which take as many times longer; maps"));
         sdm_text_dispose(&line);
         sdm_instance_free(sheet);
     }

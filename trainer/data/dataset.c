@@ -7,6 +7,7 @@
 #include "sdm/internal/heap.h"
 #include "sdm/internal/rng.h"
 #include "sdm/internal/sampling.h"
+#include "sdm/internal/text.h"
 #include "streams.h"
 
 sdm_status trainer_dataset_static(dataset *d, const sdm_config *config, sdm_error *err)
@@ -61,21 +62,21 @@ typedef struct kept_maps {
     double fixed, start, holdout; // of the static grid, random, held out (twice as large)
 } kept_maps;
 
-static double kept_gb(kept_maps n, size_t n_voxels)
+static double kept_gb(kept_maps n, double n_voxels)
 {
-    return 2e-9 * (n.fixed + n.start + 2 * n.holdout) * (double)n_voxels;
+    return 2e-9 * (n.fixed + n.start + 2 * n.holdout) * n_voxels;
 }
 
 /* Does the memory hold the static grid, the held-out maps and the fewest random maps? */
 static bool holds_fewest(const sdm_config *c, kept_maps n, size_t n_voxels)
 {
     n.start = fmin(n.start, FEWEST);
-    return kept_gb(n, n_voxels) <= c->data.memory_gb;
+    return kept_gb(n, (double)n_voxels) <= c->data.memory_gb;
 }
 
 static sdm_status refuse_memory(const sdm_config *c, kept_maps n, size_t n_voxels, sdm_error *err)
 {
-    const double gb = kept_gb(n, n_voxels);
+    const double gb = kept_gb(n, (double)n_voxels);
     return sdm_fail(
         err, SDM_E_CONFIG,
         "%s: data.static (%.0f maps), data.start (%.0f) and data.holdout (%.0f) on %.3g voxels "
@@ -94,7 +95,24 @@ static kept_maps maps_of(const sdm_config *c, size_t n_params)
 
 bool sdm_train_fits_memory(const sdm_config *c, size_t n_params, const sdm_grid *g)
 {
-    return kept_gb(maps_of(c, n_params), sdm_grid_count(g)) <= c->data.memory_gb;
+    return kept_gb(maps_of(c, n_params), (double)sdm_grid_count(g)) <= c->data.memory_gb;
+}
+
+void sdm_train_add_price(const sdm_config *c, size_t n_params, const sdm_grid *g, double spacing,
+                         sdm_text *out)
+{
+    double times = 1;
+    for (int a = 0; a < 3; a++) times *= g->spacing[a] / spacing;
+    const double voxels = times * (double)sdm_grid_count(g),
+                 gb = kept_gb(maps_of(c, n_params), voxels);
+    sdm_text_add(
+        out,
+        " (about %.2g million voxels, %.2g times as many, which take as many times longer; "
+        "maps of up to %.2g GB in memory",
+        1e-6 * voxels, times, gb);
+    if (gb > c->data.memory_gb)
+        sdm_text_add(out, ": raise data.memory_gb, which is %g", c->data.memory_gb);
+    sdm_text_add(out, ")");
 }
 
 sdm_status sdm_train_check_memory(const sdm_config *c, size_t n_params, const sdm_grid *g,

@@ -169,6 +169,7 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
         sdm_text_add(line, "; %s; %s with grid: {spacing: %.2g}", limit,
                      finer ? "still finer" : "finer for the thinnest part",
                      thick / SDM_GRID_THIN_VOXELS);
+    if (limit) sdm_train_add_price(config, n_params, &grid, thick / SDM_GRID_THIN_VOXELS, line);
     return line->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
 }
 

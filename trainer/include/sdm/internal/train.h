@@ -143,6 +143,12 @@ sdm_status sdm_train_grid_proposal(const sdm_config *config, const sdm_instance 
    fewer. */
 bool sdm_train_fits_memory(const sdm_config *c, size_t n_params, const sdm_grid *g);
 
+/* Appends the price of the box of the grid with another spacing, mm: " (about 1.2 million voxels, 8
+   times as many, which take as many times longer; maps of up to 7.1 GB in memory)", and whether
+   data.memory_gb must be raised for it. */
+void sdm_train_add_price(const sdm_config *c, size_t n_params, const sdm_grid *g, double spacing,
+                         sdm_text *out);
+
 /* SDM_E_CONFIG, and how much memory is needed, if they do not fit even with 512 maps in place of a
    larger data.start: a training makes as many of data.start before its first step as fit. */
 sdm_status sdm_train_check_memory(const sdm_config *c, size_t n_params, const sdm_grid *g,

@@ -31,6 +31,23 @@ const cli_command *cli_find_command(const char *name, sdm_error *err)
     return NULL;
 }
 
+/* SDM_E_ARG with the commands that have the option which `args->command` lacks; SDM_OK: none. */
+static sdm_status option_of_others(const cli_args *args, const char *name, sdm_error *err)
+{
+    const char *commands[CLI_N_COMMANDS];
+    char list[200];
+    size_t n = 0;
+    for (size_t c = 0; c < CLI_N_COMMANDS; c++)
+        if (cli_find_option(c, name, strlen(name))) commands[n++] = cli_commands[c].name;
+    if (!n) return SDM_OK;
+    return sdm_fail(err, SDM_E_ARG,
+                    "%s: unknown option --%s; it belongs to the command%s %s (sdmgen %s --help "
+                    "lists those of %s)",
+                    args->command->name, name, n > 1 ? "s" : "",
+                    sdm_list_names(commands, n, list, sizeof list), args->command->name,
+                    args->command->name);
+}
+
 static sdm_status unknown_option(const cli_args *args, const char *word, size_t length,
                                  sdm_error *err)
 {
@@ -42,6 +59,8 @@ static sdm_status unknown_option(const cli_args *args, const char *word, size_t 
     const size_t cut = length < sizeof name - 1 ? length : sizeof name - 1;
     memcpy(name, word, cut);
     name[cut] = '\0';
+    const sdm_status s = option_of_others(args, name, err);
+    if (s) return s;
     const char *command = args->command->name, *near = sdm_nearest_name(name, names, n);
     if (near)
         return sdm_fail(err, SDM_E_ARG, "%s: unknown option --%s; did you mean --%s?", command,
@@ -129,8 +148,9 @@ static sdm_status bad_value(const cli_option *o, const char *value, sdm_error *e
 {
     if (o->kind == CLI_CHOICE)
         return sdm_fail(err, SDM_E_ARG, "--%s '%s': need one of %s", o->name, value, o->choices);
-    char two[48];
-    snprintf(two, sizeof two, "two numbers %.20s", o->value);
+    char two[64];
+    snprintf(two, sizeof two, "two numbers %.20s%s", o->value,
+             o->value && !strcmp(o->value, "DEG,MM") ? " (degrees and mm)" : "");
     const char *form = o->kind == CLI_INT     ? "a whole number"
                        : o->kind == CLI_INT3  ? "three whole numbers X,Y,Z"
                        : o->kind == CLI_REAL  ? "a number"
@@ -246,6 +266,24 @@ static sdm_status check_once(const cli_args *args, const cli_option *o, const ch
     return SDM_OK;
 }
 
+/* Refuses a blank in place of the '=' of -p and -O, or beside it: next[] are the arguments that
+ * follow, NULL: none. */
+static sdm_status check_equals(const cli_option *o, const char *value, char **next, sdm_error *err)
+{
+    if (!o->value || strcmp(o->value, "name=value")) return SDM_OK;
+    const char *equals = strchr(value, '=');
+    if (equals && (equals[1] || o->letter == 'O')) return SDM_OK; // the text of an option may be ""
+    const int length = equals ? (int)(equals - value) : (int)strlen(value);
+    const char *word = next ? *next + strspn(*next, "=") : "";
+    if (next && !*word && next[1]) word = next[1];
+    // another option follows, unless it is a negative number
+    if (*word == '-' && !strchr("0123456789.", word[1])) word = "";
+    if (!*word) return SDM_OK; // the command refuses it
+    return sdm_fail(err, SDM_E_ARG,
+                    "-%c '%.200s': need name=value, without blanks: -%c %.*s=%.100s", o->letter,
+                    value, o->letter, length, value, word);
+}
+
 /* Parses the option at argv[*i]. Its value is in the same argument or the next one, which
  * advances *i. */
 static sdm_status parse_option(int argc, char **argv, int *i, cli_args *args, sdm_error *err)
@@ -264,13 +302,15 @@ static sdm_status parse_option(int argc, char **argv, int *i, cli_args *args, sd
         if (word[2]) value = word + 2;
     }
     if (o->kind == CLI_FLAG && value)
-        return sdm_fail(err, SDM_E_ARG, "%s: --%s takes no value", word, o->name);
+        return sdm_fail(err, SDM_E_ARG, "%s: --%s takes no value%s", word, o->name,
+                        strcmp(o->name, "measure") ? "" : ", it prints all measures");
     if (o->kind != CLI_FLAG && !value) {
         if (*i + 1 >= argc) return sdm_fail(err, SDM_E_ARG, "%s needs a value", word);
         value = argv[++*i];
     }
     if (value && !*value) return sdm_fail(err, SDM_E_ARG, "--%s: empty value", o->name);
-    const sdm_status s = check_once(args, o, value, err);
+    sdm_status s = check_once(args, o, value, err);
+    if (!s) s = check_equals(o, value, argc > *i + 1 ? argv + *i + 1 : NULL, err);
     if (s) return s;
     args->given[args->n_given++] = (cli_given){o, value ? value : o->name};
     return store_value(args, o, value, err);

@@ -452,7 +452,8 @@ const cli_option cli_options[] = {
      AT(pose.translation),
      "translation of the shape after the rotation, LPS mm (fit: at the start)"},
     {"random-pose", 0, CLI_REAL2, "DEG,MM", NULL, 0, 1e12, ON(CLI_PHANTOM), AT(phantom.random_pose),
-     "random rotation and translation up to these values, applied after the given ones"},
+     "random rotation of at most DEG degrees and translation of at most MM mm, applied after the "
+     "given ones"},
     {"random-params", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_PHANTOM), AT(phantom.random_params),
      "draw the parameters without -p from their distributions"},
     {"frame", 0, CLI_REAL3, "X,Y,Z", NULL, -CLI_TURN, CLI_TURN, ON(CLI_PHANTOM), AT(phantom.frame),

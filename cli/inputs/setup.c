@@ -112,6 +112,29 @@ const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_err
     return NULL;
 }
 
+/* Is the name of one of the n options of a shape that of a parameter, which the shape has without
+ * options? Adds the right words to the message. */
+static void explain_option(const sdm_shape *shape, const sdm_named_text *named, size_t n,
+                           sdm_error *err)
+{
+    sdm_instance *plain = NULL;
+    size_t n_params = 0;
+    if (!err || sdm_instance_create(shape, NULL, 0, NULL, &plain, NULL)) return;
+    const sdm_param *params = sdm_instance_params(plain, &n_params);
+    for (size_t i = 0; i < n; i++) {
+        bool known = false, is_param = false;
+        for (size_t k = 0; k < shape->n_options; k++)
+            known = known || !strcmp(shape->options[k].name, named[i].name);
+        for (size_t k = 0; k < n_params; k++)
+            is_param = is_param || !strcmp(params[k].name, named[i].name);
+        if (known || !is_param) continue;
+        sdm_fail(err, err->status, "shape '%s': %s is a parameter, no option: -p %s=%.100s",
+                 shape->name, named[i].name, named[i].name, named[i].value);
+        break;
+    }
+    sdm_instance_free(plain);
+}
+
 sdm_status cli_create_shape(const sdm_registry *r, const char *name, const cli_list *options,
                             sdm_instance **out, sdm_error *err)
 {
@@ -127,6 +150,7 @@ sdm_status cli_create_shape(const sdm_registry *r, const char *name, const cli_l
     if (s == SDM_E_CONFIG) { // options come from the command line
         s = SDM_E_ARG;
         if (err) err->status = s;
+        explain_option(shape, named, options->n, err);
     }
     sdm_free(words);
     sdm_free(named);
@@ -153,6 +177,26 @@ static sdm_status check_repeats(const cli_shape *shape, sdm_error *err)
     return s;
 }
 
+/* SDM_E_ARG if a parameter that is given is an option of the shape. */
+static sdm_status refuse_options(const cli_args *args, const cli_shape *shape, sdm_error *err)
+{
+    const sdm_shape *s = sdm_instance_shape(shape->instance);
+    for (size_t i = 0; i < args->params.n; i++) {
+        const char *word = args->params.items[i];
+        const size_t length = strcspn(word, "=");
+        bool is_param = false;
+        for (size_t k = 0; k < shape->n_params; k++)
+            is_param = is_param || (strlen(shape->params[k].name) == length &&
+                                    !strncmp(shape->params[k].name, word, length));
+        for (size_t k = 0; k < s->n_options && !is_param; k++)
+            if (strlen(s->options[k].name) == length && !strncmp(s->options[k].name, word, length))
+                return sdm_fail(err, SDM_E_ARG,
+                                "shape '%s': %s is an option, no parameter: -O %.200s", s->name,
+                                s->options[k].name, word);
+    }
+    return SDM_OK;
+}
+
 sdm_status cli_shape_open(const cli_args *args, const char *name, const cli_list *options,
                           cli_shape *out, sdm_error *err)
 {
@@ -160,7 +204,8 @@ sdm_status cli_shape_open(const cli_args *args, const char *name, const cli_list
     if (!s) s = cli_create_shape(out->registry, name, options, &out->instance, err);
     if (s) return s;
     out->params = sdm_instance_params(out->instance, &out->n_params);
-    s = SDM_ALLOC(&out->values, out->n_params, "parameters", err);
+    s = refuse_options(args, out, err);
+    if (!s) s = SDM_ALLOC(&out->values, out->n_params, "parameters", err);
     if (!s) s = cli_read_params(out->params, out->n_params, &args->params, out->values, err);
     return s || !args->isolate ? s : check_repeats(out, err);
 }

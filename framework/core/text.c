@@ -108,16 +108,34 @@ static bool is_near_range(double value, double min, double max)
     return value >= min - around && value <= max + around;
 }
 
-const char *sdm_unit_question(double value, double min, double max, const char *unit)
+/* A unit in which a value may have been given by mistake. */
+typedef struct other_unit {
+    double factor;        /* to the unit of the parameter; 0: there is none */
+    const char *question; /* the end of the message */
+} other_unit;
+
+static other_unit find_unit(double value, double min, double max, const char *unit)
 {
+    static const other_unit none = {0, ""}, metres = {1e3, "; was it given in metres? It needs mm"},
+                            micrometres = {1e-3, "; was it given in micrometres? It needs mm"},
+                            degrees = {0.017453292519943295,
+                                       "; was it given in degrees? It needs rad"};
     const double size = fabs(value), low = fmin(fabs(min), fabs(max)),
                  high = fmax(fabs(min), fabs(max));
-    if (strcmp(unit, "mm") || (value >= min && value <= max)) return "";
-    if (size < 0.01 * low && is_near_range(1e3 * value, min, max))
-        return "; was it given in metres? It needs mm";
-    if (size > 100 * high && is_near_range(1e-3 * value, min, max))
-        return "; was it given in micrometres? It needs mm";
-    return "";
+    if (value >= min && value <= max) return none;
+    if (!strcmp(unit, "rad")) {
+        const double angle = degrees.factor * value;
+        return size > 1.5 * high && size <= 720 && angle >= min && angle <= max ? degrees : none;
+    }
+    if (strcmp(unit, "mm")) return none;
+    if (size < 0.01 * low && is_near_range(1e3 * value, min, max)) return metres;
+    if (size > 100 * high && is_near_range(1e-3 * value, min, max)) return micrometres;
+    return none;
+}
+
+const char *sdm_unit_question(double value, double min, double max, const char *unit)
+{
+    return find_unit(value, min, max, unit).question;
 }
 
 sdm_status sdm_fail_range(const char *name, double value, double min, double max, const char *unit,
@@ -125,10 +143,13 @@ sdm_status sdm_fail_range(const char *name, double value, double min, double max
 {
     char v[32], low[32], high[32];
     const char *space = *unit ? " " : "";
-    return sdm_fail(err, SDM_E_RANGE, "parameter '%s' = %s%s%s, allowed %s .. %s%s%s%s", name,
+    const other_unit other = find_unit(value, min, max, unit);
+    char right[128] = "";
+    if (other.factor > 0) snprintf(right, sizeof right, ": %.64s=%.4g", name, other.factor * value);
+    return sdm_fail(err, SDM_E_RANGE, "parameter '%s' = %s%s%s, allowed %s .. %s%s%s%s%s", name,
                     isnan(value) ? "nan" : sdm_format_real(value, v), space, unit,
                     sdm_format_real(min, low), sdm_format_real(max, high), space, unit,
-                    sdm_unit_question(value, min, max, unit));
+                    other.question, right);
 }
 
 #define WORD_MAX 64

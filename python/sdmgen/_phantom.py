@@ -28,7 +28,7 @@ class Phantom:
 
 def random_pose(degrees: float, mm: float, seed: int = 1) -> Pose:
     """A random pose: a rotation about a random axis by up to this angle, and a translation in the ball
-    of this radius."""
+    of this radius: the angle is in degrees, the radius in mm."""
     angle = np.arccos(-1.0) / 180 * number(degrees, "degrees")
     return Pose._of(function("sdm_phantom_random_pose")(angle, number(mm, "mm"), whole(seed, "seed", 0, 2**53)))
 

@@ -24,6 +24,18 @@ expect 2 "unknown command 'xyzzy'; see sdmgen --help" sdmgen xyzzy
 expect 2 "unknown command 'evla'; did you mean 'eval'\?" sdmgen help evla
 expect 2 'unknown option --sampels; did you mean --samples\?' sdmgen eval model.sdm --sampels 3
 expect 2 'unknown option -x' sdmgen exact -x
+expect 2 'exact: unknown option --rotation; it belongs to the commands phantom, fit \(sdmgen exact --help lists those of exact\)$' sdmgen exact --shape torus --rotation 0,0,1 --json
+expect 2 'fit: unknown option --certify; it belongs to the command exact ' sdmgen fit model.sdm x.nii --certify
+# A blank in place of the equals sign, a parameter given as an option, and the other way round.
+expect 2 "^sdmgen: error: -p 'minor': need name=value, without blanks: -p minor=1\.2$" sdmgen exact --shape torus -p minor 1.2 --json
+expect 2 "^sdmgen: error: -p 'minor': need name=value, without blanks: -p minor=-1$" sdmgen exact --shape torus -p minor = -1 --json
+expect 2 "^sdmgen: error: -p 'minor=': need name=value, without blanks: -p minor=2$" sdmgen exact --shape torus -p minor= 2 --json
+expect 2 "^sdmgen: error: -O 'edge': need name=value$" sdmgen exact --shape torus -O edge --json
+expect 2 "^sdmgen: error: shape 'torus': minor is a parameter, no option: -p minor=1$" sdmgen exact --shape torus -O minor=1 --json
+expect 2 "^sdmgen: error: shape 'torus': edge is an option, no parameter: -O edge=0\.2$" sdmgen exact --shape torus -p edge=0.2 --json
+expect 5 "'phi' = 15 rad, allowed .* rad; was it given in degrees\? It needs rad: phi=0\.2618$" sdmgen exact --shape cochlea -p phi=15 --json
+expect 2 'measure=volume: --measure takes no value, it prints all measures$' sdmgen exact --shape torus --measure=volume
+expect 2 "random-pose '3\.5': need two numbers DEG,MM \(degrees and mm\), at least 0" sdmgen phantom --shape torus --random-pose 3.5 -o x.nii
 expect 2 'experiment: unknown option -o; did you mean --out DIR\?' sdmgen experiment x.yaml -o folder
 expect 2 'usage: sdmgen train CONFIG' sdmgen train
 expect 2 "unexpected argument 'b'" sdmgen info a b

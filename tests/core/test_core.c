@@ -200,7 +200,11 @@ static void range_mistakes_have_one_text(void **state)
     assert_int_equal(sdm_fail_range("b", INFINITY, -1, 0.25, "", NULL), SDM_E_RANGE);
     sdm_fail_range("a", 0.0042, 2, 5, "mm", &err);
     assert_string_equal(err.text, "parameter 'a' = 0.0042 mm, allowed 2 .. 5 mm; was it given in "
-                                  "metres? It needs mm");
+                                  "metres? It needs mm: a=4.2");
+    sdm_fail_range("angle", 15, -1, 1, "rad", &err);
+    assert_string_equal(err.text,
+                        "parameter 'angle' = 15 rad, allowed -1 .. 1 rad; was it given in "
+                        "degrees? It needs rad: angle=0.2618");
 }
 
 /* A length that is a thousand times too small or too large may be in another unit. */
@@ -225,6 +229,12 @@ static void another_unit_is_asked_for(void **state)
         assert_string_equal(sdm_unit_question(neither[k][0], neither[k][1], neither[k][2], "mm"),
                             "");
     assert_string_equal(sdm_unit_question(0.003, 2, 5, "rad"), "");
+    static const double angles[][4] = {{15, -1, 1, 1},   {-30, -1, 1, 1},      {300, 0, 6.2832, 1},
+                                       {1.2, -1, 1, 0},  {90, -1, 1, 0},       {-15, 0, 1, 0},
+                                       {7, 0, 6.283, 0}, {1e4, -1000, 180, 0}, {NAN, 0, 1, 0}};
+    for (size_t k = 0; k < sizeof angles / sizeof *angles; k++)
+        assert_true(!*sdm_unit_question(angles[k][0], angles[k][1], angles[k][2], "rad") ==
+                    !(angles[k][3] > 0));
 }
 
 static void json_text_is_escaped(void **state)

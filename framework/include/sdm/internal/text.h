@@ -57,11 +57,12 @@ SDM_INTERNAL_API const char *sdm_comma_hint(const char *s, char buf[64]);
 SDM_INTERNAL_API const char *sdm_format_real(double v, char buf[32]);
 
 /* "; was it given in metres? It needs mm" for a length outside its range that would be in it or
- * near it if it were in metres, the same for micrometres, "" for others. */
+ * near it if it were in metres, the same for micrometres, and for an angle in rad that would be in
+ * its range if it were in degrees; "" for others. */
 const char *sdm_unit_question(double value, double min, double max, const char *unit);
 
-/* SDM_E_RANGE, "parameter 'a' = 9 mm, allowed 2 .. 5 mm" and sdm_unit_question(): the one text
- * about a parameter out of its range min .. max. */
+/* SDM_E_RANGE, "parameter 'a' = 9 mm, allowed 2 .. 5 mm" and sdm_unit_question(), with the value in
+ * the right unit as ": a=9": the one text about a parameter out of its range min .. max. */
 sdm_status sdm_fail_range(const char *name, double value, double min, double max, const char *unit,
                           sdm_error *err);
 

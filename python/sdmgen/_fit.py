@@ -244,14 +244,20 @@ def _labels(value: Union[None, Label, Sequence[Label]]) -> list[Label]:
     return list(value)
 
 
-def _warn_few_values(image: Image) -> None:
-    """Warns where an image looks like labels: few different values, all of them whole numbers from 0 on."""
+def _check_few_values(image: Image, tissues: bool) -> None:
+    """Refuses an image that looks like labels: few different values, all of them whole numbers from 0 on.
+    Where values of tissues say that it is meant as an image, a warning."""
     values, found = image.values.ravel(), np.empty(0)
     for start in range(0, values.size, _CHUNK):
         part = values[start : start + _CHUNK].astype(np.float64)
         found = np.union1d(found, part[~np.isnan(part)])
         if found.size > _FEW_VALUES or (found < 0).any() or (found != np.rint(found)).any():
             return
+    if found.size > 1 and not tissues:
+        raise argument_error(
+            f"fit: the image holds only the values {', '.join(f'{v:g}' for v in found)}, as labels do: give label= with that "
+            f"of the shape, e.g. label={found[-1]:g}, or several; inside= and outside= fit to them as to an image"
+        )
     if found.size > 1:
         warn(
             f"the image holds only {found.size} different values, {found[0]:g} to {found[-1]:g}: if it is a label map, "
@@ -526,7 +532,7 @@ def fit(
         if opened.values.ndim != 3 or (opened.segments and mask is None):
             raise argument_error("fit: the image is a segmentation: select segments by label=")
         if mask is None:
-            _warn_few_values(opened)
+            _check_few_values(opened, inside is not None or outside is not None)
         values = float32(opened.values, opened.grid.shape, "image") if mask is None else mask
         c_target.kind = _abi.constants["SDM_FIT_IMAGE" if mask is None else "SDM_FIT_LABEL"]
         c_target.grid, c_target.values = opened.grid._c, address(values)

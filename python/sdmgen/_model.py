@@ -149,8 +149,7 @@ class Model:
         self._lock = threading.Lock()
         info = _abi.structs["sdm_model_info"].from_address(function("sdm_model_get_info")(self))
         params = (_abi.structs["sdm_model_param"] * info.n_params).from_address(info.params)
-        #: the parameters in their order: name, range of the training, default, unit
-        self.params: list[Param] = [param_of(p, p.distribution) for p in params]
+        self._params = [param_of(p, p.distribution) for p in params]
         #: the grid of the maps
         self.grid = Grid._of(info.grid)
         #: errors on shapes that the training did not use
@@ -180,6 +179,11 @@ class Model:
     @property
     def _as_parameter_(self) -> Any:
         return self._handle.pointer
+
+    @property
+    def params(self) -> list[Param]:
+        """The parameters in their order: name, unit, range of the training, default, distribution."""
+        return self._params
 
     @property
     def defaults(self) -> Float64:

@@ -156,11 +156,16 @@ class Shape:
         self._instance = Handle("sdm_instance_free", self._registry, self._python)
         folder = None if base_dir is None else path_bytes(base_dir, "base_dir")
         call("sdm_instance_create", self._registry.find(self.name), named, len(words), folder, self._instance.out())
-        self.params = _params(self._instance)
+        self._params = _params(self._instance)
 
     @property
     def _as_parameter_(self) -> c_void_p:
         return self._instance.pointer
+
+    @property
+    def params(self) -> list[Param]:
+        """The parameters in their order: name, unit, range, default, distribution."""
+        return self._params
 
     @property
     def defaults(self) -> Float64:
@@ -233,7 +238,7 @@ class InstanceShape(Shape):
         self._python = None
         self._instance = instance
         self.name = name
-        self.params = _params(instance)
+        self._params = _params(instance)
 
 
 class _PythonShape:

@@ -99,9 +99,12 @@ def test_labels_without_label(ct):
     shape, label = sdmgen.Shape("torus"), sdmgen.read(ct["label.nii.gz"])
     named = {"rotation": (0, 0, 0), "spacing": 0.8, "max_iterations": 1}
     for values in (label.values, label.values.astype(np.uint8)):
+        image = sdmgen.Image(values, label.grid)
+        with pytest.raises(ValueError, match="holds only the values 0, 1, as labels do: give label= .*, e.g. label=1, or several"):
+            sdmgen.fit(shape, image, **named)
         with pytest.warns(UserWarning, match="only 2 different values, 0 to 1: if it is a label map, give label="):
             with pytest.raises(sdmgen.QualityError):
-                sdmgen.fit(shape, sdmgen.Image(values, label.grid), **named)
+                sdmgen.fit(shape, image, **named, inside=(0, 0.3), outside=(1, 0.3))
     for target, more in ((ct["ct.nii.gz"], {}), (label, {"label": 1})):
         with warnings.catch_warnings():
             warnings.simplefilter("error")

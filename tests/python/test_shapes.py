@@ -184,3 +184,8 @@ def test_training_and_fit(tmp_path):
 
     with pytest.raises(sdmgen.Error, match="no such egg"):
         sdmgen.train(config, out=tmp_path / "fourth", shape=sdmgen.Shape(broken, PARAMS, name="egg"))
+
+
+def test_help_texts():
+    for kind in (sdmgen.Model, sdmgen.Shape):
+        assert "parameters in their order" in kind.params.__doc__

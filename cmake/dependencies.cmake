@@ -88,7 +88,12 @@ endif()
 if(SDM_VDB)
   # Debian installs FindOpenVDB.cmake in a separate folder
   list(APPEND CMAKE_MODULE_PATH "/usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB")
+  # QUIET does not silence what this file and the packages that it needs print, such as notes about
+  # a library of Imath for Python, which is not used
+  set(sdm_level ${CMAKE_MESSAGE_LOG_LEVEL})
+  set(CMAKE_MESSAGE_LOG_LEVEL WARNING)
   find_package(OpenVDB QUIET COMPONENTS openvdb)
+  set(CMAKE_MESSAGE_LOG_LEVEL ${sdm_level})
   if(NOT OpenVDB_FOUND)
     message(FATAL_ERROR "OpenVDB not found: install libopenvdb-dev and libboost-iostreams-dev, or "
       "configure with -DSDM_VDB=OFF (no .vdb files)")

@@ -285,7 +285,9 @@ const cli_option cli_options[] = {
      "vertices of .ply .stl .obj .off .vtk .vtp, LPS mm; -o FILE.csv (x,y,z and the columns) or "
      "FILE.npy (float64, the columns alone), one row a point"},
     {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_EXACT), AT(columns),
-     "columns for --points: distance,gradient,closest,triangle (default distance)"},
+     "columns for --points: distance,gradient,closest,triangle (default distance). Where several "
+     "points of the surface are equally near, as on a ridge, gradient, closest and triangle are "
+     "those of one of them"},
     {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_GENERATE), AT(columns),
      "columns for --points: distance,gradient (default distance)"},
     {"narrow", 0, CLI_REAL, "N", NULL, 0.5, 1e6, ON(CLI_EXACT), AT(narrow),

@@ -3,6 +3,7 @@
 #include "template_kind.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "data/trilinear.h"
@@ -107,13 +108,19 @@ static void report_design(trainer *t, const template_state *s)
                         "degree %zu; error of the warp %.2g mm, of the amplitudes %.2g mm",
                         frame_name(d->parts[0].frame), modes, d->degree, d->warp_error_mm,
                         d->motion_error_mm);
-    else
+    else {
+        // parts that move together are one piece, one that bends is several
+        char of[96] = "parts";
+        if (d->n_parts != d->family.n_components)
+            snprintf(of, sizeof of, "moving pieces of the %zu parts of the mesh",
+                     d->family.n_components);
         trainer_message(t,
-                        "template: %zu parts (%zu rigid, %zu affine, %zu still, %zu with warps of "
+                        "template: %zu %s (%zu rigid, %zu affine, %zu still, %zu with warps of "
                         "%zu modes); polynomials of degree %zu; error of the frames %.2g mm, of "
                         "the warps %.2g mm",
-                        d->n_parts, rigid, affine, still, joints, modes, d->degree,
+                        d->n_parts, of, rigid, affine, still, joints, modes, d->degree,
                         d->motion_error_mm, d->warp_error_mm);
+    }
 }
 
 /* Errors of a template without a correction, mm, root mean square. */

@@ -16,7 +16,9 @@ extern "C" {
 /* world = origin + dir * diag(spacing) * (i, j, k). origin is the CENTRE of voxel (0, 0, 0), in mm;
  * spacing is in mm; dir is a row-major orthonormal 3 x 3 matrix (reflections are allowed). */
 typedef struct sdm_grid {
-    int64_t n[3]; /* number of voxels along x, y, z */
+    /* number of voxels along x, y, z: what configurations, options of the program, JSON and Python
+     * call `size` */
+    int64_t n[3];
     double origin[3];
     double spacing[3];
     double dir[9];

@@ -276,9 +276,11 @@ static sdm_status check_equals(const cli_option *o, const char *value, char **ne
     const int length = equals ? (int)(equals - value) : (int)strlen(value);
     const char *word = next ? *next + strspn(*next, "=") : "";
     if (next && !*word && next[1]) word = next[1];
-    // another option follows, unless it is a negative number
-    if (*word == '-' && !strchr("0123456789.", word[1])) word = "";
-    if (!*word) return SDM_OK; // the command refuses it
+    double number;
+    // other words are options and files
+    const bool is_value =
+        sdm_parse_real(word, &number) || (o->letter == 'O' && *word && !strpbrk(word, "-./"));
+    if (!is_value) return SDM_OK; // the command refuses what is no name=value
     return sdm_fail(err, SDM_E_ARG,
                     "-%c '%.200s': need name=value, without blanks: -%c %.*s=%.100s", o->letter,
                     value, o->letter, length, value, word);

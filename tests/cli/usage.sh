@@ -30,6 +30,8 @@ expect 2 'fit: unknown option --certify; it belongs to the command exact ' sdmge
 expect 2 "^sdmgen: error: -p 'minor': need name=value, without blanks: -p minor=1\.2$" sdmgen exact --shape torus -p minor 1.2 --json
 expect 2 "^sdmgen: error: -p 'minor': need name=value, without blanks: -p minor=-1$" sdmgen exact --shape torus -p minor = -1 --json
 expect 2 "^sdmgen: error: -p 'minor=': need name=value, without blanks: -p minor=2$" sdmgen exact --shape torus -p minor= 2 --json
+expect 2 "^sdmgen: error: -O 'edge': need name=value, without blanks: -O edge=fine$" sdmgen exact --shape torus -O edge fine --json
+expect 2 "^sdmgen: error: -p 'minor': need name=value$" sdmgen mesh --shape torus -o x.off -p minor
 expect 2 "^sdmgen: error: -O 'edge': need name=value$" sdmgen exact --shape torus -O edge --json
 expect 2 "^sdmgen: error: shape 'torus': minor is a parameter, no option: -p minor=1$" sdmgen exact --shape torus -O minor=1 --json
 expect 2 "^sdmgen: error: shape 'torus': edge is an option, no parameter: -O edge=0\.2$" sdmgen exact --shape torus -p edge=0.2 --json

@@ -1,7 +1,7 @@
 /* Parts of the fit: derivatives against differences, bounded steps, averaged gradient, Anderson
- * acceleration.
- * Tests: anderson.c averaged_gradient.c averaged_maps.c map_fields.c newton.c objective.c solve.c
- * unknowns_cost.c */
+ * acceleration, maxima.
+ * Tests: anderson.c averaged_gradient.c averaged_maps.c map_fields.c newton.c objective.c
+ * same_maximum.c solve.c unknowns_cost.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,6 +13,7 @@
 #include <cmocka.h>
 
 #include "fit/data/observation.h"
+#include "fit/judge/same_maximum.h"
 #include "fit/judge/unknowns_cost.h"
 #include "fit/solver/anderson.h"
 #include "fit/solver/averaged_gradient.h"
@@ -21,6 +22,7 @@
 #include "fit/solver/prior.h"
 #include "fit/solver/solve.h"
 #include "oracle/fit_tools.h"
+#include "sdm/internal/rng.h"
 
 // ---- observation model
 
@@ -394,6 +396,50 @@ static void test_unknowns_cost(void **state)
     free(p);
 }
 
+// ---- maxima
+
+// Whether a bar of 200 voxels that begins at voxel 100 and one that begins at `rival` belong to the
+// same maximum, in an image of white noise with this sd that holds a bar at each of the places
+// shown[n].
+static bool same_maximum(double sd, size_t rival, size_t n, const size_t *shown)
+{
+    enum { N = 600, LENGTH = 200 };
+    static float value[N];
+    static double fit[N], other[N];
+    const sdm_fit_opts o = sdm_fit_defaults();
+    fit_state s = {.appearance = {.n_inside = 1,
+                                  .n_outside = 1,
+                                  .inside = {{.weight = 1, .mean = 0, .sd = sd}},
+                                  .outside = {{.weight = 1, .mean = 1000, .sd = sd}}}};
+    fit_problem p = {.samples = {.n = N, .value = value, .field = other}, .maps = {.share = true}};
+    const sdm_fit_target target = {.kind = SDM_FIT_IMAGE};
+    p.target = &target;
+    sdm_fit_observation_prepare(&o, SDM_FIT_IMAGE, &s, &p.observation);
+    fit_standing a = {.factor = 1}, b = {.factor = 1};
+    for (size_t i = 0; i < N; i++) {
+        bool in = false;
+        for (size_t k = 0; k < n; k++)
+            in = in || i - shown[k] < LENGTH; // unsigned: also i >= shown
+        value[i] = (float)((in ? 0 : 1000) + sd * sdm_rng_normal(5, 0, i));
+        fit[i] = i - 100 < LENGTH, other[i] = i - rival < LENGTH;
+        a.log_likelihood += log_likelihood(&p.observation, (double)value[i], fit[i]);
+        b.log_likelihood += log_likelihood(&p.observation, (double)value[i], other[i]);
+    }
+    return sdm_fit_same_maximum(&p, &a, fit, &b);
+}
+
+// In strong noise the bar may begin anywhere in some voxels. In weak noise two places that explain
+// the image as well as each other are no maximum, as the truth lies between them, or two maxima, as
+// the image holds two bars.
+static void test_a_wide_maximum_is_one(void **state)
+{
+    (void)state;
+    const size_t at_110 = 110, both[] = {100, 350};
+    assert_true(same_maximum(4000, 120, 1, &at_110));
+    assert_false(same_maximum(200, 120, 1, &at_110));
+    assert_false(same_maximum(1000, 350, 2, both));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -404,6 +450,7 @@ int main(void)
         cmocka_unit_test(test_prior_of_parameters),
         cmocka_unit_test(test_gradient_matches_differences),
         cmocka_unit_test(test_anderson_converges_fast),
+        cmocka_unit_test(test_a_wide_maximum_is_one),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

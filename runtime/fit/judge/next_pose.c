@@ -16,6 +16,7 @@
 #include "fit/start/start_search.h"
 #include "fit/start/turn_set.h"
 #include "rival.h"
+#include "same_maximum.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/internal/rotation.h"
@@ -75,6 +76,10 @@ typedef struct own_fit {
     double centre[3]; /* of its inside, in its frame, mm */
     double axes[9];   /* rows: its principal axes */
     double factor;    /* as fit_standing, for the present samples */
+    /* after some iterations on these samples, as its rivals have: how it stands, and its field
+     * there; NULL: not known yet */
+    fit_standing standing;
+    double *field;
 } own_fit;
 
 static void place_of(const sdm_grid *g, size_t v, double x[3])
@@ -247,7 +252,11 @@ static sdm_status challenge(fit_problem *p, const own_fit *own, const fit_start 
     if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
     *other = !s && map_likeness(own, &p->maps, &p->state) <= dice;
     if (s == SDM_E_QUALITY) return SDM_OK; // a state that cannot be fitted is no rival
-    return s ? s : sdm_fit_stand(p, own->factor, standing, err);
+    if (!s) s = sdm_fit_stand(p, own->factor, standing, err);
+    // where the data tell little, a maximum is wide, and it holds surfaces that differ
+    if (!s && *other && own->field)
+        *other = !sdm_fit_same_maximum(p, &own->standing, own->field, standing);
+    return s;
 }
 
 // *best = the value of parameter k, of those that are tried, with which the shape explains the
@@ -335,7 +344,7 @@ static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_e
 {
     turns *t = NULL;
     fit_start *value = NULL;
-    fit_standing fit, rival;
+    fit_standing rival;
     bool other;
     size_t n_values = 0;
     sdm_status s = SDM_ALLOC(&t, 1, "rival of the fit", err);
@@ -343,22 +352,25 @@ static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_e
     if (!s) turns_rank(own, t);
     // the tissues of the fit on these samples, as those of its rivals
     if (!s) s = climb(p, true, STEPS_OF_FIT, err);
-    if (!s) s = sdm_fit_stand(p, own->factor, &fit, err);
+    if (!s) s = sdm_fit_stand(p, own->factor, &own->standing, err);
+    if (!s) s = SDM_ALLOC(&own->field, p->samples.n, "rival of the fit", err);
+    if (!s) memcpy(own->field, p->samples.field, p->samples.n * sizeof *own->field);
+    const fit_standing *fit = &own->standing;
     if (!s) s = values_rank(p, own, value, &n_values, err);
     if (!s) tell_symmetry(t, least);
     if (!s && p->has_runner_up) {
         const fit_start from = {.state = p->runner_up};
         s = challenge(p, own, &from, ALIKE, &other, &rival, err);
-        if (!s && other) nearest_take(least, p, &fit, &rival, 0);
+        if (!s && other) nearest_take(least, p, fit, &rival, 0);
     }
     other = false;
     for (size_t i = 0; !s && i < t->n_other && i < TRIES_MAX && !other; i++) {
         s = challenge(p, own, &t->other[i], ALIKE, &other, &rival, err);
-        if (!s && other) nearest_take(least, p, &fit, &rival, 0);
+        if (!s && other) nearest_take(least, p, fit, &rival, 0);
     }
     for (size_t i = 0; i < n_values && !s; i++) {
         s = challenge(p, own, &value[i], ALIKE, &other, &rival, err);
-        if (!s && other) nearest_take(least, p, &fit, &rival, value[i].param);
+        if (!s && other) nearest_take(least, p, fit, &rival, value[i].param);
     }
     if (!s) s = compare_alike(p, own, t, least, err);
     sdm_free(t);
@@ -385,6 +397,7 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     own.factor = fmax(factor / pow((double)p->stride, 3), 1) * fmax(v->chi_square, 1);
     if (!s) s = least_gain(p, &own, &least, err);
     sdm_free(own.distance);
+    sdm_free(own.field);
     p->opts = given;
     if (s) return s;
     if (p->n_motions > 0) least.symmetry[0] = 0; // any angle, which the fit tells

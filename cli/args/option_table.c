@@ -543,7 +543,8 @@ const cli_option cli_options[] = {
     {"image-model", 0, CLI_CHOICE, NULL, "partial|labels", 0, 0, ON(CLI_FIT), AT(fit.image_model),
      "partial: partial volume (default); labels: tissue labels with a logistic prior"},
     {"inside", 0, CLI_REAL2, "MEAN,SD", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.inside),
-     "values inside at the start: mean and standard deviation (default 40,170: fluid, HU)"},
+     "values inside: mean and standard deviation, at the start and as a prior of the mean "
+     "(default 40,170: fluid, HU)"},
     {"outside", 0, CLI_REAL2, "MEAN,SD", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.outside),
      "values outside at the start (default 1300,270: bone, HU)"},
     {"air", 0, CLI_REAL2, "MEAN,SD", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.air),

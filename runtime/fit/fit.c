@@ -252,11 +252,11 @@ static sdm_status samples_follow(fit_problem *p, bool *changed, sdm_error *err)
 // change of a weight, 0 if it is negligible or no unknown has a prior
 static sdm_status priors_reweight(fit_problem *p, double *change, sdm_error *err)
 {
-    double weight[FIT_PARAMS_MAX + 6] = {0};
+    double weight[FIT_UNKNOWNS_MAX] = {0};
     const sdm_status s = sdm_fit_weigh_priors(p, weight, &p->noise_factor, err);
     if (s) return s;
     *change = 0;
-    for (size_t k = 0; k < p->n_params + 6; k++)
+    for (size_t k = 0; k < p->information.n_unknowns; k++)
         *change = fmax(*change, fabs(weight[k] / p->prior_weight[k] - 1));
     if (*change > WEIGHT_EPS)
         memcpy(p->prior_weight, weight, sizeof weight);
@@ -615,7 +615,7 @@ static sdm_status attempt_renew(fit_problem *p, sdm_fit_result *out, sdm_error *
     out->n_cavity = old.n_cavity;
     out->widest_space = old.widest_space;
     out->n_restarts = old.n_restarts + 1;
-    for (size_t k = 0; k < FIT_PARAMS_MAX + 6; k++) p->prior_weight[k] = 1;
+    for (size_t k = 0; k < FIT_UNKNOWNS_MAX; k++) p->prior_weight[k] = 1;
     p->noise_factor = 1;
     p->recent = (fit_recent){0};
     return s;
@@ -667,7 +667,7 @@ static sdm_status run(const sdm_fit_source *source, const sdm_fit_target *target
     const double from = sdm_clock();
     fit_problem p = {
         .source = source, .target = target, .opts = opts, .is_rival = is_rival, .noise_factor = 1};
-    for (size_t k = 0; k < FIT_PARAMS_MAX + 6; k++) p.prior_weight[k] = 1;
+    for (size_t k = 0; k < FIT_UNKNOWNS_MAX; k++) p.prior_weight[k] = 1;
 
     // 1. check the arguments
     sdm_status s = sdm_fit_check_source(source, &p.n_params, err);

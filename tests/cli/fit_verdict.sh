@@ -89,6 +89,11 @@ expect 0 - sdmgen phantom --shape capsule --seed 5 --random-params --inside 1500
 expect 0 - sdmgen fit --shape capsule wide.nrrd --rotation 0,0,0 --inside 1500,50 --outside -1000,50 --blur 0.6 --margin 0.9 -q
 for check in beside residuals outside; do has "^  $check +passed "; done
 
+# Blur nearly as wide as the tube: a fainter inside and a thicker tube explain the image as well, and the given value decides.
+expect 0 - sdmgen phantom --shape torus -O edge=0.5 --random-params --random-pose 5,0.3 --spacing 0.4 --blur 0.8 --seed 6 -o faint.nrrd --truth faint.json -q
+expect 0 - sdmgen fit --shape torus -O edge=0.5 faint.nrrd --rotation 0,0,0 --margin 3 --truth faint.json -q
+has '^  minor .* off by [01]\.[0-9] sd'
+
 # An ellipsoid that covers a torus and its hole: half of what lies deep inside is not labelled, which is no noise.
 cat >hole.yaml <<'END'
 experiment: {title: a torus fitted by an ellipsoid, seed: 6, pictures: no}

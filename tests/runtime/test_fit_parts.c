@@ -302,6 +302,36 @@ static void test_prior_of_parameters(void **state)
     }
 }
 
+// The mean values inside have Gaussians about those of the start; kept ones have none.
+static void test_prior_of_means(void **state)
+{
+    (void)state;
+    enum { N = 1, ALL = N + 7 + 3 };
+    sdm_fit_opts o = sdm_fit_defaults();
+    fit_problem p = {.opts = &o, .n_params = N, .low = {1}, .high = {4}};
+    o.prior_sd = 0;
+    o.appearance.n_inside = 2;
+    o.appearance.inside[0] = (sdm_fit_law){.weight = 0.5, .mean = 40, .sd = 170};
+    o.appearance.inside[1] = (sdm_fit_law){.weight = 0.5, .mean = 300, .sd = 50};
+    p.information.n_unknowns = ALL;
+    for (int k = 0; k < ALL; k++) p.prior_weight[k] = 1 + k;
+    fit_state s = {.appearance = o.appearance};
+    s.appearance.inside[0].mean = 500;
+    s.appearance.inside[1].mean = 275;
+    double gradient[ALL] = {0}, complete[ALL * ALL] = {0};
+    const double first = 9.0 * 460 / (170 * 170), second = 10.0 * 25 / (50 * 50),
+                 found = sdm_fit_prior(&p, &s, gradient, complete, NULL);
+    assert_true(fabs(found + 0.5 * (first * 460 + second * 25)) < 1e-9);
+    assert_true(fabs(gradient[8] + first) < 1e-12 && fabs(gradient[9] - second) < 1e-12);
+    assert_true(fabs(complete[8 * ALL + 8] - 9.0 / (170 * 170)) < 1e-15);
+    assert_true(gradient[10] == 0 && complete[10 * ALL + 10] == 0); // outside: none
+    assert_true(sdm_fit_has_prior(&p));
+    p.absent[0] = true;
+    assert_true(fabs(sdm_fit_prior(&p, &s, NULL, NULL, NULL) + 0.5 * second * 25) < 1e-9);
+    o.keep_appearance = true;
+    assert_true(sdm_fit_prior(&p, &s, NULL, NULL, NULL) == 0 && !sdm_fit_has_prior(&p));
+}
+
 static void test_gradient_matches_differences(void **state)
 {
     (void)state;
@@ -448,6 +478,7 @@ int main(void)
         cmocka_unit_test(test_information_of_gaussians),
         cmocka_unit_test(test_bounded_step),
         cmocka_unit_test(test_prior_of_parameters),
+        cmocka_unit_test(test_prior_of_means),
         cmocka_unit_test(test_gradient_matches_differences),
         cmocka_unit_test(test_anderson_converges_fast),
         cmocka_unit_test(test_a_wide_maximum_is_one),

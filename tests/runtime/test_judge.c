@@ -467,7 +467,7 @@ static void test_a_second_pose_is_refused(void **state)
     o.start_pose = POSE;
     o.polish_eps = 1e-4;
     o.appearance.n_outside = 1;
-    o.beside = 2;
+    o.beside = 2, o.margin = 2; // the image surely shows a capsule
     sdm_fit_result r;
     sdm_error err = {0};
     const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);

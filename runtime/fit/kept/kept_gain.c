@@ -24,7 +24,7 @@ sdm_status sdm_fit_free(fit_problem *p, const sdm_fit_opts *freed, double *gain,
                                     .eps = EPS,
                                     .max_flat = 2};
     fit_newton_end end;
-    double weight[FIT_PARAMS_MAX + 6], noise_factor;
+    double weight[FIT_UNKNOWNS_MAX], noise_factor;
     silent.progress = NULL;
     p->opts = &silent;
     sdm_status s = sdm_fit_newton(p, &newton, &end, err);

@@ -1,6 +1,7 @@
-/* Prior densities: Gaussians of the parameters, and of the pose about the start. A parameter with a
- * normal distribution has this distribution as its prior; its truncation is the bounds of the fit.
- * The others have a Gaussian about the middle of their range. */
+/* Prior densities: Gaussians of the parameters, of the pose about the start, and of the mean values
+ * inside about those of the start. A parameter with a normal distribution has this distribution as
+ * its prior; its truncation is the bounds of the fit. The others have a Gaussian about the middle
+ * of their range. */
 #include "prior.h"
 
 #include <math.h>
@@ -27,10 +28,16 @@ static void rotation_residual(const fit_problem *p, const fit_state *s, double w
     sdm_rotation_vector(r, w);
 }
 
+// whether mean values of tissues are unknowns of the fit
+static bool has_means(const fit_problem *p)
+{
+    return p->information.n_unknowns > fit_columns(p->n_params) && !p->opts->keep_appearance;
+}
+
 bool sdm_fit_has_prior(const fit_problem *p)
 {
     const sdm_fit_opts *o = p->opts;
-    return (!o->keep_params && o->prior_sd > 0) ||
+    return (!o->keep_params && o->prior_sd > 0) || has_means(p) ||
            (!o->keep_pose && (o->prior_rotation_sd > 0 || o->prior_translation_sd > 0));
 }
 
@@ -85,6 +92,17 @@ double sdm_fit_prior(const fit_problem *p, const fit_state *s, double *gradient,
             sum -= 0.5 * precision * residual * residual;
             normal_add(n, at, residual, precision, gradient, complete, observed);
         }
+    }
+    // mean values of the tissues inside: where blur is as wide as the shape is thick, no voxel
+    // shows them, and the data tell a higher value from a thicker shape hardly at all
+    for (size_t i = 0; i < s->appearance.n_inside && fit_columns(p->n_params) + i < n; i++) {
+        const size_t at = fit_columns(p->n_params) + i;
+        if (fit_mean_is_kept(p, at)) continue;
+        const sdm_fit_law *given = &o->appearance.inside[i];
+        const double precision = weight[at] / (given->sd * given->sd),
+                     residual = s->appearance.inside[i].mean - given->mean;
+        sum -= 0.5 * precision * residual * residual;
+        normal_add(n, at, residual, precision, gradient, complete, observed);
     }
     return sum;
 }

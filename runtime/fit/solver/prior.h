@@ -1,4 +1,4 @@
-/* Prior densities of the shape parameters and the pose. */
+/* Prior densities of the shape parameters, the pose and the mean values inside. */
 #pragma once
 
 #include "problem.h"

@@ -56,8 +56,8 @@ typedef struct fit_problem {
     sdm_distribution distribution[FIT_PARAMS_MAX];
     /* centre of the priors of rotation and translation; only the pose is used */
     fit_state prior;
-    /* [n_params + 6] factor >= 1 of each log prior, see sdm_fit_weigh_priors() */
-    double prior_weight[FIT_PARAMS_MAX + 6];
+    /* [n_unknowns] factor >= 1 of each log prior, see sdm_fit_weigh_priors() */
+    double prior_weight[FIT_UNKNOWNS_MAX];
     /* >= 1: number of correlated samples that carry as much information as one independent one */
     double noise_factor;
     /* where the start shape lies on its map */

@@ -98,7 +98,7 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
     // sd^2
     memset(spread, 0, n * n * sizeof *spread);
     (void)sdm_fit_prior(p, &p->state, NULL, spread, NULL);
-    for (size_t i = 0; i < size; i++) spread[i * (n + 1)] *= p->prior_weight[i];
+    for (size_t i = 0; i < n; i++) spread[i * (n + 1)] *= p->prior_weight[i];
     // add the noise of the samples and the error of the network
     const double model = out->model_error_mm * out->model_error_mm;
     for (size_t i = 0; i < n * n; i++)
@@ -141,10 +141,9 @@ sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *no
     if (!s) {
         double *influence = work + 3 * n * n;
         const bool known = sdm_fit_influence(p, false, influence, work);
-        for (size_t i = 0; i < p->n_params + 6; i++) weight[i] = 1;
+        for (size_t i = 0; i < n; i++) weight[i] = 1;
         for (size_t k = 0; k < m; k++) {
             const size_t i = list[k];
-            if (i >= p->n_params + 6) continue;
             const double ratio =
                 known ? sandwich(n, influence, scatter.noise, i, i) / influence[i * (n + 1)] : 0;
             weight[i] = known ? fmax(ratio, 1) : *noise_factor;

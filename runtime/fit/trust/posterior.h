@@ -16,7 +16,7 @@ sdm_status sdm_fit_posterior(fit_problem *p, sdm_fit_result *out, sdm_error *err
    data; 0 for exact maps. */
 double sdm_fit_network_error(const fit_problem *p);
 
-/* weight[n_params + 6]: factor of each log prior. The log-likelihood counts correlated samples as
+/* weight[n_unknowns]: factor of each log prior. The log-likelihood counts correlated samples as
    independent, so it is too sharp relative to a prior. To restore the balance, the log prior of
    each unknown is multiplied by the ratio of the sandwich variance to the variance for independent
    samples, at least 1 (magnitude adjustment, Pauli, Racugno and Ventura 2011); where the

@@ -149,7 +149,9 @@ typedef struct sdm_fit_opts {
     double blur;
     /* true: the blur is not estimated */
     bool keep_blur;
-    /* start values of the tissues */
+    /* start values of the tissues. Images with partial volume: the mean of each tissue inside also
+       has a normal prior about its start value, with the sd of the tissue. It counts where blur is
+       as wide as the shape is thick, so that no voxel shows the mean */
     sdm_fit_appearance appearance;
     /* true: the appearance is not estimated */
     bool keep_appearance;

@@ -41,6 +41,7 @@ static const char *const MEANINGS[SDM_FIT_N_CHECKS] = {
     [SDM_FIT_CHECK_COVERED] = "share of the surface without points",
     [SDM_FIT_CHECK_NETWORK_ERROR] = "move of a parameter by exact maps, in sd",
     [SDM_FIT_CHECK_KEPT_PARAMS] = "gain of free parameters",
+    [SDM_FIT_CHECK_OFFSET] = "mean distance of the surface of the data, mm",
 };
 
 /* What the figure of this check is in this fit; points have no material. */

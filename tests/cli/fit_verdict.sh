@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: the verdict with its reasons, wrong shapes that are refused, the mirror image of a shape.
-# Tests: fit_contrast.c fit_mirror.c fit_verdict.c
+# Tests: fit_contrast.c fit_mirror.c fit_verdict.c offset.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 
@@ -61,6 +61,19 @@ for square in 0.7 1; do
         has '^  residuals    doubtful  2\.[0-9]+, need at most 1\.[0-9]+: neighbourhoods of points lie 1\.[0-9] times as far off the surface as the scatter'
     fi
 done
+
+# Links of another thickness, which no parameter changes: nearly all of the surface lies inside or outside of the shape's.
+expect 0 - sdmgen phantom --shape linkage -O edge=0.5 -p q1=0.2 -p q2=0.4 --spacing 0.4 --seed 3 -o arm.nii --label arm-label.nii --surface arm.csv \
+    --surface-points 800 --surface-noise 0.05 --quiet
+arm='sdmgen fit --shape linkage -O edge=0.5 --rotation 0,0,0 --translation 0,0,0 --keep pose --quiet'
+expect 0 - $arm arm.csv
+has '^  offset       passed '
+expect 4 '^sdmgen: error: arm.csv: the surface of the points lies 0\.1[0-9] mm inside of .*: a wall or another size that is no parameter is thinner' \
+    $arm arm.csv -O radius=1 -O tip=0.7
+expect 0 - $arm arm.csv -O radius=1 -O tip=0.7 --tolerance 0.2
+has '^  offset       doubtful '
+expect 4 '^sdmgen: error: arm-label.nii: the surface of the labels lies 0\.1[0-9] mm inside of ' \
+    $arm arm-label.nii --label 1 --spacing 0.4 -O radius=1 -O tip=0.7
 
 # Maps too coarse for the point spread: the advised voxel passes its own check.
 expect 0 - sdmgen phantom --shape ellipsoid -p rx=4.5 -p ry=3.5 -p rz=3 --spacing 0.5 --blur 0.22 --seed 2 -o sharp.nii --quiet

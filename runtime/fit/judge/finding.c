@@ -32,7 +32,8 @@ const char *sdm_fit_check_name(sdm_fit_check_kind kind)
                                                         [SDM_FIT_CHECK_COVERED] = "covered",
                                                         [SDM_FIT_CHECK_NETWORK_ERROR] =
                                                             "network bias",
-                                                        [SDM_FIT_CHECK_KEPT_PARAMS] = "kept value"};
+                                                        [SDM_FIT_CHECK_KEPT_PARAMS] = "kept value",
+                                                        [SDM_FIT_CHECK_OFFSET] = "offset"};
     return kind >= 0 && kind < SDM_FIT_N_CHECKS ? names[kind] : NULL;
 }
 

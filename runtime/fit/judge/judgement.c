@@ -12,6 +12,7 @@
 #include "coverage.h"
 #include "far_labels.h"
 #include "finding.h"
+#include "offset.h"
 #include "rival.h"
 #include "sdm/internal/shared.h"
 #include "suffice.h"
@@ -426,6 +427,8 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     if (!s && points && !has_passed(v, SDM_FIT_CHECK_PATCH))
         s = sdm_fit_measure_beyond(p, r, &bounds, err);
     if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
+    if (!s && (points || p->given_labels) && !p->is_rival && v->grade != SDM_FIT_FAILED)
+        s = sdm_fit_check_offset(p, v, err);
     if (!s) check_bounds(p, &misfit, &bounds, r, v);
     if (!s) sdm_fit_check_voxels(p, coarse, r);
     if (!s && labels) sdm_fit_check_labels(p, v);

@@ -357,6 +357,10 @@ typedef enum sdm_fit_check_kind {
        independent samples; doubtful above 8; failed above 20 where the surface moves by more than
        half a voxel of the maps */
     SDM_FIT_CHECK_KEPT_PARAMS,
+    /* labels, points: by how far the surface of the data lies outside of the shape's, or inside,
+       on average, mm: another thickness than the shape says. Left out where the parameters can
+       explain it, and where a check failed */
+    SDM_FIT_CHECK_OFFSET,
     SDM_FIT_N_CHECKS
 } sdm_fit_check_kind;
 

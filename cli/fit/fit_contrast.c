@@ -101,9 +101,10 @@ static void name_exchange(cli_fit *f, double a, double b, bool fitted)
     else
         snprintf(shown, sizeof shown,
                  "at the start the image is %.4g within the shape and %.4g around it", a, b);
-    snprintf(why.text, sizeof why.text,
-             "the values of the inside and the outside are exchanged: %s, but the inside %s %.4g "
-             "and the outside %.4g: %s",
+    snprintf(why.text, sizeof why.text, "%s: %s, but the inside %s %.4g and the outside %.4g: %s",
+             given ? "the values of the inside and the outside are exchanged"
+                   : "no values of the tissues were given, and the default ones do not suit this "
+                     "image",
              shown, given ? "was given as" : "has the default value", inside, outside,
              given ? "exchange --inside and --outside"
                    : "give the values of this image with --inside and --outside");

@@ -230,7 +230,7 @@ expect 4 'constant.nii: the image shows nothing: every voxel is 7' sdmgen fit $f
 expect 0 'have the same mean' sdmgen phantom $shape $truth $turned --spacing 0.5 $calm -o empty.nii
 expect 4 'empty.nii: the image shows no such shape|empty.nii: .*(not converged|left the image)' sdmgen fit $fit empty.nii $near_truth -o no.stl -o no.json -o no.png
 expect 0 - sdmgen phantom $shape $truth $turned --spacing 0.5 --inside 1300,225 --outside 40,80 -o bright.nii
-expect 4 'bright.nii: the values of the inside and the outside are exchanged: at the start .* but the inside has the default value 40 and the outside 1300: give the values of this image with --inside and --outside' sdmgen fit $fit bright.nii $near_truth -o no.stl --label-out no.nrrd
+expect 4 'bright.nii: no values of the tissues were given, and the default ones do not suit this image: at the start .* but the inside has the default value 40 and the outside 1300: give the values of this image with --inside and --outside' sdmgen fit $fit bright.nii $near_truth -o no.stl --label-out no.nrrd
 expect 0 - sdmgen fit $fit bright.nii $near_truth --inside 1300,250 --outside 40,150 --json
 within rx 3.5 4
 expect 4 'not converged after 1 iterations.*; --max-iterations 1 ended it too early to judge the fit.*; no file was written' sdmgen fit $fit ct.nii.gz $near_truth --max-iterations 1 -o no.stl ${vdb:+-o no.vdb}

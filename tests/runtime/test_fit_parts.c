@@ -1,7 +1,7 @@
 /* Parts of the fit: derivatives against differences, bounded steps, averaged gradient, Anderson
  * acceleration, maxima.
- * Tests: anderson.c averaged_gradient.c averaged_maps.c map_fields.c newton.c objective.c
- * same_maximum.c solve.c unknowns_cost.c */
+ * Tests: anderson.c averaged_gradient.c averaged_maps.c map_fields.c newton.c objective.c rival.c
+ * solve.c unknowns_cost.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,7 +13,7 @@
 #include <cmocka.h>
 
 #include "fit/data/observation.h"
-#include "fit/judge/same_maximum.h"
+#include "fit/judge/rival.h"
 #include "fit/judge/unknowns_cost.h"
 #include "fit/solver/anderson.h"
 #include "fit/solver/averaged_gradient.h"

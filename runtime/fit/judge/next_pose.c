@@ -16,7 +16,6 @@
 #include "fit/start/start_search.h"
 #include "fit/start/turn_set.h"
 #include "rival.h"
-#include "same_maximum.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/internal/rotation.h"

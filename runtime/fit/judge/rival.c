@@ -4,12 +4,15 @@
 
 #include <math.h>
 
+#include "finding.h"
 #include "residuals.h"
 
 // a chi-square is at least this: residuals without any noise
 #define CHI_SQUARE_MIN 1e-3
 // of points that a rival takes for strays
 #define CHI_SQUARE_STRAY 9.0
+// loss of log-likelihood, below the worse one of the two, that is no valley
+#define VALLEY 0.5
 
 bool sdm_fit_is_image(const fit_problem *p)
 {
@@ -47,4 +50,23 @@ double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival)
         rival->n_points < fit->n_points ? (double)rival->n_points / (double)fit->n_points : 1;
     return sdm_fit_units_gain(0.5 * (double)(fit->n_units + rival->n_units), fit->chi_square,
                               kept * rival->chi_square + (1 - kept) * CHI_SQUARE_STRAY);
+}
+
+bool sdm_fit_same_maximum(const fit_problem *p, const fit_standing *fit, const double *field,
+                          const fit_standing *rival)
+{
+    const fit_samples *s = &p->samples;
+    if (!p->maps.share || !(fit->factor > 0)) return false;
+    if (!(fabs(sdm_fit_gain(fit, rival)) < SDM_FIT_PREFERRED)) return false;
+    fit_standing between = {.factor = fit->factor};
+    for (size_t i = 0; i < s->n; i++) {
+        fit_likelihood l;
+        sdm_fit_likelihood(&p->observation, (double)s->value[i], fit_sample_weights(s, i),
+                           0.5 * (field[i] + s->field[i]), false, &l);
+        between.log_likelihood += l.log_likelihood;
+    }
+    const double below_fit = sdm_fit_gain(fit, &between),
+                 below_rival = sdm_fit_gain(rival, &between);
+    // much better half-way: the image shows both, or the truth between them
+    return fmin(below_fit, below_rival) < VALLEY && below_fit > -SDM_FIT_PREFERRED;
 }

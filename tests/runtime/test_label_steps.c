@@ -1,7 +1,7 @@
 /* Deviations of fits to labels of a box whose faces are parallel to the voxels, or nearly: the
  * labels show each face to a voxel only, however many voxels the face has; and of a rod along an
- * axis of the voxels, whose wall may err alike on all sides. Tests: label_steps.c, matching_steps.c
- */
+ * axis of the voxels, whose wall may err alike on all sides. A bracket along the voxels, whose
+ * right fit is accepted. Tests: label_steps.c matching_steps.c misfit.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -233,11 +233,90 @@ static void test_pieces_that_match(void **state)
     assert_float_equal(missing_variance((double[4]){0, 0, 0.5, 0.5}), 1, 1e-12);
 }
 
+// ---- rivals
+
+enum { THICK = 4 };
+static const sdm_param bracket_params[EDGES] = {{"length", "mm", 30, 60, 45, "along x"},
+                                                {"width", "mm", 20, 40, 30, "along y"},
+                                                {"up", "mm", 10, 40, 25, "along z"}};
+
+// the corners of the lying plate, and of the standing one
+static void bracket_corners(const double *p, double low[2][3], double high[2][3])
+{
+    const double x = 0.5 * p[0], y = 0.5 * p[1], z = 0.5 * THICK;
+    memcpy(low, (const double[2][3]){{-x, -y, -z}, {-x, -y, -z}}, 6 * sizeof x);
+    memcpy(high, (const double[2][3]){{x, y, z}, {THICK - x, y, p[2]}}, 6 * sizeof x);
+}
+
+static int bracket_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                        const double *p, sdm_mesh_out *out)
+{
+    double low[2][3], high[2][3];
+    sdm_mesh m = {0}, standing = {0};
+    (void)self, (void)options;
+    bracket_corners(p, low, high);
+    mesh_box(&m, low[0], high[0]);
+    mesh_box(&standing, low[1], high[1]);
+    mesh_append(&m, &standing);
+    const int failed = host->reserve(host, out, m.n_vert, m.n_tri);
+    if (!failed) memcpy(out->vert, m.vert, 3 * m.n_vert * sizeof *m.vert);
+    if (!failed) memcpy(out->tri, m.tri, 3 * m.n_tri * sizeof *m.tri);
+    sdm_mesh_dispose(&m);
+    sdm_mesh_dispose(&standing);
+    return failed;
+}
+
+static const sdm_shape bracket = {.abi = SDM_SHAPE_ABI,
+                                  .size = sizeof(sdm_shape),
+                                  .name = "bracket",
+                                  .summary = "two plates",
+                                  .params = bracket_params,
+                                  .n_params = EDGES,
+                                  .mesh = bracket_mesh};
+
+// All faces lie between the same layers of voxels, which the labels show as one step: another width
+// and pose, which the steps favour, are no better fit.
+static void test_steps_favour_no_rival(void **state)
+{
+    (void)state;
+    const double truth[EDGES] = {46.3, 29.1, 24.7};
+    enum { NX = 39, NY = 27, NZ = 25 };
+    static float v[NX * NY * NZ];
+    double low[2][3], high[2][3];
+    sdm_instance *shape = NULL;
+    if (sdm_instance_create(&bracket, NULL, 0, NULL, &shape, NULL)) abort();
+    bracket_corners(truth, low, high);
+    const sdm_grid g = sdm_grid_centred((int64_t[3]){NX, NY, NZ}, 1.5, (double[3]){0, 0, 11.35});
+    for (size_t n = 0; n < NX * NY * NZ; n++) {
+        const double index[3] = {(double)(n % NX), (double)(n / NX % NY), (double)(n / (NX * NY))};
+        double x[3];
+        sdm_grid_world(&g, index, x);
+        for (int part = 0; part < 2; part++) {
+            bool in = true;
+            for (int d = 0; d < 3; d++) in = in && x[d] > low[part][d] && x[d] < high[part][d];
+            if (in) v[n] = 1;
+        }
+    }
+    const sdm_fit_source source = {
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){60, 42, 50}, 1.14, (double[3]){0, 0, 11})};
+    const sdm_fit_target t = {.kind = SDM_FIT_LABEL, .grid = g, .values = v};
+    const sdm_fit_opts o = sdm_fit_defaults_for(1.5);
+    sdm_fit_result r;
+    sdm_error err = {0};
+    if (sdm_fit(&source, &t, &o, &r, &err)) fail_msg("%s", err.text);
+    for (size_t k = 0; k < EDGES; k++) assert_true(fabs(r.params[k] - truth[k]) < 3 * r.sd[k]);
+    sdm_fit_dispose(&r);
+    sdm_instance_free(shape);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_pieces_that_match), cmocka_unit_test(test_rod_along_an_axis),
-        cmocka_unit_test(test_faces_parallel_to_the_voxels),
-        cmocka_unit_test(test_faces_nearly_parallel), cmocka_unit_test(test_oblique_faces)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_pieces_that_match),
+                                       cmocka_unit_test(test_rod_along_an_axis),
+                                       cmocka_unit_test(test_faces_parallel_to_the_voxels),
+                                       cmocka_unit_test(test_faces_nearly_parallel),
+                                       cmocka_unit_test(test_oblique_faces),
+                                       cmocka_unit_test(test_steps_favour_no_rival)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

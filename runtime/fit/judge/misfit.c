@@ -79,8 +79,8 @@ static double mean_correlation(const fit_residuals *r, const member *m, size_t n
     return pairs > 0 ? sum / pairs : 0;
 }
 
-/* Mean of the residuals of a unit; its variance by noise, and by noise and errors of the maps; mean
- * of the expected shares. */
+/* Mean of the residuals of a unit; its variance by noise (with the steps of labels), and by noise
+ * and errors of the maps; mean of the expected shares. */
 typedef struct unit_mean {
     double mean, noise, variance, expected;
 } unit_mean;
@@ -113,10 +113,9 @@ static unit_mean unit_measure(const fit_residuals *r, const member *m, size_t n,
         variance += r->sd[m[k].sample] * r->sd[m[k].sample];
     }
     const double one = 1 / (double)n, shared = (1 - one) * mean_correlation(r, m, n);
-    const double noise = variance * one * (one + shared) + least * least,
-                 steps = unit_steps(r, m, n);
-    return (unit_mean){sum * one, noise, noise + maps * one * maps * one + steps * steps,
-                       expected * one};
+    const double steps = unit_steps(r, m, n),
+                 noise = variance * one * (one + shared) + least * least + steps * steps;
+    return (unit_mean){sum * one, noise, noise + maps * one * maps * one, expected * one};
 }
 
 // The share of a unit that the data contradict. At most the expected share can be empty: a value

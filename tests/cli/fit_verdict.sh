@@ -106,6 +106,8 @@ for check in beside residuals outside; do has "^  $check +passed "; done
 expect 0 - sdmgen phantom --shape torus -O edge=0.5 --random-params --random-pose 5,0.3 --spacing 0.4 --blur 0.8 --seed 6 -o faint.nrrd --truth faint.json -q
 expect 0 - sdmgen fit --shape torus -O edge=0.5 faint.nrrd --rotation 0,0,0 --margin 3 --truth faint.json -q
 has '^  minor .* off by [01]\.[0-9] sd'
+expect 4 '^sdmgen: error: faint.nrrd: .*the blur hides the background within the margin: give a margin of four times the point spread' \
+    sdmgen fit --shape torus -O edge=0.5 faint.nrrd --rotation 0,0,0 --margin 0.6 -q
 
 # An ellipsoid that covers a torus and its hole: half of what lies deep inside is not labelled, which is no noise.
 cat >hole.yaml <<'END'

@@ -49,6 +49,9 @@
 // largest change of a parameter by exact maps, in standard deviations, that is not told
 #define NETWORK_ERROR_MAX 1.0
 
+// voxels nearer to the surface than this multiple of the point spread hardly show the background
+#define MARGIN_OVER_BLUR 4.0
+
 // the tissue with the largest weight
 static const sdm_fit_law *main_law(const sdm_fit_law *law, size_t n)
 {
@@ -85,9 +88,13 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
             v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > SDM_FIT_PREFERRED, SDM_FIT_FAILED, r->evidence,
             SDM_FIT_PREFERRED,
             "the image shows no such shape near the start: explaining it without one is %s by %.3g "
-            "(log-likelihood of independent voxels); check the start pose, whether the inside is "
+            "(log-likelihood of independent voxels); %scheck the start pose, whether the inside is "
             "%s than the outside in this image, and whether it shows this shape at all",
             r->evidence < 0 ? "better" : "worse only", fabs(r->evidence),
+            r->blur * MARGIN_OVER_BLUR > o->margin
+                ? "the blur hides the background within the margin: give a margin of four times the "
+                  "point spread (sdm_fit_opts.margin), or "
+                : "",
             darker ? "darker" : "brighter");
         sdm_fit_judge_add(
             v, SDM_FIT_CHECK_CONTRAST, (in < out) == darker, SDM_FIT_FAILED, in - out, 0,

@@ -91,10 +91,10 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
             "(log-likelihood of independent voxels); %scheck the start pose, whether the inside is "
             "%s than the outside in this image, and whether it shows this shape at all",
             r->evidence < 0 ? "better" : "worse only", fabs(r->evidence),
-            r->blur * MARGIN_OVER_BLUR > o->margin
-                ? "the blur hides the background within the margin: give a margin of four times the "
-                  "point spread (sdm_fit_opts.margin), or "
-                : "",
+            r->blur * MARGIN_OVER_BLUR > o->margin ? "the blur hides the background within the "
+                                                     "margin: give a margin of four times the "
+                                                     "point spread (sdm_fit_opts.margin), or "
+                                                   : "",
             darker ? "darker" : "brighter");
         sdm_fit_judge_add(
             v, SDM_FIT_CHECK_CONTRAST, (in < out) == darker, SDM_FIT_FAILED, in - out, 0,

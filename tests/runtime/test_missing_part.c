@@ -1,10 +1,12 @@
 /* A flask whose points lack the neck: the length of the neck is not determined, whatever the start,
- * and the verdict names it; with the points of the neck it is determined.
- * Tests: flat_params.c coverage.c */
+ * and the verdict names it; with the points of the neck it is determined. A cup whose wall is
+ * thinner than the voxels has points all over, or none on its base. Tests: flat_params.c coverage.c
+ * surface_places.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -108,9 +110,93 @@ static void test_neck_with_points(void **state)
     sdm_fit_dispose(&r);
 }
 
+enum { RIM, DEPTH, CUP_PARAMS };
+static const sdm_param cup_params[CUP_PARAMS] = {{"rim", "mm", 1.5, 3, 2.2, "radius of the rim"},
+                                                 {"depth", "mm", 2, 6, 3.5, "outside"}};
+static const double WALL = 0.3;
+
+/* Outside from the base to the rim, then inside from the rim to the floor. */
+static void cup_ring(const double *p, int i, double *r, double *z)
+{
+    const double inner = i < 2 ? 0 : WALL;
+    *r = (i == 0 || i == 3 ? 0.8 : 1) * p[RIM] - inner;
+    *z = i == 0 ? 0 : i == 3 ? WALL : p[DEPTH];
+}
+
+static int cup_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    return revolved_mesh(host, out, 4, AROUND, cup_ring, p, 0, WALL);
+}
+
+static const sdm_shape cup = {.abi = SDM_SHAPE_ABI,
+                              .size = sizeof(sdm_shape),
+                              .name = "cup",
+                              .summary = "a cup with a thin wall",
+                              .params = cup_params,
+                              .n_params = CUP_PARAMS,
+                              .mesh = cup_mesh};
+
+/* Fits points of a cup, errors 0.02 mm, with maps whose voxels are longer than its wall is thick;
+ * without those where x > most. */
+static sdm_fit_result fit_cup(double most)
+{
+    enum { N = 2400 };
+    const double truth[CUP_PARAMS] = {2, 4}, from[CUP_PARAMS] = {2.1, 3.8};
+    sdm_instance *shape = NULL;
+    sdm_mesh m = {0};
+    double x[3 * N];
+    size_t n = 0;
+    assert_int_equal(sdm_instance_create(&cup, NULL, 0, NULL, &shape, NULL), SDM_OK);
+    assert_int_equal(sdm_instance_mesh(shape, truth, &m, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_surface_points(&m, N, 2, x, NULL), SDM_OK);
+    for (size_t i = 0; i < N; i++) {
+        if (x[3 * i] > most) continue;
+        for (size_t k = 0; k < 3; k++) x[3 * n + k] = x[3 * i + k] + 0.02 * sdm_rng_normal(1, k, i);
+        n++;
+    }
+    const sdm_fit_source source = {
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){20, 20, 20}, 0.37, (double[3]){0, 0, 2})};
+    const sdm_fit_target target = {.kind = SDM_FIT_POINTS, .points = x, .n_points = n};
+    sdm_fit_opts o = sdm_fit_defaults();
+    o.start_params = from;
+    o.n_threads = 2;
+    sdm_fit_result r;
+    sdm_error err = {0};
+    if (sdm_fit(&source, &target, &o, &r, &err)) fail_msg("%s", err.text);
+    for (size_t k = 0; k < CUP_PARAMS; k++)
+        if (!(fabs(r.params[k] - truth[k]) < 0.02)) fail_msg("%zu: %g", k, r.params[k]);
+    sdm_mesh_dispose(&m);
+    sdm_instance_free(shape);
+    return r;
+}
+
+// The places that have no points lie on the surface itself, not where a coarse map takes it to be.
+static void test_thin_wall(void **state)
+{
+    (void)state;
+    sdm_fit_result r = fit_cup(INFINITY);
+    assert_string_equal(text_of_covered(&r), "");
+    sdm_fit_dispose(&r);
+    r = fit_cup(1.2);
+    const char *text = text_of_covered(&r), *place = strstr(text, "in the shape's frame (");
+    double x[3] = {0};
+    if (!place || sscanf(place, "in the shape's frame (%lg, %lg, %lg)", x, x + 1, x + 2) != 3)
+        fail_msg("%s", text);
+    const double radius = hypot(x[0], x[1]), outside = 1.6 + 0.1 * x[2],
+                 inside = 1.3 + 0.4 * (x[2] - WALL) / (4 - WALL);
+    // a side of the polygon lies up to 0.02 mm nearer to the axis than its corners
+    if (!(x[0] > 1.2 && fmin(fabs(radius - outside), fabs(radius - inside)) < 0.03))
+        fail_msg("%s", text);
+    sdm_fit_dispose(&r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_neck_without_points),
-                                       cmocka_unit_test(test_neck_with_points)};
+                                       cmocka_unit_test(test_neck_with_points),
+                                       cmocka_unit_test(test_thin_wall)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

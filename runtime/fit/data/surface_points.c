@@ -1,4 +1,7 @@
-/* Points on the surface of a mesh, for a fit to the mesh. */
+/* Points on the surface of a mesh, for a fit to the mesh, and for a fit that is judged by its
+   surface. */
+#include "surface_points.h"
+
 #include <math.h>
 
 #include "sdm/exact.h"
@@ -6,8 +9,9 @@
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
-// the golden ratio less 1: its multiples fill 0 .. 1 evenly (Weyl 1916)
-#define GOLDEN 0.61803398874989485
+// the middle of each share; across triangles the golden ratio less 1: its multiples fill 0 .. 1
+// evenly (Weyl 1916)
+static const double MIDDLE[2] = {0, 0.61803398874989485};
 
 static double triangle_area(const sdm_mesh *m, size_t t)
 {
@@ -30,23 +34,35 @@ static void triangle_point(const sdm_mesh *m, size_t t, double u, double v, doub
     for (int k = 0; k < 3; k++) x[k] = wa * a[k] + wb * b[k] + wc * c[k];
 }
 
-// Point i lies at the share (i + 1/2) / n of the area, counted over the triangles in their order:
-// each triangle has its share of the points to within one. Its place within the triangle comes from
-// what is left of this share and from a multiple of the golden ratio.
-static void points_spread(const sdm_mesh *m, double area, size_t n, double *points)
+static double fraction(double x) { return x - floor(x); }
+
+// Point i lies within the i-th of n equal shares of the area, counted over the triangles in their
+// order: each triangle has its share of the points to within one. Its place within the triangle
+// comes from what is left of this share and from a multiple of turn[1].
+static void points_spread(const sdm_mesh *m, double area, size_t n, const double turn[2],
+                          double *points, uint32_t *triangle)
 {
     double before = 0, own = triangle_area(m, 0);
     size_t t = 0;
     for (size_t i = 0; i < n; i++) {
-        const double at = area * ((double)i + 0.5) / (double)n;
+        const double at = area * ((double)i + fraction(0.5 + turn[0] * (double)i)) / (double)n;
         while (at > before + own && t + 1 < m->n_tri) {
             before += own;
             own = triangle_area(m, ++t);
         }
         const double u = own > 0 ? fmin(fmax((at - before) / own, 0), 1) : 0;
-        const double turn = GOLDEN * (double)i;
-        triangle_point(m, t, u, turn - floor(turn), points + 3 * i);
+        triangle_point(m, t, u, fraction(turn[1] * (double)i), points + 3 * i);
+        if (triangle) triangle[i] = (uint32_t)t;
     }
+}
+
+double sdm_fit_spread_over(const sdm_mesh *m, size_t n, const double turn[2], double *points,
+                           uint32_t *triangle)
+{
+    double area = 0;
+    for (size_t t = 0; t < m->n_tri; t++) area += triangle_area(m, t);
+    if (area > 0 && isfinite(area)) points_spread(m, area, n, turn, points, triangle);
+    return area;
 }
 
 sdm_status sdm_fit_surface_points(const sdm_mesh *mesh, size_t n, int n_threads, double *points,
@@ -56,10 +72,7 @@ sdm_status sdm_fit_surface_points(const sdm_mesh *mesh, size_t n, int n_threads,
     sdm_exact *engine = NULL;
     const sdm_status s = sdm_exact_create(mesh, &opts, &engine, err);
     if (s) return s;
-    const sdm_mesh *surface = sdm_exact_surface(engine);
-    double area = 0;
-    for (size_t t = 0; t < surface->n_tri; t++) area += triangle_area(surface, t);
-    if (area > 0 && isfinite(area)) points_spread(surface, area, n, points);
+    const double area = sdm_fit_spread_over(sdm_exact_surface(engine), n, MIDDLE, points, NULL);
     sdm_exact_free(engine);
     if (area > 0 && isfinite(area)) return SDM_OK;
     return sdm_fail(err, SDM_E_MESH, "the surface of the mesh has the area %g mm^2", area);

@@ -12,6 +12,7 @@
 
 #include "finding.h"
 #include "fit/data/source_params.h"
+#include "fit/data/surface_places.h"
 #include "fit/solver/prior.h"
 #include "noise.h"
 #include "sdm/internal/heap.h"
@@ -20,6 +21,8 @@
 
 // points and places of the surface that are compared; of more, every second, third ... one
 #define MOST 2000
+// the golden ratio less 1: its multiples fill 0 .. 1 evenly
+#define GOLDEN 0.61803398874989485
 // neighbours that define the spacing of points, and that show whether points form a layer
 #define FEW 4
 #define MANY 10
@@ -140,12 +143,11 @@ static patches find_patches(const cloud *strays, double spacing)
 static void judge_patches(const fit_problem *p, const patches *found, size_t n_points, double stray,
                           double bare, sdm_fit_verdict *v)
 {
-    const fit_field field = sdm_fit_maps_distances(&p->maps);
     const double share = (double)found->n / (double)n_points,
                  most = fmax(p->opts->tolerance, PATCH_MAX),
                  refused = bare > UNCOVERED_MAX ? fmin(PATCH_MAX_UNCOVERED, most) : most,
                  limit = fmax(fmax(p->opts->tolerance, PATCH_DOUBTFUL), BY_CHANCE * stray),
-                 *x = found->world, d = sdm_fit_field_at(&field, &p->state, x);
+                 *x = found->world, d = sdm_fit_maps_at(&p->maps, &p->state, x);
     char place[FIT_PLACE_NAME];
     sdm_fit_judge_add(v, SDM_FIT_CHECK_PATCH, share <= fmin(limit, refused),
                       share > refused ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, share,
@@ -158,58 +160,33 @@ static void judge_patches(const fit_problem *p, const patches *found, size_t n_p
                       d < 0 ? "inside" : "outside", refused);
 }
 
-/* Splits points into those on the surface and strays, at most MOST in all. */
+/* Splits points into those on the surface and strays, at most MOST in all: of `step` points that
+   follow each other one, not always the same, since points in the order of a scan or of triangles
+   would leave stripes bare. */
 static void split_points(const fit_problem *p, cloud *on, cloud *strays)
 {
     const size_t step = (p->samples.n + MOST - 1) / MOST;
-    for (size_t i = 0; i < p->samples.n; i += step) {
+    for (size_t first = 0, number = 0; first < p->samples.n; first += step, number++) {
+        const double turn = GOLDEN * (double)number;
+        const size_t i = first + (size_t)((turn - floor(turn)) * (double)step);
+        if (i >= p->samples.n) break;
         cloud *c = sdm_fit_point_belongs(&p->observation, p->samples.field[i]) < 0.5 ? strays : on;
         for (size_t a = 0; a < 3; a++) c->x[c->n][a] = p->samples.world[3 * i + a];
         c->n++;
     }
 }
 
-/* Places on the fitted surface in the world, one for a voxel that it passes, at most MOST;
-   voxel[MOST + 1]: the voxel of each. */
-static sdm_status surface_places(const fit_problem *p, cloud *out, size_t *voxel, sdm_error *err)
-{
-    const sdm_grid *g = &p->maps.grid;
-    const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]};
-    const double *d = p->maps.distance, half = 0.5 * fit_longest_edge(g);
-    size_t all = 0, number = 0;
-    for (size_t v = 0; v < p->maps.n_voxels; v++) all += fabs(d[v]) <= half;
-    const size_t each = (all + MOST - 1) / MOST;
-    const sdm_status s = SDM_ALLOC(&out->x, MOST + 1, "places of the surface", err);
-    for (int64_t k = 1; k + 1 < g->n[2] && !s; k++)
-        for (int64_t j = 1; j + 1 < g->n[1]; j++)
-            for (int64_t i = 1; i + 1 < g->n[0]; i++) {
-                const int64_t v = k * step[2] + j * step[1] + i;
-                double index[3] = {(double)i, (double)j, (double)k}, slope[3], square = 0, y[3];
-                if (!(fabs(d[v]) <= half) || number++ % each) continue;
-                for (int a = 0; a < 3; a++) {
-                    slope[a] = (d[v + step[a]] - d[v - step[a]]) / (2 * g->spacing[a]);
-                    square += slope[a] * slope[a];
-                }
-                for (int a = 0; a < 3 && square > 0; a++)
-                    index[a] -= d[v] * slope[a] / (square * g->spacing[a]);
-                sdm_grid_world(g, index, y);
-                voxel[out->n] = (size_t)v;
-                sdm_fit_to_world(&p->state, y, out->x[out->n++]);
-            }
-    return s;
-}
-
 /* bare[i]: place i of the surface has no points within REACH times the spacing. Strays count: they
    may lie on the surface of another shape that touches this one. Returns the share of such places.
  */
-static double find_bare(const cloud *surface, const cloud *on, const cloud *strays, double reach,
-                        bool *bare)
+static double find_bare(const fit_places *surface, const cloud *on, const cloud *strays,
+                        double reach, bool *bare)
 {
     size_t n = 0, number;
     for (size_t i = 0; i < surface->n; i++) {
         double d2[2];
-        find_nearest(on, surface->x[i], SIZE_MAX, 1, &d2[0], &number);
-        find_nearest(strays, surface->x[i], SIZE_MAX, 1, &d2[1], &number);
+        find_nearest(on, surface->world[i], SIZE_MAX, 1, &d2[0], &number);
+        find_nearest(strays, surface->world[i], SIZE_MAX, 1, &d2[1], &number);
         bare[i] = fmin(d2[0], d2[1]) > reach * reach;
         n += bare[i];
     }
@@ -218,19 +195,19 @@ static double find_bare(const cloud *surface, const cloud *on, const cloud *stra
 
 /* The part of the surface without points: of its places, the one nearest to their mean. NULL: all
  * of the surface has points. */
-static const double *middle_of_bare(const cloud *surface, const bool *bare)
+static const double *middle_of_bare(const fit_places *surface, const bool *bare)
 {
     double mean[3] = {0}, nearest = INFINITY;
     const double *middle = NULL;
     size_t n = 0;
     for (size_t i = 0; i < surface->n; i++) {
-        for (int a = 0; a < 3 && bare[i]; a++) mean[a] += surface->x[i][a];
+        for (int a = 0; a < 3 && bare[i]; a++) mean[a] += surface->world[i][a];
         n += bare[i];
     }
     for (int a = 0; a < 3 && n; a++) mean[a] /= (double)n;
     for (size_t i = 0; i < surface->n; i++) {
-        const double d2 = v3_dist2(surface->x[i], mean);
-        if (bare[i] && d2 < nearest) nearest = d2, middle = surface->x[i];
+        const double d2 = v3_dist2(surface->world[i], mean);
+        if (bare[i] && d2 < nearest) nearest = d2, middle = surface->world[i];
     }
     return middle;
 }
@@ -238,20 +215,19 @@ static const double *middle_of_bare(const cloud *surface, const bool *bare)
 /* Names the parameters that the points hardly determine and that move a surface which has no
    points: text[size]. Returns the largest share of such a surface without points; 0: there is none.
  */
-static double name_unseen(const fit_problem *p, const sdm_fit_result *r, size_t n_places,
-                          const size_t *voxel, const bool *bare, char *text, size_t size)
+static double name_unseen(const fit_problem *p, const sdm_fit_result *r, const fit_places *surface,
+                          const bool *bare, char *text, size_t size)
 {
-    const fit_maps *m = &p->maps;
-    const double edge = fit_longest_edge(&m->grid);
+    const double edge = fit_longest_edge(&p->maps.grid);
     double most = 0;
     *text = '\0';
-    for (size_t k = 0; k < p->n_params && m->jacobian; k++) {
+    for (size_t k = 0; k < p->n_params; k++) {
         double all = 0, unseen = 0, fastest = 0, low, high;
         const double sd = sdm_fit_prior_sd(p, k);
         const char *name = "";
         if (fit_param_is_kept(p, k) || !(r->sd[k] > HARDLY_KNOWN * sd)) continue;
-        for (size_t i = 0; i < n_places; i++) {
-            const double by = (double)m->jacobian[k * m->n_voxels + voxel[i]];
+        for (size_t i = 0; i < surface->n; i++) {
+            const double by = surface->by[i * p->n_params + k];
             all += by * by;
             unseen += bare[i] ? by * by : 0;
             fastest = fmax(fastest, fabs(by));
@@ -275,20 +251,19 @@ static double share_at_bounds(const fit_problem *p)
     return p->n_params ? (double)at / (double)p->n_params : 0;
 }
 
-sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v,
-                                  sdm_error *err)
+sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
+                                  fit_coarseness coarse, sdm_fit_verdict *v, sdm_error *err)
 {
-    cloud on = {0}, strays = {0}, surface = {0};
-    size_t *voxel = NULL;
+    cloud on = {0}, strays = {0};
+    fit_places surface = {0};
     bool *bare_at = NULL;
     double spacing = 0;
     sdm_status s = SDM_ALLOC(&on.x, MOST + 1, "points of the fit", err);
     if (!s) s = SDM_ALLOC(&strays.x, MOST + 1, "points of the fit", err);
-    if (!s) s = SDM_ALLOC(&voxel, MOST + 1, "places of the surface", err);
     if (!s) s = SDM_ALLOC(&bare_at, MOST + 1, "places of the surface", err);
     if (!s) split_points(p, &on, &strays);
     if (!s && on.n > MANY) s = find_spacing(&on, &spacing, err);
-    if (!s && on.n > MANY) s = surface_places(p, &surface, voxel, err);
+    if (!s && on.n > MANY) s = sdm_fit_places_create(&p->maps, &p->state, MOST, &surface, err);
     if (!s && spacing > 0) {
         const patches found = find_patches(&strays, spacing);
         const double sd = p->state.point_sd,
@@ -297,14 +272,19 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
         const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
         judge_patches(p, &found, on.n + strays.n, stray, bare, v);
-        char names[200], unseen_text[300] = "", astray[80] = "";
+        char names[200], unseen_text[300] = "", astray[80] = "", beside[90] = "";
+        const double voxel = fit_longest_edge(&p->maps.grid);
         char place[FIT_PLACE_NAME] = "";
         const double *middle = grown || other ? NULL : middle_of_bare(&surface, bare_at);
         if (middle) sdm_fit_name_place(&p->state, middle, place);
         if (stray >= 0.005)
             snprintf(astray, sizeof astray, ", and %.0f %% of the points lie away from the surface",
                      100 * stray);
-        const double unseen = name_unseen(p, r, surface.n, voxel, bare_at, names, sizeof names);
+        if (voxel > coarse.limit)
+            snprintf(beside, sizeof beside,
+                     "; or the voxels of the maps, %.2g mm, are too coarse to show its surface",
+                     voxel);
+        const double unseen = name_unseen(p, r, &surface, bare_at, names, sizeof names);
         if (unseen > 0)
             snprintf(unseen_text, sizeof unseen_text,
                      "the data do not determine %s: no points lie near the part of the surface "
@@ -319,7 +299,7 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
             sdm_fit_judge_add(
                 v, SDM_FIT_CHECK_COVERED, covered,
                 grown || other ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, bare, UNCOVERED_MAX,
-                "%.0f %% of the fitted surface has no points near it%s%s%s: %s%s%s", 100 * bare,
+                "%.0f %% of the fitted surface has no points near it%s%s%s: %s%s%s%s", 100 * bare,
                 middle ? ", about " : "", place, astray,
                 grown   ? "a fit that stopped at a wrong shape; give a better start, or take the "
                           "strays out (sdm_fit_opts.tolerance allows more)"
@@ -327,12 +307,11 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
                           "data show another shape, or their lengths are in another unit"
                 : unseen > 0 ? ""
                              : "the data lack a part of the shape, or it is too large",
-                (grown || other) && unseen > 0 ? "; " : "", unseen_text);
+                (grown || other) && unseen > 0 ? "; " : "", unseen_text, beside);
     }
-    sdm_free(voxel);
     sdm_free(bare_at);
     sdm_free(on.x);
     sdm_free(strays.x);
-    sdm_free(surface.x);
+    sdm_fit_places_dispose(&surface);
     return s;
 }

@@ -2,9 +2,9 @@
    which the shape does not have, and parts of its surface without points. */
 #pragma once
 
-#include "fit/solver/problem.h"
+#include "suffice.h"
 
-/* Adds the findings "patch" and "covered" of a fit to points, whose covariance *r holds.
-   SDM_E_NOMEM. */
-sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v,
-                                  sdm_error *err);
+/* Adds the findings "patch" and "covered" of a fit to points, whose covariance *r holds. coarse:
+   what the voxels of its maps show. SDM_E_NOMEM. */
+sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
+                                  fit_coarseness coarse, sdm_fit_verdict *v, sdm_error *err);

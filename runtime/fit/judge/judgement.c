@@ -429,7 +429,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
         v->chi_square = misfit.noise_chi_square;
     }
     if (!s && points) s = sdm_fit_check_points(p, &residuals, r->noise_factor, v, err);
-    if (!s && points) s = sdm_fit_check_coverage(p, r, v, err);
+    if (!s && points) s = sdm_fit_check_coverage(p, r, coarse, v, err);
     // strays that form a surface belong to the data: they show how long these are
     if (!s && points && !has_passed(v, SDM_FIT_CHECK_PATCH))
         s = sdm_fit_measure_beyond(p, r, &bounds, err);

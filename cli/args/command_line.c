@@ -59,9 +59,16 @@ static sdm_status unknown_option(const cli_args *args, const char *word, size_t 
     const size_t cut = length < sizeof name - 1 ? length : sizeof name - 1;
     memcpy(name, word, cut);
     name[cut] = '\0';
-    const sdm_status s = option_of_others(args, name, err);
-    if (s) return s;
     const char *command = args->command->name, *near = sdm_nearest_name(name, names, n);
+    sdm_text aliases = {0};
+    cli_add_aliases(args->command, name, &aliases);
+    sdm_status s = aliases.data
+                       ? sdm_fail(err, SDM_E_ARG, "%s: unknown option --%s; did you mean %s?",
+                                  command, name, aliases.data)
+                       : SDM_OK;
+    sdm_text_dispose(&aliases);
+    if (!s) s = option_of_others(args, name, err);
+    if (s) return s;
     if (near)
         return sdm_fail(err, SDM_E_ARG, "%s: unknown option --%s; did you mean --%s?", command,
                         name, near);

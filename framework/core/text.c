@@ -206,11 +206,11 @@ enum { SHORTEST_BEGINNING = 3 };
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n)
 {
     const int length = (int)strnlen(word, WORD_MAX);
-    int best = length <= 2 ? 2 : length / 3 + 2; // distances must be below this limit
+    int best = length < 5 ? 2 : (length + 1) / 3 + 1; // distances must be below this limit
     const char *nearest = NULL;
     for (size_t i = 0; i < n; i++) {
         const int d = edit_distance(word, names[i]);
-        if (d < best) best = d, nearest = names[i];
+        if (d < best && (d <= 1 || *word == *names[i])) best = d, nearest = names[i];
     }
     // else the first name that begins with the word
     for (size_t i = 0; i < n && !nearest && length >= SHORTEST_BEGINNING; i++)

@@ -1,6 +1,6 @@
 /* The table of options and the parser: an option that may not be repeated is refused when it is
- * given twice, for every option of every command; decimal commas.
- * Tests: command_line.c, option_table.c */
+ * given twice, for every option of every command; decimal commas; words of other programs.
+ * Tests: command_line.c, option_aliases.c, option_table.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -115,12 +115,41 @@ static void decimal_commas_are_told(void **state)
     }
 }
 
+static void words_of_other_programs_are_known(void **state)
+{
+    (void)state;
+    static const struct {
+        size_t command;
+        const char *word, *message;
+    } cases[] = {
+        {CLI_FIT, "--center=1,2,3", "option --center; did you mean --start-centre X,Y,Z?"},
+        {CLI_FIT, "--start", "did you mean --start-centre X,Y,Z or --start-axis X,Y,Z?"},
+        {CLI_FIT, "--fix", "did you mean --keep WHAT?"},
+        {CLI_FIT, "--resolution=2", "did you mean --spacing MM?"},
+        {CLI_EXACT, "--voxelsize", "did you mean --spacing MM?"},
+        {CLI_FIT, "--out", "did you mean -o FILE?"},
+        {CLI_TRAIN, "--output=x", "did you mean --out DIR?"},
+        {CLI_TRAIN, "--budget=3", "did you mean train.minutes=3?"},
+        {CLI_TRAIN, "--voxel", "did you mean grid.spacing=0.5?"},
+        // the command has nothing for the word, and no option is like it
+        {CLI_EXACT, "--center", "unknown option --center; see sdmgen exact --help"},
+        {CLI_EXACT, "--budget", "unknown option --budget; see sdmgen exact --help"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        sdm_error err;
+        assert_int_equal(parse(cases[i].command, (const char *[4]){cases[i].word}, &err),
+                         SDM_E_ARG);
+        if (!strstr(err.text, cases[i].message)) fail_msg("%s: %s", cases[i].word, err.text);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(only_lists_and_flags_may_repeat),
         cmocka_unit_test(both_values_are_named),
         cmocka_unit_test(decimal_commas_are_told),
+        cmocka_unit_test(words_of_other_programs_are_known),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -165,6 +165,12 @@ static void numbers_and_names_are_parsed(void **state)
     assert_string_equal(sdm_nearest_name("dpeth", names, 3), "depth");
     assert_string_equal(sdm_nearest_name("withd", names, 3), "width");
     assert_null(sdm_nearest_name("colour", names, 3));
+    // no words that only share letters
+    const char *const options[] = {"part", "quiet", "dense", "find"};
+    assert_null(sdm_nearest_name("start", options, 4));
+    assert_null(sdm_nearest_name("budget", options, 4));
+    assert_null(sdm_nearest_name("center", options, 4));
+    assert_null(sdm_nearest_name("fix", options, 4));
     const char *const lengths[] = {"size", "spacing"};
     assert_string_equal(sdm_nearest_name("space", lengths, 2), "spacing");
     const char *const parts[] = {"height", "head_radius"};

@@ -77,7 +77,8 @@ bool sdm_is_name(const char *text);
 #define SDM_NAME_RULE                                                                              \
     "names are a small letter, then small letters, digits and _, at most 63 in all"
 
-/* The most similar of names[n] to `word` by optimal string alignment distance; if none is similar,
+/* The most similar of names[n] to `word` by optimal string alignment distance, which is at most 1,
+ * or about a third of the characters of `word` if both begin with the same one; if none is similar,
  * the first that begins with `word`, if it has three characters or more; else, if it has five, the
  * first that begins with all but its last one; else NULL. */
 const char *sdm_nearest_name(const char *word, const char *const *names, size_t n);

@@ -73,8 +73,12 @@ sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *opt
 {
     if (!out) return sdm_fail(err, SDM_E_ARG, "the address of the instance must not be NULL");
     *out = NULL;
-    if (!shape || (n_options && !options))
-        return sdm_fail(err, SDM_E_ARG, "a shape and its options are needed to make an instance");
+    if (!shape)
+        return sdm_fail(err, SDM_E_ARG,
+                        "sdm_instance_create: the shape is NULL, as sdm_registry_find() gives it "
+                        "for an unknown name; sdm_registry_at() lists the shapes there are");
+    if (n_options && !options)
+        return sdm_fail(err, SDM_E_ARG, "sdm_instance_create: the %zu options are NULL", n_options);
     sdm_option_value *values = NULL;
     char *text = NULL;
     sdm_status status = SDM_ALLOC(&values, shape->n_options, "option values", err);

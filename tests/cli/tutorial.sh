@@ -50,6 +50,8 @@ present work/nine.png work/map.{nii.gz,vdb,stl,seg.nrrd,png,npy} work/compare/co
     work/by-network.npy work/exactly.npy work/shape0{1,2}.stl work/{image,labels,points}.json
 has '^fine: '
 has '^at radius=38 height=85 wall=8 reach=28, against the exact map$'
+work/own/build/own work/mug/build/mug.so jug 2>err && bad 'own/own finds the shape jug'
+grep -qx "own: unknown shape 'jug'; the shapes are mug" err || bad "the message of own/own about an unknown shape: $(cat err)"
 [ "$(grep -c '^  wall .* truth 8.5212, off by [0-3]' out)" = 3 ] || bad "not three fits that find the wall"
 if python3 -c 'import numpy' 2>/dev/null; then # the same volumes and derivatives as the C program
     # after a training on a busy machine the C program says first that the model is not for derivatives of volumes

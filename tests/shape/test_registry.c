@@ -406,6 +406,9 @@ static void test_option_text_is_parsed(void **state)
     err_has("option 'level' is given twice");
     assert_int_equal(sdm_instance_create(&GOOD, none, 1, NULL, &s, &err), SDM_E_ARG);
     assert_int_equal(sdm_instance_create(NULL, NULL, 0, NULL, &s, &err), SDM_E_ARG);
+    err_has("the shape is NULL, as sdm_registry_find() gives it for an unknown name");
+    assert_int_equal(sdm_instance_create(&GOOD, NULL, 2, NULL, &s, &err), SDM_E_ARG);
+    err_has("the 2 options are NULL");
     assert_int_equal(sdm_instance_create(&GOOD, NULL, 0, NULL, NULL, &err), SDM_E_ARG);
 }
 

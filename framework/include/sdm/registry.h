@@ -45,8 +45,8 @@ SDM_API size_t sdm_registry_count(const sdm_registry *r);
 /* Shape and origin of entry `index`, in order of addition. */
 SDM_API const sdm_shape *sdm_registry_at(const sdm_registry *r, size_t index);
 SDM_API const char *sdm_registry_origin(const sdm_registry *r, size_t index);
-/* The shape of this name. If there is none, the result is NULL, and *nearest (`nearest` may be
-   NULL) is a similar name or NULL. */
+/* The shape of this name. If there is none, the result is NULL, which callers must check, and
+ * *nearest (`nearest` may be NULL) is a similar name or NULL; sdm_registry_at() lists the names. */
 SDM_API const sdm_shape *sdm_registry_find(const sdm_registry *r, const char *name,
                                            const char **nearest);
 

@@ -543,7 +543,10 @@ static void tell_unit(teller *t)
                      c->odd_size ? ", " : "", sdm_instance_params(t->s->shape, NULL)[c->param].name,
                      c->speed);
     sdm_text_add(&text, "; the unit of sdmgen is mm");
-    if (c->unit)
+    // an angle in degrees that tan() or a division makes huge
+    if (c->degrees && c->size > SDM_SURVEY_SIZE_MAX)
+        add_degrees(t->s, &text);
+    else if (c->unit && !c->swings)
         sdm_text_add(&text, ": if the vertices are in %s, multiply them by %g", c->unit,
                      c->unit_mm);
     tell(t, SDM_E_QUALITY, &text);
@@ -573,9 +576,14 @@ static void tell_params(teller *t)
         } else if (sdm_survey_is_narrow(f, t->s->shape, k)) {
             sdm_text_add(&slow,
                          "the parameter '%s' ranges from %g to %g mm, which moves no vertex of a "
-                         "shape of %.3g mm by more than %.2g mm: are these m (times 1000)?",
+                         "shape of %.3g mm by more than %.2g mm",
                          params[k].name, params[k].min, params[k].max, f->scale.size,
                          f->speed[k] * (params[k].max - params[k].min));
+            // an angle that is taken for rad makes shapes too large
+            if (f->scale.degrees)
+                add_degrees(t->s, &slow);
+            else if (!f->scale.swings)
+                sdm_text_add(&slow, ": are these m (times 1000)?");
             tell(t, SDM_E_QUALITY, &slow);
         }
         // tell_swings() has named it
@@ -592,6 +600,14 @@ static void tell_params(teller *t)
                          "the parameter '%s' has the unit %s, but ranges from %g to %g: are these "
                          "rad? Then its unit is \"rad\"",
                          params[k].name, unit, params[k].min, params[k].max);
+            tell(t, SDM_E_QUALITY, &other);
+            continue;
+        }
+        if (sdm_survey_is_other_length(&params[k])) {
+            sdm_text_add(&other,
+                         "the parameter '%s' has the unit %s: sdmgen counts in mm; give its range, "
+                         "its default and its unit in mm",
+                         params[k].name, unit);
             tell(t, SDM_E_QUALITY, &other);
             continue;
         }

@@ -293,16 +293,17 @@ static sdm_status give_verdict(const check *c, sdm_error *err)
     sdm_text left = {0};
     cli_survey_untested(&c->survey, &left);
     const bool failed = left.failed;
-    if (!failed)
+    const sdm_survey_count *apart = &c->survey.found.apart;
+    if (!failed && apart->shapes)
+        printf("%zu of %zu shapes have groups of parts that meet no other part (the note above "
+               "names one): if they are meant to be apart, the shape can be trained; else let them "
+               "overlap%s%s\n",
+               apart->shapes, c->survey.found.n - c->survey.found.untested,
+               left.data ? "; not tested for want of time: " : "", left.data ? left.data : "");
+    else if (!failed)
         printf("%s: the shape can be trained%s%s%s\n", left.data ? "fine as far as tested" : "fine",
                c->survey.grid ? "" : "; give a configuration to compare it with a grid",
                left.data ? "; not tested for want of time: " : "", left.data ? left.data : "");
-    const sdm_survey_count *apart = &c->survey.found.apart;
-    if (!failed && apart->shapes)
-        printf("but %zu of %zu shapes have groups of parts that meet no other part (the note above "
-               "names one): if they are meant to be apart, nothing is to be done; else let them "
-               "overlap\n",
-               apart->shapes, c->survey.found.n - c->survey.found.untested);
     sdm_text_dispose(&left);
     return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the verdict") : SDM_OK;
 }

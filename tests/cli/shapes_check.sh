@@ -21,14 +21,14 @@ done
 expect 0 - sdmgen shapes check faulty -O fault=apart --plugin "$plugin" --samples 16
 has '^note +groups of parts that meet no other part in all 21 shapes, up to 2 at .*: part 2 of 2 \(12 triangles, .*\) lies 0\.5 mm from the others; where they belong together, let them overlap$'
 
-has '^but 21 of 21 shapes have groups of parts that meet no other part .*: if they are meant to be apart, nothing is to be done; else let them overlap$'
+has '^21 of 21 shapes have groups of parts that meet no other part .*: if they are meant to be apart, the shape can be trained; else let them overlap$'
 expect 0 - sdmgen shapes check faulty -O fault=within --plugin "$plugin" --samples 16
 has '^note +groups of parts that meet no other part .*: part 2 of 2 \(12 triangles, .*\) lies inside part 1 and changes nothing; if it is to be a cavity, reverse'
 
 # Groups of parts: each part meets another one, the groups do not meet. In a training, too.
 expect 0 - sdmgen shapes check faulty -O fault=groups --plugin "$plugin" --samples 16
 has '^note +groups of parts that meet no other part in all 21 shapes, up to 2 at .*: parts 2 \(vertices 8 \.\. 15, box .* mm\), 3 \(vertices 16 \.\. 23, box .* mm\) of 4 lie 0\.5 mm from the others; where they belong together, let them overlap$'
-has '^but 21 of 21 shapes have groups of parts that meet no other part'
+has '^21 of 21 shapes have groups of parts that meet no other part'
 
 # Parts that meet in some shapes only: a note, with the parameter that decides.
 expect 0 - sdmgen shapes check faulty -O fault=meets --plugin "$plugin" --samples 64
@@ -261,4 +261,18 @@ for most in 3.1416 5 90; do
         has "^warning +the parameter 'radius' has the unit deg, but ranges from 0.5 to 3.1416: are these rad\? Then its unit is \"rad\"$"
     fi
 done
+# an angle in degrees that makes shapes huge: no question about metres; a length in another unit than mm
+sed -E 's/enum \{ RADIUS \}/enum { RADIUS, LEAN }/; s/\.min = 0\.5/.min = 1.5/; s/\.max = 5/.max = 2/; s/p\[RADIUS\]/(p[RADIUS] \/ fabs(cos(p[LEAN])))/g
+    s/^static const sdm_param PARAMS.*/&\n    [LEAN] = {.name = "lean", .unit = "deg", .min = 10, .max = 11, .def = 10, .help = "lean"},/' \
+    "$source_folder/examples/plugin/octahedron.c" >lean.c
+cc -shared -fPIC -I"$source_folder/framework/include" lean.c -o lean.so -lm || bad 'the plug-in lean.so was not built'
+expect 4 'mend' sdmgen shapes check --plugin ./lean.so --samples 4
+has "^warning +the parameter 'radius' ranges from 1.5 to 2 mm, which moves no vertex of a shape of 90[0-9] mm by more than 0.6 mm; does mesh\(\) give 'lean' \(10 \.\. 11 deg\) to cos\(\) or sin\(\)\? These want rad"
+if grep -q 'are these m ' out; then bad "degrees, and a question about metres: $(cat out)"; fi
+sed 's/"mm"/"m"/' "$source_folder/examples/plugin/octahedron.c" >unit.c
+cc -shared -fPIC -I"$source_folder/framework/include" unit.c -o unit.so -lm || bad 'the plug-in unit.so was not built'
+expect 4 'mend' sdmgen shapes check --plugin ./unit.so --samples 4
+has "^warning +the parameter 'radius' has the unit m: sdmgen counts in mm; give its range, its default and its unit in mm$"
+expect 0 - sdmgen shapes test ./unit.so
+has "^doubtful units +.*'radius' has the unit m: sdmgen counts in mm"
 finish

@@ -160,7 +160,10 @@ static void tell_units(tests *t)
             sdm_text_add(&text, ": are they in %s? Multiply them by %g", c->unit, c->unit_mm);
     }
     for (size_t k = 0; k < f->n_params; k++)
-        if (f->speed[k] == 0)
+        if (sdm_survey_is_other_length(&params[k]))
+            sdm_text_add(&text, "%sthe parameter '%s' has the unit %s: sdmgen counts in mm",
+                         text.data ? "; " : "", params[k].name, params[k].unit);
+        else if (f->speed[k] == 0)
             sdm_text_add(&text, "%sthe parameter '%s' moves no vertex: does mesh() use it?",
                          text.data ? "; " : "", params[k].name);
         else if (sdm_survey_is_narrow(f, t->instance, k))

@@ -598,7 +598,7 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
                s->cut.shapes || s->thin.shapes || s->flat.shapes || s->tiny.shapes || s->narrow ||
                s->repeat.unlike || s->surplus > SDM_SURVEY_SURPLUS_MAX ||
                s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
-               s->scale.odd_speed || s->scale.odd_angle || s->scale.swings;
+               s->scale.odd_speed || s->scale.odd_angle || s->scale.other_length || s->scale.swings;
     for (size_t k = 0; k < s->n_params && s->jump; k++)
         bad = bad || s->jump[k].kind != SDM_BREAK_NONE;
     bad = bad || s->slow || sdm_survey_has_twins(s);

@@ -160,6 +160,14 @@ bool sdm_survey_is_radian(const sdm_param *p)
            (is_part_of_turn(p->min) || is_part_of_turn(p->max));
 }
 
+bool sdm_survey_is_other_length(const sdm_param *p)
+{
+    static const char *const LENGTHS[] = {"m", "cm", "um", "km", "in", "inch", "inches"};
+    for (size_t i = 0; i < sizeof LENGTHS / sizeof *LENGTHS; i++)
+        if (!strcmp(p->unit, LENGTHS[i])) return true;
+    return false;
+}
+
 sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, sdm_error *err)
 {
     sdm_survey_scale *c = &s->scale;
@@ -169,6 +177,7 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
         s->speed[k] = NAN;
         const sdm_param *p = &f->shape->params[k];
         c->odd_angle = c->odd_angle || sdm_survey_is_odd_angle(p) || sdm_survey_is_radian(p);
+        c->other_length = c->other_length || sdm_survey_is_other_length(p);
         c->degrees = c->degrees || sdm_survey_is_degree(p);
     }
     if (status || s->failed.shapes == s->n - s->untested) return status;

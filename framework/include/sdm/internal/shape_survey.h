@@ -78,9 +78,10 @@ typedef struct sdm_survey_scale {
      * parameters with the unit mm the one that moves them farthest. NaN: there is none */
     double speed;
     size_t param;
-    bool odd_speed; /* it is below SDM_SURVEY_SPEED_MIN or above SDM_SURVEY_SPEED_MAX */
-    bool odd_angle; /* of a parameter: sdm_survey_is_odd_angle() or sdm_survey_is_radian() */
-    bool degrees;   /* of a parameter: sdm_survey_is_degree() */
+    bool odd_speed;    /* it is below SDM_SURVEY_SPEED_MIN or above SDM_SURVEY_SPEED_MAX */
+    bool odd_angle;    /* of a parameter: sdm_survey_is_odd_angle() or sdm_survey_is_radian() */
+    bool degrees;      /* of a parameter: sdm_survey_is_degree() */
+    bool other_length; /* of a parameter: sdm_survey_is_other_length() */
     /* how often vertices of the first shape turn back along the parameter `angle`, which mesh() is
      * likely to give to cos() or sin() in degrees; 0: there is none such */
     size_t swings, angle;
@@ -100,6 +101,9 @@ bool sdm_survey_is_radian(const sdm_param *p);
 /* Does a parameter with the unit deg or degrees reach beyond a turn in rad? cos() and sin() give
  * what was not meant if mesh() does not convert it. */
 bool sdm_survey_is_degree(const sdm_param *p);
+
+/* Is the unit a length other than mm, such as m or cm? */
+bool sdm_survey_is_other_length(const sdm_param *p);
 
 /* Zero-initialise; sdm_shape_survey_dispose() frees. */
 typedef struct sdm_shape_survey {

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "report/terminal.h"
+#include "sdm/internal/box.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 #include "setup.h"
@@ -38,12 +39,32 @@ static sdm_status read_config(const cli_args *args, sdm_config **out, sdm_error 
     return s;
 }
 
-/* Completes a grid that is to be fitted to the shapes, and tells its numbers. */
-static sdm_status fit_grid(sdm_config *c, const sdm_instance *shape, sdm_error *err)
+/* The numbers of a grid that was fitted to the shapes, in one line. */
+static void tell_grid(const sdm_grid *g)
+{
+    const sdm_box box = sdm_box_of_grid(g);
+    const double *h = g->spacing;
+    char spacing[128];
+    if (h[0] == h[1] && h[0] == h[2])
+        snprintf(spacing, sizeof spacing, "%.4g", h[0]);
+    else
+        snprintf(spacing, sizeof spacing, "%.4g x %.4g x %.4g", h[0], h[1], h[2]);
+    cli_notice("grid: %lld x %lld x %lld voxels of %s mm, from (%.4g, %.4g, %.4g) to (%.4g, %.4g, "
+               "%.4g) mm; sdmgen config gives the reasons",
+               (long long)g->n[0], (long long)g->n[1], (long long)g->n[2], spacing, box.min[0],
+               box.min[1], box.min[2], box.max[0], box.max[1], box.max[2]);
+}
+
+/* Completes a grid that is to be fitted to the shapes, and tells its numbers; also the reasons for
+ * them if `reasons`. */
+static sdm_status fit_grid(sdm_config *c, const sdm_instance *shape, bool reasons, sdm_error *err)
 {
     sdm_text line = {0};
     const sdm_status s = sdm_train_complete(c, shape, &line, err);
-    if (!s && line.data) cli_notice("%s", line.data);
+    if (!s && line.data && reasons)
+        cli_notice("%s", line.data);
+    else if (!s && line.data)
+        tell_grid(&c->grid);
     sdm_text_dispose(&line);
     return s;
 }
@@ -62,7 +83,7 @@ sdm_status cli_config_shape(sdm_config *c, const sdm_registry *r, sdm_instance *
                             sdm_error *err)
 {
     const sdm_status s = make_shape(c, r, out, err);
-    return s ? s : fit_grid(c, *out, err);
+    return s ? s : fit_grid(c, *out, false, err);
 }
 
 sdm_status cli_check_memory(const sdm_config *c, const sdm_instance *shape, sdm_error *err)
@@ -125,5 +146,6 @@ sdm_status cli_open_config(const cli_args *args, sdm_config **config, sdm_regist
     if (!s && s_shape) return sdm_fail(err, s_shape, "%s", of_shape.text);
     if (s_shape == SDM_E_CONFIG) add_lines(err, of_shape.text);
     if (!s) tell_other_plugins(args, *registry, *config);
-    return s ? s : fit_grid(*config, *shape, err);
+    if (s) return s;
+    return fit_grid(*config, *shape, args->command == &cli_commands[CLI_CONFIG], err);
 }

@@ -12,7 +12,8 @@
  * sdm_instance_free() and *registry with sdm_registry_free(); the three must be NULL before the
  * call. SDM_E_ARG: an argument is not key=value; SDM_E_IO; SDM_E_CONFIG with one line for each
  * mistake in the keys and in the options, ranges and distributions of the shape; errors of
- * cli_open_registry(). */
+ * cli_open_registry(). A fitted grid is told as by cli_config_shape(), to the command `config` with
+ * the reasons for its numbers. */
 sdm_status cli_open_config(const cli_args *args, sdm_config **config, sdm_registry **registry,
                            sdm_instance **shape, sdm_error *err);
 

@@ -118,8 +118,10 @@ cat >rod.yaml <<'YAML'
 shape: {name: linkage, options: {links: 1, length: 24, radius: 0.15, tip: 0.15, base: 0.1}, ranges: {q1: [0, 0.1]}}
 train: {minutes: 0.02}
 YAML
-expect 0 'voxels of 0\.13 mm in place of .*; no more than two voxels across it, as the longest edge has over 96; still finer with grid: \{spacing: 0\.087\} \(about 0\.2 million voxels, 3\.3 times as many, .* GB in memory\)$' sdmgen shapes check rod.yaml --samples 8
+grid='grid: [0-9]+ x [0-9]+ x [0-9]+ voxels of 0\.13 mm, from \(.*\) to \(.*\) mm; sdmgen config gives the reasons$'
+expect 0 "^sdmgen: $grid" sdmgen shapes check rod.yaml --samples 8
 has '^fine: the shape can be trained$'
+expect 0 'voxels of 0\.13 mm in place of .*; no more than two voxels across it, as the longest edge has over 96; still finer with grid: \{spacing: 0\.087\} \(about 0\.2 million voxels, 3\.3 times as many, .* GB in memory\)$' sdmgen config rod.yaml
 
 # More maps than the memory for them holds: refused, or a warning where a template may do with fewer.
 expect 2 'good.yaml: data.static .* need [0-9.]+ GB, data.memory_gb is 0.002' sdmgen config good.yaml network.kind=pod data.memory_gb=0.002 --plugin "$plugin"

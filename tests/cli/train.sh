@@ -185,7 +185,7 @@ grep -q '^sdmgen: the template needs no training, so these keys have no effect: 
 
 # A grid that is fitted to the shapes: an interrupted run goes on with the same one, and the model has its numbers.
 interrupted fitted "$tiny" grid.voxels=16
-grep -q '^sdmgen: grid: size: \[16, ' err || bad "no word of the fitted grid: $(cat err)"
+grep -q '^sdmgen: grid: 16 x 16 x 11 voxels of ' err || bad "no word of the fitted grid: $(cat err)"
 grep -q '^  size: \[16, ' fitted/config.yaml || bad 'the run does not have the numbers of the fitted grid'
 expect 2 "has 'size: .16, 16, 11.', this configuration 'size: .20, 19, 13.'" sdmgen train "$tiny" grid.voxels=20 train.steps=1000000000 --out fitted --resume --quiet
 expect 2 'is at step' sdmgen train "$tiny" grid.voxels=16 --out fitted --resume --quiet

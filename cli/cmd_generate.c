@@ -684,11 +684,11 @@ static sdm_status run_points(job *j, sdm_error *err)
     sdm_result result = {0};
     sdm_status s = cli_points_check_model(j->args, &table, err);
     if (!s) s = open_model(j, err);
+    if (!s) s = cli_read_points(j->args->points, &a.x, &a.lines, &a.n, err);
     if (!s) warn_far(j);
     if (!s) s = read_rows(j, err);
     if (!s) s = open_shape(j, err);
     if (!s) s = check_rows(j, err);
-    if (!s) s = cli_read_points(j->args->points, &a.x, &a.lines, &a.n, err);
     if (!s) warn_unit(j, &a);
     if (!s) s = compute_points(j, &a, &result, err);
     if (s == SDM_E_RANGE && a.lines) s = fail_point(j, &a, s, err);

@@ -117,7 +117,9 @@ sdm_status sdm_field_points(const sdm_field *f, const double *x, size_t n, float
                             float *gradient, float *slopes, sdm_error *err)
 {
     if (!f || (n && (!x || !values)))
-        return sdm_fail(err, SDM_E_ARG, "field: a field, points and values are needed");
+        return sdm_fail(err, SDM_E_ARG,
+                        "sdm_field_points: the field f, the points x and an array "
+                        "values[n] must not be NULL");
     const sdm_status s = sdm_field_check(f, slopes, err);
     if (s) return s;
     const size_t pieces = (n + PIECE - 1) / PIECE;

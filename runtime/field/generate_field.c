@@ -65,6 +65,10 @@ sdm_status sdm_generate_points(const sdm_model *m, const double *params,
                                float *values, float *gradient, float *slopes, sdm_result *result,
                                sdm_error *err)
 {
+    if (n && (!x || !values))
+        return sdm_fail(err, SDM_E_ARG,
+                        "sdm_generate_points: the points x and an array values[n] must not be "
+                        "NULL");
     sdm_field *f;
     sdm_status s = open_field(m, params, opts, slopes != NULL, NULL, &f, result, err);
     if (!s) s = sdm_field_points(f, x, n, values, gradient, slopes, err);

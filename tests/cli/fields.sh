@@ -48,6 +48,10 @@ expect 0 'stated error, RMSE .*sdmgen exact --points computes exact distances' s
 [ "$(head -n 1 at.csv)" = x,y,z,distance,gradient_x,gradient_y,gradient_z ] || bad 'points: wrong header'
 [ "$(wc -l <at.csv)" -eq 3 ] || bad 'points: wrong number of rows'
 echo '0,0,100' >far.csv
+# a file that is no table of points: nothing else is said before
+printf 'x,y\n1,2\n' >two.csv
+sdmgen generate $model -p a=4.2 --points two.csv -o no.csv >out 2>err && bad 'a table without z was read'
+[ "$(grep -c . err)" = 1 ] && grep -q '^sdmgen: error: two.csv' err || bad "the message about two.csv: $(cat err)"
 sdmgen generate $model -p a=4.2 --points far.csv -o far_bound.csv --outside bound >out 2>err || bad "a point far away: $(cat err)"
 grep -q '1 of 1 points lie outside of the box of the network: their values are lower bounds' err || bad "a bound that is not told: $(cat err)"
 [ "$(grep -c 'gradient is shorter' err)" -eq 0 ] || bad "a ridge beyond the box: $(cat err)"

@@ -120,6 +120,12 @@ static void test_wrong_arguments_are_refused(void **state)
         sdm_generate_points(s->model[0], params, NULL, bad, 2, values, NULL, NULL, NULL, &err),
         SDM_E_ARG);
     assert_non_null(strstr(err.text, "point 2 of 2"));
+    assert_int_equal(
+        sdm_generate_points(s->model[0], params, NULL, bad, 2, NULL, NULL, NULL, NULL, &err),
+        SDM_E_ARG);
+    assert_non_null(strstr(err.text, "sdm_generate_points: the points x and an array values[n]"));
+    assert_int_equal(sdm_field_points(NULL, bad, 1, values, NULL, NULL, &err), SDM_E_ARG);
+    assert_non_null(strstr(err.text, "sdm_field_points: the field f"));
     sdm_field *f;
     const sdm_generate_opts check = {.check = true, .exact_shape = s->shape};
     assert_int_equal(sdm_field_create(s->model[0], &check, false, &f, &err), SDM_E_ARG);

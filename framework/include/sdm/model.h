@@ -86,7 +86,8 @@ typedef struct sdm_model_quality {
 typedef enum sdm_model_use {
     SDM_USE_SURFACE = 0,           /* surfaces and level sets: the grade is "poor" */
     SDM_USE_VOLUME = 1,            /* of maps: volume_error > SDM_VOLUME_BAD */
-    SDM_USE_DERIVATIVE = 2,        /* of maps: derivative_error > SDM_DERIVATIVE_BAD */
+    SDM_USE_DERIVATIVE = 2,        /* of maps by the parameters, as of sdm_generate_jacobian() and
+                                      --jacobian: derivative_error > SDM_DERIVATIVE_BAD */
     SDM_USE_VOLUME_DERIVATIVE = 3, /* volume_derivative_error > SDM_DERIVATIVE_BAD: a parameter that
                                       hardly changes the volume passes, see `unfit` */
     SDM_USE_DISTANCE = 4,          /* far from the surface: far_error_mm > a voxel */

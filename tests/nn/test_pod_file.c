@@ -253,6 +253,38 @@ static void every_allocation_may_fail(void **state)
     }
 }
 
+/* A refused use names the parameter, with the figure that the training printed of it; volumes of
+ * surfaces blame voxels only where those of maps are much better. */
+static void refusals_quote_the_training(toy *t)
+{
+    static const struct {
+        const char *unfit, *text;
+    } cases[] = {
+        {"volumes of maps: off by 3 %\n"
+         "derivatives of the volume by rose: off by 220 %; by height: off by 127 %\n"
+         "derivatives of the volume by tilt: off by 822 % of their own size: these parameters\n",
+         "derivatives of volumes of its maps are off by 220 % for rose, more than 20 %; take"},
+        {"derivatives of the volume by tilt: off by over 1000 % of their own size: these\n",
+         "derivatives of volumes of its maps are off by over 1000 % for tilt, more than 20 %; "
+         "take"},
+        {"derivatives of the volume by a: off by 20 %\n",
+         "derivatives of volumes of its maps are off by 20.4 % for a, more than 20 %; take"}};
+    sdm_error err;
+    for (size_t i = 0; i < 3; i++) {
+        t->info.quality = (sdm_model_quality){.grade = "usable",
+                                              .volume_error = 0.04,
+                                              .surface_volume_error = 0.038,
+                                              .volume_derivative_error = i == 2 ? 0.204 : 4.37};
+        snprintf(t->info.quality.unfit, sizeof t->info.quality.unfit, "%s", cases[i].unfit);
+        sdm_model *m = toy_open(t);
+        assert_int_equal(sdm_model_check_use(m, SDM_USE_VOLUME_DERIVATIVE, &err), SDM_E_QUALITY);
+        if (strstr(err.text, cases[i].text) != err.text) fail_msg("%s", err.text);
+        assert_int_equal(sdm_model_check_use(m, SDM_USE_SURFACE_VOLUME, &err), SDM_E_QUALITY);
+        assert_non_null(strstr(err.text, "off by 3.8 %, more than 2 %: the network errs"));
+        sdm_model_free(m);
+    }
+}
+
 // The verdict of the training is kept; without one the file has no section for it, as the files of
 // earlier versions.
 static void quality_is_kept(void **state)
@@ -316,6 +348,7 @@ static void quality_is_kept(void **state)
     assert_int_equal(sdm_model_check_use(m, (sdm_model_use)6, &err), SDM_E_ARG);
     assert_int_equal(sdm_model_check_use(NULL, SDM_USE_VOLUME, &err), SDM_E_ARG);
     sdm_model_free(m);
+    refusals_quote_the_training(&t);
     // an unknown grade and an impossible share are damage
     const sdm_model_quality wrong[] = {{.grade = "fine"},
                                        {.grade = "good", .cut = 1.5},

@@ -163,11 +163,15 @@ static void patience_left_time(void **state)
                             .budget = 2};
         trainer_verdict_decide(&in, &v);
         assert_true(!strcmp(v.key, "train.minutes") && v.to == 4);
-        assert_int_equal(!strstr(v.sentence, "which the time for them limits"), early);
+        assert_int_equal(!strstr(v.sentence,
+                                 "The time for maps was too short for data.start of them. Their "
+                                 "number limits the model (100 % of the mean square error): raise "
+                                 "train.minutes from 2 to 4"),
+                         early);
         assert_int_equal(strstr(v.sentence,
                                 "Half of the budget, which is for the maps, was too "
                                 "short for data.start, though train.patience ended "
-                                "the steps early; the number of maps limits it (100 % "
+                                "the steps early. The number of maps limits it (100 % "
                                 "of the mean square error): raise train.minutes") != NULL,
                          early);
         // few steps, but patience ended them

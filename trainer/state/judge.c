@@ -69,7 +69,7 @@ static const char *advise_static(const verdict_input *in, sdm_verdict *v)
     int64_t fewer = most - 1;
     while (fewer > 1 && pow((double)fewer, in->n_params) > in->maps / 3) fewer--;
     advise(v, "data.static", (double)most, fewer > 1 ? (double)fewer : 0);
-    return "The static grid took most of the time for maps, which limits it";
+    return "The static grid took most of the time for maps. This limits the model";
 }
 
 /* The network leaves much of training maps: it was trained too shortly or is too small. */
@@ -118,12 +118,14 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
         advise_budget(in, v);
         return in->ended_early
                    ? "Half of the budget, which is for the maps, was too short for data.start, "
-                     "though train.patience ended the steps early; the number of maps limits it"
-                   : "The number of maps limits it, which the time for them limits";
+                     "though train.patience ended the steps early. The number of maps limits it"
+                   : "The time for maps was too short for data.start of them. Their number limits "
+                     "the model";
     }
     if (in->full) {
         advise_double(v, "data.memory_gb", c->data.memory_gb, INFINITY);
-        return "The number of maps limits it, which the memory for them limits";
+        return "The memory for maps was too small for data.start of them. Their number limits the "
+               "model";
     }
     // `start` counts for bases and polynomials, too
     if (c->data.online > c->data.start)

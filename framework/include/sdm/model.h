@@ -144,9 +144,9 @@ SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
 
 /* Tells whether the training found the model good enough for a use; the functions that compute
    maps, volumes and derivatives do not ask. SDM_OK: it did. SDM_E_QUALITY: it did not; *err holds
-   the figure, as in "derivatives of volumes are off by 165 % for the worst parameter, more than 20
-   %". SDM_E_UNSUPPORTED: not measured (slow kinds of network, earlier versions). SDM_E_ARG: m is
-   NULL, or there is no such use. [any thread] */
+   the figure, as in "derivatives of volumes of its maps are off by 165 % for alpha, more than 20
+   %", with a parameter and its figure as in `unfit`. SDM_E_UNSUPPORTED: not measured (slow kinds of
+   network, earlier versions). SDM_E_ARG: m is NULL, or there is no such use. [any thread] */
 SDM_API sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error *err);
 
 /* Index of a parameter in the parameter vectors of the model; -1 if there is none of this name.

@@ -1,5 +1,7 @@
 /* The uses that a model is good enough for, by the figures that its training measured. */
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sdm/model.h"
@@ -10,6 +12,27 @@ static int digits_over(double error, double bad)
     int n = error < 0.1;
     while (n < 6 && rint(100 * error * pow(10, n)) <= 100 * bad * pow(10, n)) n++;
     return n;
+}
+
+/* A parameter and the error of its derivatives in per cent, as the training printed them. */
+typedef struct worst_param {
+    char name[64], percent[16];
+} worst_param;
+
+/* *out = the first parameter of the line of `unfit` that begins with `begin`. Returns whether there
+ * is one. */
+static bool find_worst(const char *unfit, const char *begin, worst_param *out)
+{
+    static const char off[] = ": off by ";
+    const char *name = strstr(unfit, begin), *error = name ? strstr(name, off) : NULL,
+               *end = error ? strstr(error, " %") : NULL;
+    if (!end) return false;
+    name += strlen(begin);
+    error += strlen(off);
+    if (end < error || error < name) return false;
+    snprintf(out->name, sizeof out->name, "%.*s", (int)(error - name - (long)strlen(off)), name);
+    snprintf(out->percent, sizeof out->percent, "%.*s", (int)(end - error), error);
+    return true;
 }
 
 static sdm_status check_grade(const sdm_model_quality *q, sdm_error *err)
@@ -43,32 +66,42 @@ sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error 
     const sdm_model_quality *q = &info->quality;
     if (use == SDM_USE_SURFACE) return check_grade(q, err);
     if (use == SDM_USE_DISTANCE) return check_distances(info, err);
-    static const char worst[] = " for the worst parameter",
-                      slopes[] = "; those of exact maps are right if the shape has the same "
+    static const char slopes[] = "; those of exact maps are right if the shape has the same "
                                  "triangles for all parameters",
                       volume_slopes[] = "; take differences of volumes of the mesh (exact "
                                         "--measure): those of maps swing as faces cross planes of "
                                         "voxels";
+    // where maps are off as much as their surfaces, voxels do not explain it
+    const bool network = q->surface_volume_error < 2 * q->volume_error;
     const struct {
-        const char *name, *worst;
+        const char *name, *lines; // of `unfit`; NULL: the figure has no parameter
         double error, bad;
         const char *remedy;
-    } figures[] = {[SDM_USE_VOLUME] = {"volumes of its maps", "", q->volume_error, SDM_VOLUME_BAD,
-                                       "; those of exact maps are right"},
-                   [SDM_USE_SURFACE_VOLUME] =
-                       {"volumes inside the surfaces of its maps", "", q->surface_volume_error,
-                        SDM_VOLUME_BAD, ": they cut edges and thin walls between the voxels"},
-                   [SDM_USE_DERIVATIVE] = {"derivatives of its maps", worst, q->derivative_error,
-                                           SDM_DERIVATIVE_BAD, slopes},
-                   [SDM_USE_VOLUME_DERIVATIVE] = {"derivatives of volumes of its maps", worst,
-                                                  q->volume_derivative_error, SDM_DERIVATIVE_BAD,
-                                                  volume_slopes}},
+    } figures[] =
+        {[SDM_USE_VOLUME] = {"volumes of its maps", NULL, q->volume_error, SDM_VOLUME_BAD,
+                             "; those of exact maps are right"},
+         [SDM_USE_SURFACE_VOLUME] = {"volumes inside the surfaces of its maps", NULL,
+                                     q->surface_volume_error, SDM_VOLUME_BAD,
+                                     network
+                                         ? ": the network errs, more than voxels cut off"
+                                         : ": they cut edges and thin walls between the voxels"},
+         [SDM_USE_DERIVATIVE] = {"derivatives of its maps", "derivatives of maps by ",
+                                 q->derivative_error, SDM_DERIVATIVE_BAD, slopes},
+         [SDM_USE_VOLUME_DERIVATIVE] = {"derivatives of volumes of its maps",
+                                        "derivatives of the volume by ", q->volume_derivative_error,
+                                        SDM_DERIVATIVE_BAD, volume_slopes}},
       *f = &figures[use];
     if (isnan(f->error))
         return sdm_fail(err, SDM_E_UNSUPPORTED, "the training did not measure the errors of %s",
                         f->name);
     if (f->error <= f->bad) return SDM_OK;
-    return sdm_fail(err, SDM_E_QUALITY, "%s are off by %.*f %%%s, more than %g %%%s", f->name,
-                    digits_over(f->error, f->bad), 100 * f->error, f->worst, 100 * f->bad,
-                    f->remedy);
+    worst_param worst = {.name = "the worst parameter"};
+    const bool named = f->lines && find_worst(q->unfit, f->lines, &worst);
+    // a figure that rounding has made equal to the bound does not exceed it
+    if (!named || strtod(worst.percent, NULL) == 100 * f->bad)
+        snprintf(worst.percent, sizeof worst.percent, "%.*f", digits_over(f->error, f->bad),
+                 100 * f->error);
+    return sdm_fail(err, SDM_E_QUALITY, "%s are off by %s %%%s%s, more than %g %%%s", f->name,
+                    worst.percent, f->lines ? " for " : "", f->lines ? worst.name : "",
+                    100 * f->bad, f->remedy);
 }

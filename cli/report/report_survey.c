@@ -567,6 +567,13 @@ static void tell_params(teller *t)
             sdm_text_add(&slow, "the parameter '%s' moves no vertex: does mesh() use it?",
                          params[k].name);
             tell(t, SDM_E_QUALITY, &slow);
+        } else if (f->still && f->still[k]) {
+            sdm_text_add(
+                &slow,
+                "the parameter '%s' moves no part of the surface: it moves vertices inside "
+                "of other parts alone",
+                params[k].name);
+            tell(t, SDM_E_QUALITY, &slow);
         } else if (sdm_survey_is_slow(f, t->s->shape, k) && !f->scale.odd_speed && !jumps) {
             sdm_text_add(&slow,
                          "1 mm of the parameter '%s' moves no vertex by more than %.2g mm: are the "

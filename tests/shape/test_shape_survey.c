@@ -1,7 +1,7 @@
 /* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
  * known from the source; shapes without faults pass.
  * Tests: shape_survey.c survey_fold.c survey_line.c survey_meeting.c survey_repeat.c
- * survey_scale.c survey_swing.c units.c */
+ * survey_scale.c survey_still.c survey_swing.c units.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -75,6 +75,26 @@ static void parts_begin_to_meet(void **state)
         assert_int_equal(s.meeting.pairs, 0);
         sdm_shape_survey_dispose(&s);
     }
+}
+
+// A parameter that moves vertices inside of another part alone is found, and no other one: a brief
+// survey does not look for it, and nothing is said of meshes that are broken.
+static void parameters_that_move_no_surface(void **state)
+{
+    (void)state;
+    static const char *const others[] = {"none", "apart", "groups", "meets"};
+    sdm_shape_survey s = survey("within");
+    assert_true(!s.still[0] && s.still[1]);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    sdm_shape_survey_dispose(&s);
+    for (size_t i = 0; i < 4; i++) {
+        s = survey(others[i]);
+        assert_true(!s.still[0] && !s.still[1]);
+        sdm_shape_survey_dispose(&s);
+    }
+    s = survey("open");
+    assert_null(s.still);
+    sdm_shape_survey_dispose(&s);
 }
 
 /* Number of the shapes with size > 2. */
@@ -509,6 +529,7 @@ static void built_in_shapes_pass(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(parameters_that_move_no_surface),
         cmocka_unit_test(parts_begin_to_meet),
         cmocka_unit_test(without_faults),
         cmocka_unit_test(parts_that_are_inside_out),

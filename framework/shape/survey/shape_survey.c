@@ -17,6 +17,7 @@
 #include "survey_meeting.h"
 #include "survey_repeat.h"
 #include "survey_scale.h"
+#include "survey_still.h"
 
 enum {
     LINES_PER_PARAM = 4,
@@ -555,6 +556,9 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
         s = sdm_grid_family_hits(shape, opts->range, FACE_SAMPLES, opts->seed, opts->grid,
                                  &out->hits, err);
     if (!s) s = sdm_survey_measure_scale(&v.family, out, err);
+    if (!s && !opts->brief && !out->failed.shapes && !out->open.shapes && !out->inside_out.shapes &&
+        !is_late(&v, 1))
+        s = sdm_survey_find_still(&v.family, opts, v.size, out, err);
     sdm_free(v.found);
     sdm_free(v.fold);
     sdm_free(v.fold_late);
@@ -569,6 +573,7 @@ void sdm_shape_survey_dispose(sdm_shape_survey *s)
     sdm_free(s->p);
     sdm_free(s->jump);
     sdm_free(s->speed);
+    sdm_free(s->still);
     *s = (sdm_shape_survey){0};
 }
 
@@ -601,6 +606,7 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
                s->scale.odd_speed || s->scale.odd_angle || s->scale.other_length || s->scale.swings;
     for (size_t k = 0; k < s->n_params && s->jump; k++)
         bad = bad || s->jump[k].kind != SDM_BREAK_NONE;
+    for (size_t k = 0; k < s->n_params && s->still; k++) bad = bad || s->still[k];
     bad = bad || s->slow || sdm_survey_has_twins(s);
     return bad ? SDM_E_QUALITY : SDM_OK;
 }

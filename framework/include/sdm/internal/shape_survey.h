@@ -173,6 +173,9 @@ typedef struct sdm_shape_survey {
      * triangles of the area, which is above SDM_SURVEY_FOLD_MIN, or, where a part of the shape
      * meets itself and none of shape 0 does, above SDM_SURVEY_FOLD_CROSSED */
     sdm_survey_count folded;
+    /* [n_params] the parameter moves vertices, but no part of the surface: they lie inside of other
+     * parts; not looked at where meshes are broken */
+    bool *still;
     size_t fold_tested;    /* number of shapes that were compared with shape 0 */
     size_t fold_untested;  /* shapes left out there for want of time */
     bool box_untested;     /* the search that widens the box was left out for want of time */

@@ -326,7 +326,10 @@ static sdm_status write_maps(const job *j, size_t row, const sdm_result *result,
                    .origin = result->source == SDM_SOURCE_EXACT ? "exact" : origin,
                    .reason = result->reason,
                    .check = result->checked ? &result->check : NULL};
-    if (result->source == SDM_SOURCE_NETWORK) map.trained_mm = sdm_grid_coarsest(&j->info->grid);
+    if (result->source == SDM_SOURCE_NETWORK) {
+        map.trained_mm = sdm_grid_coarsest(&j->info->grid);
+        map.quality = &j->info->quality;
+    }
     if (j->shape && compares_surface(j)) compare_shape(j, row, &map);
     if (!s) s = cli_write_maps(files->list.items, j->args->outputs.n, &map, j->args, err);
     sdm_text_dispose(&params);

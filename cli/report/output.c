@@ -23,6 +23,10 @@
 /* Largest part by which the volume of a surface may differ from that of the shape in silence. */
 #define VOLUME_OFF_MAX 0.02
 
+/* Voxels explain that the surface of a network's map encloses less than the shape if this is more
+   than such a multiple of the error of the volumes of maps, which edges change little. */
+#define NETWORK_OFF 2
+
 typedef enum file_kind {
     KIND_NONE = 0,
     KIND_VDB,
@@ -144,6 +148,28 @@ static sdm_status map_beyond(void *engine, const sdm_grid *grid, float *values, 
 /* Maps of at most so many voxels have their level sets compared with the shape. */
 #define COMPARED_MAX 2000000
 
+/* Is a volume that is off by `more` of that of the shape an error of the network? Voxels cut edges,
+ * so that the surface encloses less. */
+static bool network_errs(const cli_map *map, double more)
+{
+    return map->quality && (more > 0 || -more < NETWORK_OFF * map->quality->volume_error);
+}
+
+/* Warns of a surface that encloses volume[0] mm^3 in place of volume[1]. */
+static void warn_network_volume(const char *path, const cli_map *map, const double volume[2])
+{
+    const double more = volume[0] / volume[1] - 1, error = map->quality->surface_volume_error;
+    char measured[96] = "";
+    if (!isnan(error))
+        snprintf(measured, sizeof measured,
+                 ": its training found volumes of surfaces off by %.2g %% (root mean square)",
+                 100 * error);
+    cli_warn(
+        "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3, because the "
+        "network errs%s; exact maps (sdmgen exact) have no such error",
+        path, volume[0], 100 * fabs(more), more < 0 ? "less" : "more", volume[1], measured);
+}
+
 /* Warns if the surface has more pieces than the shape whose map it was made from, or encloses
  * another volume. */
 static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *surface)
@@ -157,7 +183,9 @@ static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *s
                  "a voxel of %.3g mm and is torn; %s shows it",
                  path, audit.components, map->pieces, trained ? map->trained_mm : voxel,
                  trained ? "a training with a smaller grid.spacing" : "a smaller --spacing");
-    else if (fabs(more) > VOLUME_OFF_MAX) {
+    else if (fabs(more) > VOLUME_OFF_MAX && network_errs(map, more)) {
+        warn_network_volume(path, map, (const double[]){fabs(audit.volume), map->volume});
+    } else if (fabs(more) > VOLUME_OFF_MAX) {
         const double cuts = trained ? map->trained_mm : voxel;
         char advice[96] = "";
         if (trained || !map->thin)
@@ -166,9 +194,10 @@ static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *s
                      sdm_spacing_for_volume(cuts, fabs(more)));
         cli_warn(
             "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
-            "%.3g mm cut its edges and thin parts%s",
+            "%.3g mm %s%s",
             path, fabs(audit.volume), 100 * fabs(more), more < 0 ? "less" : "more", map->volume,
-            cuts, advice);
+            cuts, more < 0 ? "cut its edges and thin parts" : "fill its gaps and inner edges",
+            advice);
     }
 }
 

@@ -5,6 +5,7 @@
 #include "sdm/blocks.h"
 #include "sdm/exact.h"
 #include "sdm/grid.h"
+#include "sdm/model.h"
 #include "sdm/runtime.h"
 
 /* Part of the text in the header of an image file that holds a distance map. */
@@ -24,9 +25,11 @@ typedef struct cli_map {
     double volume; /* of the shape, mm^3: a surface that encloses much less or more is warned of; 0:
                       not known */
     double trained_mm; /* of a network: longest edge of a voxel of its training; 0: exact maps */
-    bool thin;         /* a part is too thin for the voxels, as was told with a better spacing */
-    size_t pieces;     /* closed surfaces of the shape: more of them in a file are warned of; 0: not
-                          known */
+    const sdm_model_quality
+        *quality;  /* of a network: errors that its training measured; else NULL */
+    bool thin;     /* a part is too thin for the voxels, as was told with a better spacing */
+    size_t pieces; /* closed surfaces of the shape: more of them in a file are warned of; 0: not
+                      known */
     const char *origin; /* "model CHECKSUM", or the method without a network: "exact", "edt" ... */
     sdm_reason reason;  /* why the exact engine replaced the network */
     const sdm_check *check; /* errors of the network's map; NULL: not checked */

@@ -11,6 +11,10 @@
 /* A template saves little time if exact maps take less than this many times as long. */
 #define SLOW 3.0
 
+/* A longer training of a kind that errs by more than this multiple of another makes it no better
+   than the other. */
+#define MUCH_WORSE 1.5
+
 /* Appends an option and its value to a command. */
 static void add_option(sdm_text *command, const char *option, const char *value)
 {
@@ -156,7 +160,8 @@ void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_ti
         printf("              pod is %s (%s)\n", r->other_path, sdm_grade_name(r->other_grade));
         return;
     }
-    if (args->files.n) {
+    // the line `next` has the command
+    if (args->files.n && !sdm_verdict_needs_pod(&r->verdict)) {
         add_changes(&command, args, &pod, "pod");
         add_options(&command, args, r);
         if (!command.failed) printf("              sdmgen train%s\n", command.data);
@@ -164,10 +169,36 @@ void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_ti
     sdm_text_dispose(&command);
 }
 
+/* The line `next` of a template that errs near the surface. */
+static void print_next_pod(const cli_args *args, const sdm_train_report *r, double minutes)
+{
+    const double ratio = r->other_voxel_mm / r->verdict.rmse_voxel_mm;
+    // auto has given pod a part of the minutes
+    const sdm_verdict pod = {.minutes = r->compared ? 2 * minutes : minutes};
+    sdm_text command = {0};
+    if (r->compared && ratio > MUCH_WORSE) {
+        printf(
+            "  next        no training is known to help near the surface: pod, which auto has "
+            "trained, too, is %.2g times worse there; exact maps (sdmgen exact, fit --exact) have "
+            "no such error\n",
+            ratio);
+        return;
+    }
+    if (!args->files.n) return;
+    add_changes(&command, args, &pod, "pod");
+    add_options(&command, args, r);
+    if (!command.failed) printf("  next        sdmgen train%s\n", command.data);
+    sdm_text_dispose(&command);
+}
+
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
-                    double ms_map)
+                    double ms_map, double minutes)
 {
     const sdm_verdict *v = &r->verdict;
+    if (sdm_verdict_needs_pod(v)) {
+        print_next_pod(args, r, minutes);
+        return;
+    }
     sdm_text command = {0};
     // the maps of another grid are not in --dataset
     const bool other_maps = args->dataset && (v->cut > 0 || !strncmp(v->key, "grid.", 5));

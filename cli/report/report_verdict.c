@@ -77,6 +77,15 @@ static void print_derivatives(const sdm_verdict *v)
     printf("\n");
 }
 
+/* Parameters of which derivatives near the surface cannot be compared. */
+static void print_still(const sdm_verdict *v)
+{
+    if (v->still_params[0])
+        printf(
+            "  no effect   %s %s no part of the surface: at most vertices inside of other parts\n",
+            v->still_params, strchr(v->still_params, ',') ? "move" : "moves");
+}
+
 void cli_print_verdict(const sdm_verdict *v)
 {
     char text[SDM_GRADE_TEXT], few[SDM_GRADE_FEW], grade[48], unfit[SDM_MODEL_UNFIT];
@@ -86,6 +95,7 @@ void cli_print_verdict(const sdm_verdict *v)
     cli_print_unfit(unfit, "  not for", 13);
     print_far(v);
     print_derivatives(v);
+    print_still(v);
     print_parts(v);
     if (isfinite(v->motion_mm))
         printf("  template    at the vertices: frames and amplitudes %.2g mm, warp %.2g mm\n",

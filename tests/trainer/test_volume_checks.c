@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "../shape/faulty_shape.h"
 #include "capsule_training.h"
 #include "data/surface_check.h"
 #include "sdm/map.h"
@@ -159,6 +160,38 @@ static void lists_of_derivatives(void **state)
                         "and the sign may be wrong");
 }
 
+// A parameter that moves vertices inside of another part alone has no error of its derivative, and
+// is named; its rounding errors are no figure.
+static void still_parameters(void **state)
+{
+    (void)state;
+    static const sdm_param p[] = {{.name = "a"}, {.name = "b"}, {.name = "c"}};
+    static const char yaml[] = "shape: {name: faulty, options: {fault: within}}\n"
+                               "grid: {size: [20, 20, 20], spacing: 0.5, centre: [0.01, 0, 0]}\n"
+                               "network: {width: 8, modes: 8, rank: 2, degree: 2, depth: 1}\n"
+                               "data: {static: 0, start: 20, online: 0, holdout: 4}\n"
+                               "train: {steps: 10, batch: 8, refine: 0}\n";
+    static const sdm_named_text option = {"fault", "within"};
+    char text[SDM_VERDICT_LIST];
+    trainer_list_still(p, (const bool[]){true, false, true}, 3, text);
+    assert_string_equal(text, "a, c");
+    trainer_list_still(p, (const bool[]){false, false, false}, 3, text);
+    assert_string_equal(text, "");
+    const sdm_config c = parse_config(yaml, NULL, 0);
+    sdm_instance *shape;
+    sdm_train_report r;
+    sdm_error e = {0};
+    run_files_remove();
+    if (sdm_instance_create(&FAULTY, &option, 1, NULL, &shape, &e) ||
+        sdm_train(&c, shape, folder, false, NULL, &r, &e))
+        fail_msg("%s", e.text);
+    assert_string_equal(r.verdict.still_params, "reach");
+    assert_string_equal(r.verdict.derivative_by, "size");
+    assert_true(r.verdict.derivative_error < 10);
+    assert_null(strstr(r.verdict.derivatives_bad, "reach"));
+    sdm_instance_free(shape);
+}
+
 // A joint that turns hardly changes the volume: the derivative by it is named with its own size,
 // also in the model.
 static void small_changes_of_the_volume(void **state)
@@ -214,9 +247,9 @@ static void surfaces_lose_volume(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(surface_of_a_sphere),  cmocka_unit_test(volumes_and_derivatives),
-        cmocka_unit_test(lists_of_derivatives), cmocka_unit_test(small_changes_of_the_volume),
-        cmocka_unit_test(surfaces_lose_volume),
+        cmocka_unit_test(surface_of_a_sphere),         cmocka_unit_test(volumes_and_derivatives),
+        cmocka_unit_test(lists_of_derivatives),        cmocka_unit_test(still_parameters),
+        cmocka_unit_test(small_changes_of_the_volume), cmocka_unit_test(surfaces_lose_volume),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

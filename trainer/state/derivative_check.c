@@ -42,6 +42,10 @@ static const double VOLUME_CHANGE = 0.05;
 /* A parameter that changes the volume by a smaller part of it does not change it: rounding. */
 static const double VOLUME_SAME = 1e-6;
 
+/* A parameter that moves no point near the surface by this part of a voxel over its range moves
+   none of the surface: what is left are rounding errors, over which no error can be told. */
+static const double STILL = 1e-3;
+
 static const size_t JACOBIAN_BYTES = 1000000000;
 
 /* Voxels near the surface of a shape. */
@@ -60,6 +64,7 @@ typedef struct shape_beside {
 /* Sums over the shapes, for one parameter. */
 typedef struct slope_sums {
     double error, size;              // squares: of maps
+    double largest;                  // exact derivative of a distance
     double volume_error;             // of volumes
     double volume_own, volume_scale; // exact derivatives; volumes over the range
 } slope_sums;
@@ -186,6 +191,7 @@ static void add_slopes(const trainer *t, const check_memory *c, size_t k, double
                      error = (double)slope[c->near->index[i]] - exact;
         sums->error += error * error;
         sums->size += exact * exact;
+        sums->largest = fmax(sums->largest, fabs(exact));
     }
     const double exact = (high->volume - low->volume) / over,
                  scale = 0.5 * (high->volume + low->volume) / range;
@@ -218,11 +224,13 @@ static sdm_status check_slopes(const trainer *t, const sdm_model *m, const doubl
 }
 
 /* The largest errors of all parameters. */
-static void take_largest(const slope_sums *sums, size_t n, derivative_check *out)
+static void take_largest(const dataset *d, const slope_sums *sums, derivative_check *out)
 {
-    for (size_t k = 0; k < n; k++) {
+    for (size_t k = 0; k < d->n_params; k++) {
+        const double range = d->max[k] - d->min[k];
+        out->still[k] = !(sums[k].largest * range > STILL * trainer_dataset_voxel(d));
         // of a parameter that changes the volume enough this is the figure of the list, too
-        const double slope = sqrt(sums[k].error / sums[k].size),
+        const double slope = out->still[k] ? NAN : sqrt(sums[k].error / sums[k].size),
                      least = VOLUME_CHANGE * VOLUME_CHANGE * sums[k].volume_scale,
                      volume = sqrt(sums[k].volume_error / fmax(sums[k].volume_own, least)),
                      change = sqrt(sums[k].volume_own / sums[k].volume_scale);
@@ -279,7 +287,7 @@ sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, deriva
         s = check_slopes(t, m, p, &c, sums, &out->shapes, err);
     }
     memory_dispose(&c);
-    if (!s && out->shapes) take_largest(sums, d->n_params, out);
+    if (!s && out->shapes) take_largest(d, sums, out);
     return s;
 }
 
@@ -322,6 +330,22 @@ void trainer_list_derivatives(const sdm_param *p, const double *error, size_t n,
                               char text[SDM_VERDICT_LIST])
 {
     list(p, error, n, "", n, SDM_VERDICT_LIST, text);
+}
+
+void trainer_list_still(const sdm_param *p, const bool *still, size_t n,
+                        char text[SDM_VERDICT_LIST])
+{
+    static const char more[] = ", ...";
+    size_t used = 0;
+    text[0] = '\0';
+    for (size_t k = 0; k < n; k++) {
+        char one[80];
+        if (!still[k]) continue;
+        const int length = snprintf(one, sizeof one, "%s%.60s", used ? ", " : "", p[k].name);
+        const bool fits = used + (size_t)length + sizeof more <= SDM_VERDICT_LIST;
+        used += (size_t)snprintf(text + used, SDM_VERDICT_LIST - used, "%s", fits ? one : more);
+        if (!fits) return;
+    }
 }
 
 void trainer_list_small(const sdm_param *p, const double *error, size_t n,

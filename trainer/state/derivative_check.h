@@ -12,7 +12,8 @@ typedef struct derivative_check {
        map within half a voxel of the surface (farther inside thin walls a distance has a ridge,
        where its derivative jumps), compared with differences of exact distances; of the derivative
        of the volume, compared with that of the meshes. Where a parameter changes the volume by less
-       than 5 % over its range, these 5 % count as its root mean square. NaN: not measured. */
+       than 5 % over its range, these 5 % count as its root mean square. NaN: not measured. Of the
+       map, a parameter that moves no part of the surface has no figure. */
     double slope, volume_slope;
     size_t slope_param, volume_slope_param;
     /* the same of every parameter */
@@ -21,6 +22,7 @@ typedef struct derivative_check {
        the parameter does not change the volume: infinite if the figure above exceeds
        SDM_DERIVATIVE_BAD, else NaN. */
     double volume_own[SDM_POD_MAX_PARAMS];
+    bool still[SDM_POD_MAX_PARAMS];        /* it moves no part of the surface over its range */
     bool volume_small[SDM_POD_MAX_PARAMS]; /* it changes it by less than 5 % over its range */
 } derivative_check;
 
@@ -38,6 +40,10 @@ void trainer_derivatives_unknown(derivative_check *out);
    sdm_verdict.derivatives_bad. An error that is NaN is not known. */
 void trainer_list_derivatives(const sdm_param *p, const double *error, size_t n,
                               char text[SDM_VERDICT_LIST]);
+
+/* text = the names of the parameters p[n] that are still[n], as sdm_verdict.still_params. */
+void trainer_list_still(const sdm_param *p, const bool *still, size_t n,
+                        char text[SDM_VERDICT_LIST]);
 
 /* The same as sdm_verdict.volume_derivatives_small, of parameters that hardly change the volume. */
 void trainer_list_small(const sdm_param *p, const double *error, size_t n,

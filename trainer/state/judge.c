@@ -170,7 +170,8 @@ static const char *advise_part(const verdict_input *in, sdm_verdict *v)
 static sdm_grade grade_of(const sdm_verdict *v)
 {
     const double voxels = v->rmse_voxel_mm / v->voxel_mm;
-    if (voxels <= SDM_GRADE_GOOD_VOXELS && v->dice >= 0.98 && v->cut <= 0.05) return SDM_GRADE_GOOD;
+    if (voxels <= SDM_GRADE_GOOD_VOXELS && v->dice >= SDM_GRADE_GOOD_DICE && v->cut <= 0.05)
+        return SDM_GRADE_GOOD;
     return voxels <= 0.2 && v->dice >= 0.9 && v->cut <= SDM_CUT_POOR ? SDM_GRADE_USABLE
                                                                      : SDM_GRADE_POOR;
 }
@@ -222,25 +223,45 @@ static double minutes_for(const verdict_input *in, const sdm_verdict *v)
     return minutes > in->budget ? minutes : 0;
 }
 
+/* text = what follows from an error far from the surface, of which no key of a template takes away
+ * anything. */
+static void advise_far(const sdm_verdict *v, size_t size, char *text)
+{
+    static const char far[] = "where distances far away matter, set network.kind to pod (a finer "
+                              "grid does not change them)";
+    char volumes[48] = "";
+    if (v->volume_error > SDM_VOLUME_BAD)
+        snprintf(volumes, sizeof volumes, " and volumes by %.2g %%", 100 * v->volume_error);
+    if (sdm_verdict_errs_near(v))
+        snprintf(text, size,
+                 ": near the surface it errs, too, distances by %.2g voxels%s, and a finer grid "
+                 "does not mend this; set network.kind to pod, or use exact maps",
+                 v->rmse_voxel_mm / v->voxel_mm, volumes);
+    else if (sdm_verdict_surfaces_off(v))
+        snprintf(text, size,
+                 ": nothing to change for level sets and fits near the surface, and a smaller "
+                 "grid.spacing for volumes of surfaces; %s",
+                 far);
+    else
+        snprintf(text, size, ": %s%s",
+                 v->grade == SDM_GRADE_GOOD
+                     ? "nothing to change for surfaces, level sets and fits near the surface; "
+                     : "",
+                 far);
+}
+
 /* The sentence, with the other keys that must change together with v->key. */
 static void write_sentence(const verdict_input *in, const char *what, sdm_verdict *v)
 {
     const sdm_config *c = in->config;
-    char change[200] = "", also[96] = "", time[96] = "", result[96] = "", share[96] = "";
+    char change[256] = "", also[96] = "", time[96] = "", result[96] = "", share[96] = "";
     if (v->key[0])
         snprintf(change, sizeof change, ": %s %s from %.6g to %.6g",
                  v->to < v->from ? "lower" : "raise", v->key, v->from, v->to);
     if (v->limit == SDM_CAUSE_ROUNDING)
         snprintf(change, sizeof change, ": set network.weights to %s",
                  c->network.weights == SDM_WEIGHT_I8 ? "f16" : "f32");
-    if (v->limit == SDM_CAUSE_FAR)
-        snprintf(
-            change, sizeof change,
-            ": %s; where distances far away matter, set network.kind to pod (a finer grid does "
-            "not change them)",
-            v->grade == SDM_GRADE_GOOD
-                ? "nothing to change for surfaces, level sets and fits near the surface"
-                : "surfaces, level sets and fits near the surface do not suffer from it");
+    if (v->limit == SDM_CAUSE_FAR) advise_far(v, sizeof change, change);
     if (!strcmp(v->key, "grid.spacing"))
         snprintf(also, sizeof also, " (and raise grid.size in proportion, if it is given)");
     // with `auto`, a value that is the default of `auto` would become that of the kind
@@ -376,6 +397,7 @@ static void set_derivatives(const trainer *t, const derivative_check *c, sdm_ver
     v->derivative_shapes = (int64_t)c->shapes;
     v->derivative_error = c->slope;
     v->volume_derivative_error = c->volume_slope;
+    if (c->shapes) trainer_list_still(p, c->still, n, v->still_params);
     if (isfinite(c->slope)) trainer_list_derivatives(p, c->slopes, n, v->derivatives_bad);
     if (isfinite(c->volume_slope)) {
         double large[SDM_POD_MAX_PARAMS], small[SDM_POD_MAX_PARAMS];

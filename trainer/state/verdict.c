@@ -55,6 +55,24 @@ bool sdm_verdict_surfaces_off(const sdm_verdict *v)
     return v->surface_volume_error > SDM_VOLUME_BAD;
 }
 
+bool sdm_verdict_voxels_cut(const sdm_verdict *v)
+{
+    return sdm_verdict_surfaces_off(v) && !(v->surface_volume_error < GRID_SHARE * v->volume_error);
+}
+
+bool sdm_verdict_errs_near(const sdm_verdict *v)
+{
+    return v->rmse_voxel_mm > SDM_GRADE_GOOD_VOXELS * v->voxel_mm ||
+           v->dice < SDM_GRADE_GOOD_DICE || v->volume_error > SDM_VOLUME_BAD ||
+           (sdm_verdict_surfaces_off(v) && !sdm_verdict_voxels_cut(v));
+}
+
+bool sdm_verdict_needs_pod(const sdm_verdict *v)
+{
+    return v->limited && v->limit == SDM_CAUSE_FAR && !(v->cut > 0) && !(v->inside_out > 0) &&
+           sdm_verdict_errs_near(v);
+}
+
 /* Why a poor model is not for use. */
 static const char *poor_text(const sdm_verdict *v, char *text)
 {
@@ -102,10 +120,9 @@ double sdm_spacing_for_volume(double spacing, double off)
 double sdm_verdict_spacing(const sdm_verdict *v)
 {
     if (!strcmp(v->key, "grid.spacing")) return v->to;
-    const bool grid =
-        sdm_verdict_surfaces_off(v) && !(v->surface_volume_error < GRID_SHARE * v->volume_error);
     if (sdm_verdict_lacks_part(v)) return rounded_down(0.5 * v->thickness_mm);
-    return grid ? sdm_spacing_for_volume(v->coarse_mm, v->surface_volume_error) : NAN;
+    return sdm_verdict_voxels_cut(v) ? sdm_spacing_for_volume(v->coarse_mm, v->surface_volume_error)
+                                     : NAN;
 }
 
 bool sdm_verdict_errs_far(const sdm_verdict *v) { return v->far_largest_mm > v->voxel_mm; }

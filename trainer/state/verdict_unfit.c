@@ -55,7 +55,7 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
             "held-out shapes, too thin for "
             "voxels of %.3g mm, and will be missing or broken; grid.spacing %.2g shows it",
             v->thickness_mm, v->coarse_mm, spacing);
-    else if (sdm_verdict_surfaces_off(v) && spacing < v->coarse_mm)
+    else if (sdm_verdict_voxels_cut(v) && spacing < v->coarse_mm)
         add(l,
             "volumes of surfaces (.stl): off by %s %%, voxels of %.3g mm cut edges and thin parts; "
             "about %.0f %% with grid.spacing %.2g (root mean square of the shapes)",

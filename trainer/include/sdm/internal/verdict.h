@@ -14,6 +14,9 @@ extern "C" {
    at most this many voxels. */
 #define SDM_GRADE_GOOD_VOXELS 0.05
 
+/* The same of the Dice overlap: at least so much. */
+#define SDM_GRADE_GOOD_DICE 0.98
+
 /* What a model is good for, by its error within a voxel of the surface, by its Dice overlap, and by
    the fraction of the shapes that the grid cuts. */
 typedef enum sdm_grade {
@@ -92,6 +95,8 @@ typedef struct sdm_verdict {
        over the size of their derivatives, however small. */
     char derivatives_bad[SDM_VERDICT_LIST], volume_derivatives_bad[SDM_VERDICT_LIST],
         volume_derivatives_small[SDM_VERDICT_LIST];
+    /* the parameters that move no part of the surface, "a, b"; "": none was found */
+    char still_params[SDM_VERDICT_LIST];
     /* a parameter that changes the numbers of vertices or the triangles of the mesh, so that
        vertices do not correspond; "": none was found */
     char triangles_by[64];
@@ -144,6 +149,18 @@ void sdm_verdict_unfit(const sdm_verdict *v, char text[SDM_MODEL_UNFIT]);
 /* The surfaces of the maps enclose too small or too large volumes (surface_volume_error exceeds
    SDM_VOLUME_BAD). [any thread] */
 bool sdm_verdict_surfaces_off(const sdm_verdict *v);
+
+/* They do, and voxels that cut edges and thin walls explain it: the volumes of maps are much
+   better. [any thread] */
+bool sdm_verdict_voxels_cut(const sdm_verdict *v);
+
+/* At the surface the model is not good, by its error within a voxel, its Dice overlap or volumes
+   that voxels do not explain. [any thread] */
+bool sdm_verdict_errs_near(const sdm_verdict *v);
+
+/* A template limits the model near the surface, too: another kind of network is the remedy, no key
+   of this one. [any thread] */
+bool sdm_verdict_needs_pod(const sdm_verdict *v);
 
 /* The grid does not show the thinnest part of the shapes (sdm_too_thin()). [any thread] */
 bool sdm_verdict_lacks_part(const sdm_verdict *v);

@@ -194,9 +194,9 @@ static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *s
                      sdm_spacing_for_volume(cuts, fabs(more)));
         cli_warn(
             "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
-            "%.3g mm %s%s",
+            "%.3g %s%s",
             path, fabs(audit.volume), 100 * fabs(more), more < 0 ? "less" : "more", map->volume,
-            cuts, more < 0 ? "cut its edges and thin parts" : "fill its gaps and inner edges",
+            cuts, more < 0 ? "mm cut its edges and thin parts" : "mm fill its gaps and inner edges",
             advice);
     }
 }

@@ -22,7 +22,7 @@ expect 0 - sdmgen shapes check faulty -O fault=apart --plugin "$plugin" --sample
 has '^note +groups of parts that meet no other part in all 21 shapes, up to 2 at .*: part 2 of 2 \(12 triangles, .*\) lies 0\.5 mm from the others; where they belong together, let them overlap$'
 
 has '^21 of 21 shapes have groups of parts that meet no other part .*: if they are meant to be apart, the shape can be trained; else let them overlap$'
-expect 4 - sdmgen shapes check faulty -O fault=within --plugin "$plugin" --samples 16
+expect 4 "mend what is marked 'warning'" sdmgen shapes check faulty -O fault=within --plugin "$plugin" --samples 16
 has "^warning +the parameter 'reach' moves no part of the surface: it moves vertices inside of other parts alone\$"
 has '^note +groups of parts that meet no other part .*: part 2 of 2 \(12 triangles, .*\) lies inside part 1 and changes nothing; if it is to be a cavity, reverse'
 

@@ -17,6 +17,9 @@
 /* Points are off the surface of the start shape where their distance from it exceeds this share of
  * their size. */
 #define OFF 0.1
+/* A start that turns about a place nearer to the z axis than this share of the size of the points
+ * may be turned by half a turn. */
+#define ON_AXIS 0.2
 /* Points that are compared with the start shape; of more, every second, third ... one. */
 #define POINTS_MAX 2000
 
@@ -130,27 +133,59 @@ static sdm_status fit_turned(const cli_fit *f, const double start[3], bool *pass
     return s == SDM_E_NOMEM || s == SDM_E_CANCELLED ? s : SDM_OK;
 }
 
-/* Points without a search over rotations: half a turn about z, from RAS to LPS, may be missing. The
- * start shape shows it where its parameters are about right; else a second fit does. --ras does not
- * change a start from --translation or --start-points. */
+/* text[size] = what to do about points that half a turn about z takes to the shape. To change the
+ * signs of x and y is to turn by half a turn: where `either`, the start may be turned as well. */
+static void advise_frame(const cli_fit *f, bool either, char *text, size_t size)
+{
+    const bool ras = f->args->fit.ras;
+    const sdm_pose half = {{0, 0, acos(-1)}, {0, 0, 0}};
+    char mend[120];
+    if (!either) {
+        snprintf(text, size, "%s",
+                 ras ? "are they LPS? Leave --ras out" : "are they RAS? --ras converts them");
+        return;
+    }
+    const sdm_pose other = sdm_pose_compose(&half, &f->opts.start_pose);
+    double r[3]; // rounded, and no negative zero
+    for (int a = 0; a < 3; a++) r[a] = round(1e4 * other.rotation[a]) / 1e4 + 0;
+    if (f->args->fit.start_points)
+        snprintf(mend, sizeof mend, "check the pairs of --start-points");
+    else
+        snprintf(mend, sizeof mend, "%s--rotation %.4g,%.4g,%.4g turns it back",
+                 isnan(f->args->pose.translation[0]) ? "leave --rotation out, or " : "", r[0], r[1],
+                 r[2]);
+    snprintf(text, size,
+             "either the start is turned by half a turn about z (%s), or the points are %s (%s)",
+             mend, ras ? "LPS" : "RAS", ras ? "leave --ras out" : "--ras converts them");
+}
+
+/* Points without a search over rotations: half a turn about z, from RAS to LPS or of the start, may
+ * be missing. The start shape shows it where its parameters are about right; else a second fit
+ * does. --ras does not change a start from --translation or --start-points. */
 static sdm_status check_frame(const cli_fit *f, const cloud *c, const double start[3], bool placed,
                               char *text, size_t size, sdm_error *err)
 {
-    const char *advice =
-        f->args->fit.ras ? "are they LPS? Leave --ras out" : "are they RAS? --ras converts them";
     double off[2];
     bool passes = false;
+    char advice[400];
     if (f->target.kind != SDM_FIT_POINTS || f->opts.turns != SDM_FIT_TURNS_NONE) return SDM_OK;
     sdm_status s = start_distances(f, c, !placed, off, err);
-    if (!s && off[0] > OFF * c->size && off[1] < NEARER * off[0])
+    const bool shown = !s && off[0] > OFF * c->size && off[1] < NEARER * off[0];
+    if (!s && !shown && f->doubt.status == SDM_E_QUALITY && isnan(f->args->pose.translation[0]) &&
+        !f->args->fit.start_points)
+        s = fit_turned(f, start, &passes, err);
+    if (!shown && !passes) return s;
+    // a start that turns about a given place, away from the z axis, is right where it is
+    const double *at = isnan(f->args->pose.translation[0]) ? start : f->opts.start_pose.translation;
+    advise_frame(f, !placed || passes || hypot(at[0], at[1]) < ON_AXIS * c->size, advice,
+                 sizeof advice);
+    if (passes)
+        snprintf(text, size, "; with x and y of the other sign the fit passes: %s", advice);
+    else
         snprintf(text, size,
                  "; with x and y of the other sign most points lie within %.2g mm of the shape at "
                  "the start, not %.2g mm: %s",
                  off[1], off[0], advice);
-    else if (!s && f->doubt.status == SDM_E_QUALITY && isnan(f->args->pose.translation[0]) &&
-             !f->args->fit.start_points)
-        s = fit_turned(f, start, &passes, err);
-    if (passes) snprintf(text, size, "; with x and y of the other sign the fit passes: %s", advice);
     return s;
 }
 

@@ -21,15 +21,23 @@ grep -q 'start-centre X,Y,Z' err && bad "a second advice on the start: $(cat err
 # Points of another frame turn the shape by half a turn; the neighbourhood that is farthest off is named.
 expect 0 - sdmgen phantom --shape cochlea -O edge=0.6 --rotation 1.57,0,0 --spacing 0.5 -o ear.nii --surface ear.csv --surface-points 500 --quiet
 negate ear.csv >ear-ras.csv
-expect 4 '; with x and y of the other sign most points lie within 0\.[0-9]* mm of the shape at the start, not 0\.[0-9]* mm: are they RAS\? --ras converts them$' \
+expect 4 '; with x and y of the other sign most points lie within 0\.[0-9]* mm of the shape at the start, not 0\.[0-9]* mm: either the start is turned by half a turn about z \(leave --rotation out, or --rotation [-0-9.,]* turns it back\), or the points are RAS \(--ras converts them\)$' \
     sdmgen fit --shape cochlea -O edge=0.6 ear-ras.csv --rotation 1.57,0,0 --mirror no --max-iterations 10 --quiet
 has "^  residuals    .*, most at \([-0-9., ]*\) mm, in the shape's frame \([-0-9., ]*\), where the data show (more|less) than the shape"
 # Where the parameters at the start are far off, a second fit tells it.
 expect 0 - sdmgen phantom --shape cochlea -O edge=1 -p a=3 -p b=0.1 --spacing 1 -o small.nii --surface small.csv --surface-points 400 --quiet
 negate small.csv >small-ras.csv
-expect 4 '; with x and y of the other sign the fit passes: are they RAS\? --ras converts them$' \
+expect 4 '; with x and y of the other sign the fit passes: either the start is turned by half a turn about z \(leave --rotation out, or --rotation 0,0,3\.142 turns it back\), or the points are RAS \(--ras converts them\)$' \
     sdmgen fit --shape cochlea -O edge=1 small-ras.csv --rotation 0,0,0 --mirror no --quiet
 expect 0 - sdmgen fit --shape cochlea -O edge=1 small-ras.csv --rotation 0,0,0 --mirror no --quiet --ras
+# A start that is turned by half a turn about z looks the same: the advised rotation turns it back. Away from the z axis only RAS explains it.
+expect 4 'either the start is turned by half a turn about z .*--rotation 0,0,-0\.0416 turns it back\)' \
+    sdmgen fit --shape cochlea -O edge=1 small.csv --rotation 0,0,3.1 --mirror no --quiet
+expect 4 'either the start is turned by half a turn about z \(--rotation 0,0,-0\.0416 turns it back\)' \
+    sdmgen fit --shape cochlea -O edge=1 -p a=3 -p b=0.1 small.csv --rotation 0,0,3.1 --translation 0,0,0 --mirror no --quiet
+awk -F, 'NR == 1 { print; next } { printf "%g,%g,%s\n", -$1 - 1, -$2, $3 }' ear.csv >aside.csv
+expect 4 'most points lie within 0\.[0-9]* mm of the shape at the start, not [0-9.]* mm: are they RAS\? --ras converts them$' \
+    sdmgen fit --shape cochlea -O edge=0.6 aside.csv --rotation 1.57,0,0 --translation 1,0,0 --mirror no --max-iterations 40 --quiet
 
 # A parameter at the end of its range is a cause, too; the texts say what is counted, and points have no material.
 awk 'BEGIN { print "x,y,z"; for (i = 0; i < 40; i++) for (j = 0; j < 20; j++) { a = i * 0.15708; b = j * 0.314159; r = 3 + 1.65 * cos(b); print r * cos(a) "," r * sin(a) "," 1.65 * sin(b) } }' >thick.csv

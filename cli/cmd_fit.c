@@ -212,6 +212,7 @@ static sdm_status fit_one(const cli_args *args, const char *json, sdm_error *err
     if (!s) s = cli_fit_check_size(&f, err);
     if (!s) cli_fit_notice_tissues(&f);
     if (!s) cli_fit_notice_kept(&f);
+    if (!s) s = cli_fit_check_contrast(&f, err);
     if (!s) s = fit_shape(&f, err);
     if (!s) s = cli_fit_explain_contrast(&f, err);
     if (!s) s = show_result(&f, json, err);

@@ -408,7 +408,8 @@ const cli_option cli_options[] = {
      "start again in a folder that holds a model"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(force),
      "write the files also of a fit that is not to be trusted (the exit code stays 4), and fit "
-     "targets whose size the shape cannot have"},
+     "targets whose size the shape cannot have, and images whose tissues look exchanged at the "
+     "start"},
     {"dry-run", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXPERIMENT), AT(dry_run),
      "print the planned rows and the duration of the trainings, then stop"},
 

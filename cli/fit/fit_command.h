@@ -257,6 +257,11 @@ void cli_fit_doubt_changed_shape(cli_fit *f);
 void cli_fit_print_verdict(const cli_fit *f);
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);
 
+/* Before a fit to an image: SDM_E_QUALITY where the values of the tissues are clearly exchanged at
+ * the start pose, unless rotations are tried or --force is given; then, and where it is not clear,
+ * a notice. */
+sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err);
+
 /* After a fit to an image that is not trustworthy: where the image at the start pose looks like the
  * inside around the shape, and clearly more like the outside within it, or a fit with exchanged
  * values finds the shape, makes this the only reason of f->doubt and of the verdict, and sets

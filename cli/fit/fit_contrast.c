@@ -3,15 +3,22 @@
 #include <stdio.h>
 
 #include "fit_command.h"
+#include "report/terminal.h"
 #include "sdm/memory.h"
 
 /* Least contrast of the exchanged values at the start, over that of the given ones: a start beside
  * the shape shows a part of it only. */
 #define CONTRAST_MIN 0.15
 
-/* Sum and number of the voxels of an image on one side of the surface. */
+/* Before the fit, the values pass for exchanged where the mean on either side of the start shape is
+ * nearer to the value of the other side than this share of its distance from its own, and the means
+ * differ by this many of their standard deviations. */
+#define CLEARLY 0.5
+#define DEVIATIONS 5.0
+
+/* Sums and number of the voxels of an image on one side of the surface. */
 typedef struct side_values {
-    double sum, n;
+    double sum, squares, n;
 } side_values;
 
 /* in, around: the image within the start shape and in the layer of the margin around it, sampled at
@@ -43,7 +50,8 @@ static sdm_status measure_start(const cli_fit *f, side_values *in, side_values *
                     (size_t)((llrint(x[2]) * image->n[1] + llrint(x[1])) * image->n[0] +
                              llrint(x[0]));
                 side_values *side = map[v] < 0 ? in : around;
-                if (isfinite(f->target.values[at])) side->sum += f->target.values[at], side->n++;
+                const double value = f->target.values[at];
+                if (isfinite(value)) side->sum += value, side->squares += value * value, side->n++;
             }
     sdm_free(map);
     return s;
@@ -84,40 +92,83 @@ static bool has_exchanged(const cli_fit *f)
            fabs(out - inside) < fabs(out - outside);
 }
 
-/* Makes exchanged values the only reason of the refusal. a, b: the image within the start shape and
- * around it; fitted: a fit with the exchanged values has shown it. */
-static void name_exchange(cli_fit *f, double a, double b, bool fitted)
+/* text[size] = that the values of the tissues are exchanged, or the default ones wrong, and what to
+ * do. a, b: the image within the start shape and around it; fitted: a fit with the exchanged values
+ * has shown it. */
+static void describe_exchange(const cli_fit *f, double a, double b, bool fitted, char *text,
+                              size_t size)
 {
-    sdm_fit_verdict *v = &f->result.verdict;
     const double inside = f->opts.appearance.inside[0].mean,
                  outside = f->opts.appearance.outside[0].mean;
     const bool given = !isnan(f->args->fit.inside[0]) || !isnan(f->args->fit.outside[0]);
-    sdm_fit_finding why = {
-        .kind = SDM_FIT_CHECK_CONTRAST, .grade = SDM_FIT_FAILED, .figure = a - b, .limit = 0};
     char shown[120];
-    for (size_t i = 0; i < v->n_findings; i++) *v->findings[i].text = '\0';
     if (fitted)
         snprintf(shown, sizeof shown, "a fit that exchanges them finds the shape in this image");
     else
         snprintf(shown, sizeof shown,
                  "at the start the image is %.4g within the shape and %.4g around it", a, b);
-    snprintf(why.text, sizeof why.text, "%s: %s, but the inside %s %.4g and the outside %.4g: %s",
+    snprintf(text, size, "%s: %s, but the inside %s %.4g and the outside %.4g: %s",
              given ? "the values of the inside and the outside are exchanged"
                    : "no values of the tissues were given, and the default ones do not suit this "
                      "image",
              shown, given ? "was given as" : "has the default value", inside, outside,
              given ? "exchange --inside and --outside"
                    : "give the values of this image with --inside and --outside");
+}
+
+/* Makes exchanged values the only reason of the refusal; see describe_exchange(). */
+static void name_exchange(cli_fit *f, double a, double b, bool fitted)
+{
+    sdm_fit_verdict *v = &f->result.verdict;
+    sdm_fit_finding why = {
+        .kind = SDM_FIT_CHECK_CONTRAST, .grade = SDM_FIT_FAILED, .figure = a - b, .limit = 0};
+    for (size_t i = 0; i < v->n_findings; i++) *v->findings[i].text = '\0';
+    describe_exchange(f, a, b, fitted, why.text, sizeof why.text);
     sdm_fit_verdict_add(v, &why);
     snprintf(f->doubt.text, sizeof f->doubt.text, "%s", why.text);
     f->exchanged = true;
+}
+
+/* Variance of the mean of one side. The voxels of the maps may be smaller than those of the image,
+ * whose noise several of them share; 27 neighbours count as one sample. */
+static double variance_of_mean(const cli_fit *f, const side_values *side)
+{
+    const sdm_grid *image = &f->target.grid;
+    const double mean = side->sum / side->n, map = cli_fit_map_voxel(f),
+                 share = fmin(map * map * map /
+                                  (image->spacing[0] * image->spacing[1] * image->spacing[2]),
+                              1);
+    return (side->squares / side->n - mean * mean) / (side->n * share / 27);
+}
+
+sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err)
+{
+    const double inside = f->opts.appearance.inside[0].mean,
+                 outside = f->opts.appearance.outside[0].mean;
+    side_values in = {0}, around = {0};
+    sdm_fit_finding why;
+    if (f->target.kind != SDM_FIT_IMAGE || f->args->fit.find) return SDM_OK;
+    // the fit itself tells what a shape lacks that has no map
+    if (measure_start(f, &in, &around, NULL) || !(in.n > 0) || !(around.n > 0)) return SDM_OK;
+    const double a = in.sum / in.n, b = around.sum / around.n;
+    const bool other = fabs(a - outside) < fabs(a - inside) && fabs(b - inside) < fabs(b - outside),
+               clear = fabs(a - outside) < CLEARLY * fabs(a - inside) &&
+                       fabs(b - inside) < CLEARLY * fabs(b - outside) &&
+                       fabs(a - b) > DEVIATIONS * sqrt(variance_of_mean(f, &in) +
+                                                       variance_of_mean(f, &around));
+    if (!other || !((a - b) / (outside - inside) > CONTRAST_MIN)) return SDM_OK;
+    describe_exchange(f, a, b, false, why.text, sizeof why.text);
+    if (clear && f->opts.turns == SDM_FIT_TURNS_NONE && !f->args->force)
+        return sdm_fail(err, SDM_E_QUALITY, "%s: %s; --force fits nevertheless", f->path, why.text);
+    cli_notice("%s, if the shape lies near the start", why.text);
+    return SDM_OK;
 }
 
 sdm_status cli_fit_explain_contrast(cli_fit *f, sdm_error *err)
 {
     const double inside = f->opts.appearance.inside[0].mean,
                  outside = f->opts.appearance.outside[0].mean;
-    side_values in = {0, 0}, around = {0, 0};
+    side_values in = {0}, around = {0};
     // --find searches the whole image: there is no start pose to look at
     if (f->target.kind != SDM_FIT_IMAGE || f->doubt.status != SDM_E_QUALITY || f->args->fit.find)
         return SDM_OK;

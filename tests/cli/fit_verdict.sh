@@ -27,15 +27,23 @@ has '^  pose         off the truth by 0\.[0-9]+ mm at the centre of the shape an
 expect 0 - $torus turned.nii --json
 has '"rotation_sd_determined_rad": *\[0\.0'
 
-# Exchanged values of the tissues are the only cause that is named, for a thin shape beside its place, too.
-expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside are exchanged: .*: exchange --inside and --outside$' \
+# Exchanged values of the tissues are told before the fit where the start shows them, and else are the only cause that is named.
+expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside are exchanged: at the start the image is 201\.[0-9] within the shape and 1250 around it, .*: exchange --inside and --outside; --force fits nevertheless$' \
     $torus turned.nii --inside 1300,270 --outside 40,170
+grep -q '^verdict' out && bad 'a fit with values that the start shows to be exchanged'
+expect 0 - $torus turned.nii --inside 40,170 --outside 1300,270 --start-centre 1,0,0
+# a start beside the shape, or many rotations: a notice
+sdmgen fit --shape torus -O edge=0.5 turned.nii --spacing 0.4 --inside 1300,270 --outside 40,170 --start-axis 0,0,1 --turns 1 --max-iterations 1 >out 2>err
+grep -q '^sdmgen: the values of the inside and the outside are exchanged: at the start .*: exchange --inside and --outside, if the shape lies near the start$' err ||
+    bad "no notice of exchanged values: $(cat err)"
+expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside are exchanged: .*: exchange --inside and --outside$' \
+    $torus turned.nii --inside 1300,270 --outside 40,170 --force
 has '^  given values doubtful  [0-9.]+, need at most 3 '
 grep -q 'other values than those of this kind of image' out && bad 'another cause beside exchanged values'
 grep -q -- '--rotation gives one start' out && bad 'advice on the start beside exchanged values'
 expect 0 - sdmgen phantom --shape cochlea -O edge=0.6 --spacing 0.4 --random-pose 10,0.3 --seed 1 -o thin.nii --quiet
 expect 4 '^sdmgen: error: thin.nii: the values of the inside and the outside are exchanged: [^;]*$' \
-    sdmgen fit --shape cochlea -O edge=0.6 thin.nii --quiet --rotation 0,0,0 --spacing 0.4 --max-iterations 5 --mirror no --inside 1300,270 --outside 40,170
+    sdmgen fit --shape cochlea -O edge=0.6 thin.nii --quiet --rotation 0,0,0 --spacing 0.4 --max-iterations 5 --mirror no --inside 1300,270 --outside 40,170 --force
 # the right values beside the shape: another cause
 expect 4 '^sdmgen: error: thin.nii: ' sdmgen fit --shape cochlea -O edge=0.6 thin.nii --quiet --rotation 3,0,0 --start-centre 6,6,0 --spacing 0.4 --max-iterations 5 --mirror no
 grep -q exchanged err && bad "exchanged values are named for a wrong start: $(cat err)"

@@ -308,6 +308,9 @@ sdm_status cli_fit_write_picture(const cli_fit *f, const char *path, sdm_error *
  * as 0. */
 double cli_fit_interpolate(const sdm_grid *g, const float *values, const double world[3]);
 
+/* Prints the pairs of parameters of which only a sum or a difference is well determined. */
+void cli_fit_print_correlated(const cli_fit *f);
+
 /* Prints the result as text on stdout. */
 void cli_fit_print(const cli_fit *f);
 

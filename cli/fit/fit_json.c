@@ -130,6 +130,7 @@ static void add_work(sdm_json *j, const cli_fit *f)
     sdm_json_real(j, "seconds_network", r->seconds_network);
     sdm_json_real(j, "seconds_exact", r->seconds_exact);
     sdm_json_real(j, "seconds_search", r->seconds_search);
+    sdm_json_real(j, "seconds_verdict", r->seconds_verdict);
     sdm_json_int(j, "threads", sdm_threads((int)f->args->threads));
 }
 

@@ -132,6 +132,7 @@ void cli_fit_print(const cli_fit *f)
     printf("%s fitted to %s%s\n", f->shape_name, f->path,
            f->doubt.status ? ": NOT TO BE TRUSTED" : "");
     print_params(f);
+    cli_fit_print_correlated(f);
     print_vector("rotation", r->pose.rotation, r->pose_sd_determined, "rad");
     print_vector("translation", r->pose.translation, r->pose_sd_determined + 3, "mm");
     if (*r->open_motions)
@@ -150,6 +151,9 @@ void cli_fit_print(const cli_fit *f)
         printf("  restarts     %zu: a refused fit went on from another value of a parameter\n",
                r->n_restarts);
     print_maps(f);
-    printf("  time         %.2f s: maps %.2f s; search of the start %.2f s\n", r->seconds,
-           r->seconds_network + r->seconds_exact, r->seconds_search);
+    printf(
+        "  time         %.2f s: search of the start %.2f s; iterations %.2f s; verdict and rivals "
+        "%.2f s; in them maps %.2f s\n",
+        r->seconds, r->seconds_search, fmax(r->seconds - r->seconds_search - r->seconds_verdict, 0),
+        r->seconds_verdict, r->seconds_network + r->seconds_exact);
 }

@@ -591,12 +591,14 @@ static sdm_status attempt(fit_problem *p, sdm_fit_result *out, fit_state *fitted
 {
     // 5. maximise the posterior; 6. covariance
     sdm_status s = maximise(p, out, err);
+    const double from = sdm_clock();
     if (!s) s = assess(p, out, err);
     if (!s) sdm_fit_accept_small_steps(p, out);
     // 7. report the result, also of a fit that failed with SDM_E_QUALITY; 8. judge it
     if (!s || s == SDM_E_QUALITY) report(p, out);
     *fitted = p->state;
     if (!s) s = judge(p, out, err);
+    out->seconds_verdict += sdm_clock() - from;
     if (s) out->verdict.grade = SDM_FIT_FAILED;
     return s;
 }
@@ -611,6 +613,7 @@ static sdm_status attempt_renew(fit_problem *p, sdm_fit_result *out, sdm_error *
     const sdm_status s = result_create(p->n_params, out, err);
     out->turn = old.turn;
     out->seconds_search = old.seconds_search;
+    out->seconds_verdict = old.seconds_verdict;
     out->start_clamped = old.start_clamped;
     out->n_cavity = old.n_cavity;
     out->widest_space = old.widest_space;

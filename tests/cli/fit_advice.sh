@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: a refused fit names its likely cause: a start away from the data, points in another frame, exchanged values.
-# Tests: fit_astray.c cause.c
+# Tests: fit_astray.c fit_correlated.c cause.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 negate() { awk -F, 'NR == 1 { print; next } { printf "%g,%g,%s\n", -$1, -$2, $3 }' "$1"; }
@@ -58,4 +58,9 @@ expect 0 - sdmgen phantom --shape torus -O edge=0.5 --spacing 0.4 -o torus.nii -
 torus='sdmgen fit --shape torus -O edge=0.5 torus.nii --rotation 0,0,0 --spacing 0.4 --eps 1e-3 --quiet --start-centre 1.5,1,0.5'
 expect 4 'the values of the inside and the outside are exchanged: a fit that exchanges them finds the shape in this image, .*: exchange --inside and --outside$' \
     $torus --inside 1300,270 --outside 40,170
+# A small patch of points tells only the sum of two radii; the parts of the time have names.
+awk 'BEGIN { print "x,y,z"; for (i = 0; i < 20; i++) for (j = 0; j < 20; j++) { u = 0.6 + 0.005 * i; t = -0.1 + 0.01 * j; s = sqrt(1 - u * u); e = 0.02 * cos(7 * i + 3 * j * j); print 4 * s * cos(t) + e "," 3.5 * s * sin(t) "," 3 * u + e } }' >patch.csv
+sdmgen fit --shape ellipsoid -p rx=4 -p ry=3.5 -p rz=3 patch.csv --keep pose --keep ry --rotation 0,0,0 --translation 0,0,0 --quiet >out 2>err
+has '^  rx and rz: only their sum is well determined \(correlation -0\.9[0-9]\)$'
+has '^  time .* s: search of the start .* s; iterations .* s; verdict and rivals .* s; in them maps .* s$'
 finish

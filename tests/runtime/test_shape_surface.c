@@ -8,6 +8,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -317,6 +318,28 @@ static double radius_variance(const sdm_fit_result *r)
     return c[0] + 0.2 * c[1] + 0.01 * c[size + 1];
 }
 
+/* The check tells the change in the unit of its parameter, over the deviation without it; no figure
+ * where the data do not determine the parameter. */
+static void network_error_text(const sdm_fit_result *r)
+{
+    const size_t k = r->network_error_param;
+    const double alone = sqrt(r->sd[k] * r->sd[k] - r->network_error * r->network_error);
+    size_t i = 0;
+    char by[80];
+    while (r->verdict.findings[i].kind != SDM_FIT_CHECK_NETWORK_ERROR) i++;
+    const sdm_fit_finding *x = &r->verdict.findings[i];
+    if (x->grade == SDM_FIT_PASSED) return;
+    if (isnan(x->figure)) {
+        assert_true(r->at_bound[k] || r->by_prior[k]);
+        assert_non_null(strstr(x->text, ", which "));
+        return;
+    }
+    assert_true(fabs(r->network_error / alone / r->network_error_sd - 1) < 1e-6);
+    snprintf(by, sizeof by, "by about %.2g mm, %.2g times its standard deviation without this",
+             r->network_error, r->network_error_sd);
+    if (!strstr(x->text, by)) fail_msg("not '%s': %s", by, x->text);
+}
+
 /* A network whose map is that of a ball of 1.25 + slope (radius - 1.25) mm takes points of one of
  * 1.26 mm for one of about 1.25 + 0.01 / slope mm. Where the shape is known, the covariance holds
  * the square of the difference to the fit with exact distances, however wrong the derivative of the
@@ -338,6 +361,7 @@ static void network_error(double slope, double (*derivative)(const double[3]))
         const sdm_status s = sdm_fit(&source[i], &target, &o, &r, &err);
         if (s && s != SDM_E_QUALITY) fail_msg("%s", err.text);
         assert_true((i == 1) == !isnan(r.network_error_sd));
+        if (i == 1) network_error_text(&r);
         radius[i] = ball_radius(r.params);
         variance[i] = radius_variance(&r);
         sdm_fit_dispose(&r);

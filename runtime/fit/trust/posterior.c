@@ -69,14 +69,15 @@ static double model_error(const fit_problem *p)
 // sd of a variance; NaN for a negative one, since 0 would mean that the unknown is known exactly
 static double sd_of(double variance) { return variance >= 0 ? sqrt(variance) : NAN; }
 
-// keeps the parameter that the error of the network moves most: `more` and `variance`, the squared
-// move and the variance without it
-static void network_error_add(sdm_fit_result *out, size_t param, double more, double variance)
+// keeps the parameter that the error of the network moves most: by `change`; variance: that without
+// it
+static void network_error_add(sdm_fit_result *out, size_t param, double change, double variance)
 {
-    const double moves = variance > 0 ? sqrt(more / variance) : 0;
+    const double moves = variance > 0 ? fabs(change) / sqrt(variance) : 0;
     if (out->network_error_sd >= moves) return;
     out->network_error_sd = moves;
     out->network_error_param = param;
+    out->network_error = fabs(change);
 }
 
 // covariance, sd and correlation from the sandwich; bias[n][n]: what the voxels of the maps add to
@@ -110,7 +111,7 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
             const double c = sandwich(n, influence, spread, i, j) + bias[i * n + j],
                          more = change ? change[i] * change[j] : 0;
             out->covariance[i * size + j] = out->covariance[j * size + i] = c + more;
-            if (change && i == j && i < p->n_params) network_error_add(out, i, more, c);
+            if (change && i == j && i < p->n_params) network_error_add(out, i, change[i], c);
         }
     sdm_fit_pose_params_spread(p, out->covariance);
     for (size_t i = 0; i < 6; i++)

@@ -527,6 +527,10 @@ typedef struct sdm_fit_result {
        measured */
     double network_error_sd;
     size_t network_error_param;
+    /* the change itself, in the unit of this parameter */
+    double network_error;
+    /* wall-clock time of the verdict: standard deviations, checks and rivals */
+    double seconds_verdict;
     /* edge of the voxels of exact maps (mm) that would be fine enough, where the check
        SDM_FIT_CHECK_VOXELS has not passed; else NaN */
     double advised_voxel_mm;

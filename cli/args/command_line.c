@@ -48,6 +48,25 @@ static sdm_status option_of_others(const cli_args *args, const char *name, sdm_e
                     args->command->name);
 }
 
+/* Appends what the command has for a word of other programs: "--spacing MM or --size NX,NY,NZ". */
+static void add_aliases(const cli_args *args, const char *word, sdm_text *out)
+{
+    const bool keys = strstr(args->command->synopsis, "key=value") != NULL;
+    size_t row = 0;
+    for (const char *name; (name = cli_alias_next(word, &row));) {
+        const bool key = strchr(name, '=') != NULL;
+        const cli_option *o = key ? NULL : cli_find_option(command_index(args), name, strlen(name));
+        if (key ? !keys : !o) continue;
+        sdm_text_add(out, "%s", out->data ? " or " : "");
+        if (key)
+            sdm_text_add(out, "%s", name);
+        else if (o->letter)
+            sdm_text_add(out, "-%c %s", o->letter, o->value);
+        else
+            sdm_text_add(out, "--%s %s", name, o->value);
+    }
+}
+
 static sdm_status unknown_option(const cli_args *args, const char *word, size_t length,
                                  sdm_error *err)
 {
@@ -61,7 +80,7 @@ static sdm_status unknown_option(const cli_args *args, const char *word, size_t 
     name[cut] = '\0';
     const char *command = args->command->name, *near = sdm_nearest_name(name, names, n);
     sdm_text aliases = {0};
-    cli_add_aliases(args->command, name, &aliases);
+    add_aliases(args, name, &aliases);
     sdm_status s = aliases.data
                        ? sdm_fail(err, SDM_E_ARG, "%s: unknown option --%s; did you mean %s?",
                                   command, name, aliases.data)

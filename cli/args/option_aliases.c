@@ -25,22 +25,11 @@ static const char *const ALIASES[][2] = {{"center", "start-centre"},
                                          {"out", "output"},
                                          {"output", "out"}};
 
-void cli_add_aliases(const cli_command *command, const char *word, sdm_text *out)
+const char *cli_alias_next(const char *word, size_t *row)
 {
-    const size_t index = (size_t)(command - cli_commands);
-    const bool keys = strstr(command->synopsis, "key=value") != NULL;
-    for (size_t i = 0; i < sizeof ALIASES / sizeof *ALIASES; i++) {
-        if (strcmp(ALIASES[i][0], word)) continue;
-        const char *name = ALIASES[i][1];
-        const bool key = strchr(name, '=') != NULL;
-        const cli_option *o = key ? NULL : cli_find_option(index, name, strlen(name));
-        if (key ? !keys : !o) continue;
-        sdm_text_add(out, "%s", out->data ? " or " : "");
-        if (key)
-            sdm_text_add(out, "%s", name);
-        else if (o->letter)
-            sdm_text_add(out, "-%c %s", o->letter, o->value);
-        else
-            sdm_text_add(out, "--%s %s", name, o->value);
+    while (*row < sizeof ALIASES / sizeof *ALIASES) {
+        const char *const *alias = ALIASES[(*row)++];
+        if (!strcmp(alias[0], word)) return alias[1];
     }
+    return NULL;
 }

@@ -228,9 +228,10 @@ extern const size_t cli_n_options;
 sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err);
 void cli_args_dispose(cli_args *args);
 
-/* Appends what the command has for a word that other programs use: "--spacing MM" for "voxel".
- * Nothing is appended, and out->data stays NULL, if it has nothing. */
-void cli_add_aliases(const cli_command *command, const char *word, sdm_text *out);
+/* The name of the next option, "spacing" for "voxel", that other programs call by this word, or of
+ * the next key of a configuration with an example of its value; NULL: there is no further one. *row
+ * is 0 before the first call. */
+const char *cli_alias_next(const char *word, size_t *row);
 
 /* Returns the command of that name. NULL: there is none; *err holds SDM_E_ARG with "did you
  * mean". */

@@ -41,6 +41,12 @@ bool sdm_fit_has_prior(const fit_problem *p)
            (!o->keep_pose && (o->prior_rotation_sd > 0 || o->prior_translation_sd > 0));
 }
 
+bool sdm_fit_may_have_prior(const fit_problem *p, size_t i)
+{
+    const size_t means = fit_columns(p->n_params);
+    return i < fit_at_blur(p->n_params) || (i >= means && i < means + p->observation.n_in);
+}
+
 double sdm_fit_prior_sd(const fit_problem *p, size_t k)
 {
     const double range = p->high[k] - p->low[k];

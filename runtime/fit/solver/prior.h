@@ -6,6 +6,9 @@
 /* Whether any unknown that is estimated has a prior. */
 bool sdm_fit_has_prior(const fit_problem *p);
 
+/* Whether unknown i is of a kind that has priors: all but the blur and the means outside. */
+bool sdm_fit_may_have_prior(const fit_problem *p, size_t i);
+
 /* Sd of parameter k before the fit, in the unit of the parameter: that of its prior or, without a
  * prior, that of the uniform distribution over its range. */
 double sdm_fit_prior_sd(const fit_problem *p, size_t k);

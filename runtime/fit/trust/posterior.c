@@ -145,6 +145,7 @@ sdm_status sdm_fit_weigh_priors(const fit_problem *p, double *weight, double *no
         for (size_t i = 0; i < n; i++) weight[i] = 1;
         for (size_t k = 0; k < m; k++) {
             const size_t i = list[k];
+            if (!sdm_fit_may_have_prior(p, i)) continue;
             const double ratio =
                 known ? sandwich(n, influence, scatter.noise, i, i) / influence[i * (n + 1)] : 0;
             weight[i] = known ? fmax(ratio, 1) : *noise_factor;

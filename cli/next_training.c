@@ -96,6 +96,20 @@ static void add_error(sdm_text *text, double error, double own)
         sdm_text_add(text, ", the same");
 }
 
+/* Prints the command that trains again with the changes of a verdict, after `begin`. Returns
+ * whether it did. */
+static bool print_command(const char *begin, const cli_args *args, const sdm_train_report *r,
+                          const sdm_verdict *changes, const char *kind)
+{
+    sdm_text command = {0};
+    add_changes(&command, args, changes, kind);
+    add_options(&command, args, r);
+    const bool whole = !command.failed;
+    if (whole) printf("%ssdmgen train%s\n", begin, command.data);
+    sdm_text_dispose(&command);
+    return whole;
+}
+
 /* Does the template err far from the surface alone, so that another kind is a choice? */
 static bool is_far(const sdm_verdict *v)
 {
@@ -154,19 +168,14 @@ void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_ti
     // the verdict, with the changes of the other kind: none but the minutes
     const sdm_verdict pod = {.minutes = minutes};
     const bool far = is_far(&r->verdict) && print_far(r), slow = print_slow(r, times);
-    sdm_text command = {0};
     if (!far && !slow) return;
     if (r->compared && r->other_path[0]) {
         printf("              pod is %s (%s)\n", r->other_path, sdm_grade_name(r->other_grade));
         return;
     }
     // the line `next` has the command
-    if (args->files.n && !sdm_verdict_needs_pod(&r->verdict)) {
-        add_changes(&command, args, &pod, "pod");
-        add_options(&command, args, r);
-        if (!command.failed) printf("              sdmgen train%s\n", command.data);
-    }
-    sdm_text_dispose(&command);
+    if (args->files.n && !sdm_verdict_needs_pod(&r->verdict))
+        print_command("              ", args, r, &pod, "pod");
 }
 
 /* The line `next` of a template that errs near the surface. */
@@ -175,7 +184,6 @@ static void print_next_pod(const cli_args *args, const sdm_train_report *r, doub
     const double ratio = r->other_voxel_mm / r->verdict.rmse_voxel_mm;
     // auto has given pod a part of the minutes
     const sdm_verdict pod = {.minutes = r->compared ? 2 * minutes : minutes};
-    sdm_text command = {0};
     if (r->compared && ratio > MUCH_WORSE) {
         printf(
             "  next        no training is known to help near the surface: pod, which auto has "
@@ -184,11 +192,7 @@ static void print_next_pod(const cli_args *args, const sdm_train_report *r, doub
             ratio);
         return;
     }
-    if (!args->files.n) return;
-    add_changes(&command, args, &pod, "pod");
-    add_options(&command, args, r);
-    if (!command.failed) printf("  next        sdmgen train%s\n", command.data);
-    sdm_text_dispose(&command);
+    if (args->files.n) print_command("  next        ", args, r, &pod, "pod");
 }
 
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
@@ -199,19 +203,14 @@ void cli_print_next(const cli_args *args, const sdm_train_report *r, const char 
         print_next_pod(args, r, minutes);
         return;
     }
-    sdm_text command = {0};
     // the maps of another grid are not in --dataset
     const bool other_maps = args->dataset && (v->cut > 0 || !strncmp(v->key, "grid.", 5));
     if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || other_maps) return;
-    add_changes(&command, args, v, kind);
-    add_options(&command, args, r);
-    if (!command.failed)
-        printf("  %-11s sdmgen train%s\n", v->grade == SDM_GRADE_GOOD ? "better" : "next",
-               command.data);
-    if (!command.failed && kind && isfinite(ms_map))
+    const bool printed = print_command(
+        v->grade == SDM_GRADE_GOOD ? "  better      " : "  next        ", args, r, v, kind);
+    if (printed && kind && isfinite(ms_map))
         printf(
             "              (%s again, %.3g ms a map on this grid; network.kind=auto would choose "
             "anew)\n",
             kind, ms_map);
-    sdm_text_dispose(&command);
 }

@@ -228,9 +228,10 @@ extern const size_t cli_n_options;
 sdm_status cli_parse(int argc, char **argv, cli_args *args, sdm_error *err);
 void cli_args_dispose(cli_args *args);
 
-/* The name of the next option, "spacing" for "voxel", that other programs call by this word, or of
- * the next key of a configuration with an example of its value; NULL: there is no further one. *row
- * is 0 before the first call. */
+/* Finds what sdmgen calls a word of other programs. Each call returns one more name: of an option,
+ * as "spacing" for "voxel", or of a key of the configuration with an example of its value, as
+ * "grid.spacing=0.5". NULL: there is no further name. *row must be 0 before the first call, and is
+ * where the search goes on. */
 const char *cli_alias_next(const char *word, size_t *row);
 
 /* Returns the command of that name. NULL: there is none; *err holds SDM_E_ARG with "did you

@@ -112,8 +112,8 @@ const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_err
     return NULL;
 }
 
-/* Is the name of one of the n options of a shape that of a parameter, which the shape has without
- * options? Adds the right words to the message. */
+/* The n options were refused. If one of them has the name of a parameter, replaces the message by
+ * one that says so, with -p. The parameters are those that the shape has without options. */
 static void explain_option(const sdm_shape *shape, const sdm_named_text *named, size_t n,
                            sdm_error *err)
 {

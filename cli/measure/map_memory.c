@@ -13,8 +13,9 @@
 #include "sdm/internal/clock.h"
 #include "sdm/internal/heap.h"
 
-/* Bytes of the maps of which the time is told, of those that an error proposes at most, and of
- * those that the notice about a large map proposes. */
+/* A map of LARGE bytes or more is told, with its time. A map that does not fit is refused, with a
+ * spacing that makes one of at most PROPOSED_MAX bytes. The notice about a large map proposes a
+ * spacing that makes one of SMALL bytes. */
 static const double LARGE = 1e9, PROPOSED_MAX = 4e9, SMALL = 2e8;
 
 /* Voxels of the planes that measure the time. */
@@ -43,8 +44,8 @@ double cli_free_memory(void)
     return machine > 0 ? fmin(machine, left) : left;
 }
 
-/* Appends "; the same box with --spacing 0.36 needs 2.1 GB": a spacing of two digits with which
- * `bytes` become at most `wanted`. */
+/* A map on the grid takes `bytes`. Appends a spacing, rounded up to two digits, with which it takes
+ * at most `wanted`: "; the same box with --spacing 0.36 needs 2.1 GB". */
 static void add_coarser(const sdm_grid *g, double bytes, double wanted, sdm_text *text)
 {
     const bool uniform = g->spacing[1] == g->spacing[0] && g->spacing[2] == g->spacing[0];

@@ -12,6 +12,7 @@
 #include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/verdict.h"
+#include "sdm/internal/volume_cause.h"
 #include "sdm/isosurface.h"
 #include "sdm/memory.h"
 #include "sdm/meshfile.h"
@@ -22,10 +23,6 @@
 
 /* Largest part by which the volume of a surface may differ from that of the shape in silence. */
 #define VOLUME_OFF_MAX 0.02
-
-/* Voxels explain that the surface of a network's map encloses less than the shape if this is more
-   than such a multiple of the error of the volumes of maps, which edges change little. */
-#define NETWORK_OFF 2
 
 typedef enum file_kind {
     KIND_NONE = 0,
@@ -152,7 +149,8 @@ static sdm_status map_beyond(void *engine, const sdm_grid *grid, float *values, 
  * so that the surface encloses less. */
 static bool network_errs(const cli_map *map, double more)
 {
-    return map->quality && (more > 0 || -more < NETWORK_OFF * map->quality->volume_error);
+    return map->quality &&
+           (more > 0 || !sdm_voxels_explain_volume(-more, map->quality->volume_error));
 }
 
 /* Warns of a surface that encloses volume[0] mm^3 in place of volume[1]. */

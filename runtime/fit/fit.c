@@ -578,7 +578,7 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     if (!s && !p->is_rival) s = sdm_fit_flat_params_spread(p, out, err);
     if (s && s != SDM_E_QUALITY) return s;
     out->inside_share = sdm_fit_inside_share(p);
-    if (p->target->kind == SDM_FIT_IMAGE && !p->given_labels) {
+    if (fit_is_image(p)) {
         const sdm_status found =
             sdm_fit_shapeless_log_likelihood(p, &out->log_likelihood_without, err);
         if (found) return found;

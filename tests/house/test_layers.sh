@@ -43,7 +43,7 @@ check() {
         own("geom", "exact isosurface map mesh")
         own("geom", "brute_force builder methods part_audit")
         own("nn", "model")
-        own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template")
+        own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template volume_cause")
         own("io", "glb image meshfile npy picture picture_child ssm volume")
         own("shape", "callback conformance isolation mesh_measures registry shape_box shape_repeat shape_sums shape_survey skipped")
         own("shapes", "builtin_shapes")

@@ -11,6 +11,7 @@
 
 #include "oracle/exact_meshes.h"
 #include "oracle/fit_tools.h"
+#include "oracle/give_mesh.h"
 #include "sdm/internal/rng.h"
 
 static const sdm_param table_params[1] = {{"height", "mm", 30, 70, 50, "of the upper side"}};
@@ -24,12 +25,8 @@ static int table_mesh(const void *self, const sdm_host *host, const sdm_option_v
     mesh_box(&plate, (const double[3]){-30, -24, p[0] - 6}, (const double[3]){30, 24, p[0]});
     mesh_box(&leg, (const double[3]){-3, -3, 0}, (const double[3]){3, 3, p[0] - 3});
     mesh_append(&plate, &leg);
-    const int failed = host->reserve(host, out, plate.n_vert, plate.n_tri);
-    if (!failed) memcpy(out->vert, plate.vert, 3 * plate.n_vert * sizeof *plate.vert);
-    if (!failed) memcpy(out->tri, plate.tri, 3 * plate.n_tri * sizeof *plate.tri);
-    sdm_mesh_dispose(&plate);
     sdm_mesh_dispose(&leg);
-    return failed;
+    return give_mesh(host, out, &plate);
 }
 
 static const sdm_shape table = {.abi = SDM_SHAPE_ABI,

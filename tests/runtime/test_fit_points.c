@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "oracle/fit_tools.h"
+#include "oracle/give_mesh.h"
 
 // ---- points on a surface
 
@@ -194,11 +195,7 @@ static int brick_mesh(const void *self, const sdm_host *host, const sdm_option_v
     sdm_mesh m = {0};
     add_box(&m, (const double[3]){-0.5 * p[0], -0.5 * p[1], -0.5 * p[2]},
             (const double[3]){0.5 * p[0], 0.5 * p[1], 0.5 * p[2]});
-    const int failed = host->reserve(host, out, m.n_vert, m.n_tri);
-    if (!failed) memcpy(out->vert, m.vert, 3 * m.n_vert * sizeof *m.vert);
-    if (!failed) memcpy(out->tri, m.tri, 3 * m.n_tri * sizeof *m.tri);
-    sdm_mesh_dispose(&m);
-    return failed;
+    return give_mesh(host, out, &m);
 }
 
 static const sdm_param brick_params[] = {

@@ -12,6 +12,7 @@
 #include "fit/trust/matching_steps.h"
 #include "oracle/exact_meshes.h"
 #include "oracle/fit_tools.h"
+#include "oracle/give_mesh.h"
 
 enum { EDGES = 3 };
 static const sdm_param box_params[EDGES] = {{"width", "mm", 6, 14, 10, "along x"},
@@ -25,11 +26,7 @@ static int box_mesh(const void *self, const sdm_host *host, const sdm_option_val
     sdm_mesh m = {0};
     (void)self, (void)options;
     mesh_box(&m, (const double[3]){-half[0], -half[1], -half[2]}, half);
-    const int failed = host->reserve(host, out, m.n_vert, m.n_tri);
-    if (!failed) memcpy(out->vert, m.vert, 3 * m.n_vert * sizeof *m.vert);
-    if (!failed) memcpy(out->tri, m.tri, 3 * m.n_tri * sizeof *m.tri);
-    sdm_mesh_dispose(&m);
-    return failed;
+    return give_mesh(host, out, &m);
 }
 
 static const sdm_shape box = {.abi = SDM_SHAPE_ABI,
@@ -258,12 +255,8 @@ static int bracket_mesh(const void *self, const sdm_host *host, const sdm_option
     mesh_box(&m, low[0], high[0]);
     mesh_box(&standing, low[1], high[1]);
     mesh_append(&m, &standing);
-    const int failed = host->reserve(host, out, m.n_vert, m.n_tri);
-    if (!failed) memcpy(out->vert, m.vert, 3 * m.n_vert * sizeof *m.vert);
-    if (!failed) memcpy(out->tri, m.tri, 3 * m.n_tri * sizeof *m.tri);
-    sdm_mesh_dispose(&m);
     sdm_mesh_dispose(&standing);
-    return failed;
+    return give_mesh(host, out, &m);
 }
 
 static const sdm_shape bracket = {.abi = SDM_SHAPE_ABI,

@@ -45,30 +45,38 @@ static const sdm_shape flask = {.abi = SDM_SHAPE_ABI,
                                 .n_params = FLASK_PARAMS,
                                 .mesh = flask_mesh};
 
-/* Fits 3000 points of a flask with a neck of 3.5 mm, errors 0.05 mm; without those of the neck
- * unless `whole`. The neck starts at `start`. */
-static sdm_fit_result fit_flask(bool whole, double start)
+/* A fit to points of a shape with normal errors, without those whose coordinate `axis` exceeds
+ * `most`. */
+typedef struct points_fit {
+    const sdm_shape *shape;
+    const double *truth, *start; /* parameters */
+    sdm_grid grid;               /* of the maps */
+    size_t n, axis;              /* number of points on the whole surface, POINTS_MAX at most */
+    double noise, most;
+} points_fit;
+
+enum { POINTS_MAX = 3000 };
+
+static sdm_fit_result fit_points_of(const points_fit *f)
 {
-    enum { N = 3000 };
-    const double truth[FLASK_PARAMS] = {2, 3.5}, from[FLASK_PARAMS] = {2.1, start};
     sdm_instance *shape = NULL;
     sdm_mesh m = {0};
-    double x[3 * N];
+    double x[3 * POINTS_MAX];
     size_t n = 0;
-    assert_int_equal(sdm_instance_create(&flask, NULL, 0, NULL, &shape, NULL), SDM_OK);
-    assert_int_equal(sdm_instance_mesh(shape, truth, &m, NULL), SDM_OK);
-    assert_int_equal(sdm_fit_surface_points(&m, N, 2, x, NULL), SDM_OK);
-    for (size_t i = 0; i < N; i++) {
-        if (!whole && x[3 * i + 2] > HEIGHT + 0.3) continue; // the root of the neck stays
-        for (size_t k = 0; k < 3; k++) x[3 * n + k] = x[3 * i + k] + 0.05 * sdm_rng_normal(1, k, i);
+    assert_true(f->n <= POINTS_MAX);
+    assert_int_equal(sdm_instance_create(f->shape, NULL, 0, NULL, &shape, NULL), SDM_OK);
+    assert_int_equal(sdm_instance_mesh(shape, f->truth, &m, NULL), SDM_OK);
+    assert_int_equal(sdm_fit_surface_points(&m, f->n, 2, x, NULL), SDM_OK);
+    for (size_t i = 0; i < f->n; i++) {
+        if (x[3 * i + f->axis] > f->most) continue;
+        for (size_t k = 0; k < 3; k++)
+            x[3 * n + k] = x[3 * i + k] + f->noise * sdm_rng_normal(1, k, i);
         n++;
     }
-    const sdm_fit_source source = {
-        .shape = shape,
-        .grid = sdm_grid_centred((int64_t[3]){30, 30, 44}, 0.25, (double[3]){0, 0, 4})};
+    const sdm_fit_source source = {.shape = shape, .grid = f->grid};
     const sdm_fit_target target = {.kind = SDM_FIT_POINTS, .points = x, .n_points = n};
     sdm_fit_opts o = sdm_fit_defaults();
-    o.start_params = from;
+    o.start_params = f->start;
     o.n_threads = 2;
     sdm_fit_result r;
     sdm_error err = {0};
@@ -76,6 +84,22 @@ static sdm_fit_result fit_flask(bool whole, double start)
     sdm_mesh_dispose(&m);
     sdm_instance_free(shape);
     return r;
+}
+
+/* Fits 3000 points of a flask with a neck of 3.5 mm, errors 0.05 mm; without those of the neck
+ * unless `whole`: its root stays. The neck starts at `start`. */
+static sdm_fit_result fit_flask(bool whole, double start)
+{
+    const points_fit f = {
+        .shape = &flask,
+        .truth = (const double[FLASK_PARAMS]){2, 3.5},
+        .start = (const double[FLASK_PARAMS]){2.1, start},
+        .grid = sdm_grid_centred((int64_t[3]){30, 30, 44}, 0.25, (double[3]){0, 0, 4}),
+        .n = 3000,
+        .axis = 2,
+        .noise = 0.05,
+        .most = whole ? INFINITY : HEIGHT + 0.3};
+    return fit_points_of(&f);
 }
 
 static const char *text_of_covered(const sdm_fit_result *r)
@@ -142,34 +166,19 @@ static const sdm_shape cup = {.abi = SDM_SHAPE_ABI,
  * without those where x > most. */
 static sdm_fit_result fit_cup(double most)
 {
-    enum { N = 2400 };
-    const double truth[CUP_PARAMS] = {2, 4}, from[CUP_PARAMS] = {2.1, 3.8};
-    sdm_instance *shape = NULL;
-    sdm_mesh m = {0};
-    double x[3 * N];
-    size_t n = 0;
-    assert_int_equal(sdm_instance_create(&cup, NULL, 0, NULL, &shape, NULL), SDM_OK);
-    assert_int_equal(sdm_instance_mesh(shape, truth, &m, NULL), SDM_OK);
-    assert_int_equal(sdm_fit_surface_points(&m, N, 2, x, NULL), SDM_OK);
-    for (size_t i = 0; i < N; i++) {
-        if (x[3 * i] > most) continue;
-        for (size_t k = 0; k < 3; k++) x[3 * n + k] = x[3 * i + k] + 0.02 * sdm_rng_normal(1, k, i);
-        n++;
-    }
-    const sdm_fit_source source = {
-        .shape = shape,
-        .grid = sdm_grid_centred((int64_t[3]){20, 20, 20}, 0.37, (double[3]){0, 0, 2})};
-    const sdm_fit_target target = {.kind = SDM_FIT_POINTS, .points = x, .n_points = n};
-    sdm_fit_opts o = sdm_fit_defaults();
-    o.start_params = from;
-    o.n_threads = 2;
-    sdm_fit_result r;
-    sdm_error err = {0};
-    if (sdm_fit(&source, &target, &o, &r, &err)) fail_msg("%s", err.text);
+    const double truth[CUP_PARAMS] = {2, 4};
+    const points_fit f = {
+        .shape = &cup,
+        .truth = truth,
+        .start = (const double[CUP_PARAMS]){2.1, 3.8},
+        .grid = sdm_grid_centred((int64_t[3]){20, 20, 20}, 0.37, (double[3]){0, 0, 2}),
+        .n = 2400,
+        .axis = 0,
+        .noise = 0.02,
+        .most = most};
+    const sdm_fit_result r = fit_points_of(&f);
     for (size_t k = 0; k < CUP_PARAMS; k++)
         if (!(fabs(r.params[k] - truth[k]) < 0.02)) fail_msg("%zu: %g", k, r.params[k]);
-    sdm_mesh_dispose(&m);
-    sdm_instance_free(shape);
     return r;
 }
 

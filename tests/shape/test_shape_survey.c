@@ -77,8 +77,8 @@ static void parts_begin_to_meet(void **state)
     }
 }
 
-// A parameter that moves vertices inside of another part alone is found, and no other one: a brief
-// survey does not look for it, and nothing is said of meshes that are broken.
+// The survey finds a parameter that moves only vertices inside of another part, and finds no other
+// parameter. A brief survey does not look for such parameters, nor does one of broken meshes.
 static void parameters_that_move_no_surface(void **state)
 {
     (void)state;

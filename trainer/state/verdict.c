@@ -6,10 +6,7 @@
 #include <string.h>
 
 #include "sdm/internal/part_audit.h"
-
-/* The grid, not the network, changes the volumes of surfaces if their error is this multiple of
-   that of the volumes of maps, which edges between the voxels change little. */
-static const double GRID_SHARE = 2;
+#include "sdm/internal/volume_cause.h"
 
 const char *sdm_cause_name(sdm_cause cause)
 {
@@ -57,7 +54,8 @@ bool sdm_verdict_surfaces_off(const sdm_verdict *v)
 
 bool sdm_verdict_voxels_cut(const sdm_verdict *v)
 {
-    return sdm_verdict_surfaces_off(v) && !(v->surface_volume_error < GRID_SHARE * v->volume_error);
+    return sdm_verdict_surfaces_off(v) &&
+           sdm_voxels_explain_volume(v->surface_volume_error, v->volume_error);
 }
 
 bool sdm_verdict_errs_near(const sdm_verdict *v)

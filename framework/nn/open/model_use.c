@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sdm/internal/volume_cause.h"
 #include "sdm/model.h"
 
 /* Digits after the point with which 100 * error is seen to exceed 100 * bad. */
@@ -71,10 +72,10 @@ sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error 
                       volume_slopes[] = "; take differences of volumes of the mesh (exact "
                                         "--measure): those of maps swing as faces cross planes of "
                                         "voxels";
-    // where maps are off as much as their surfaces, voxels do not explain it
-    const bool network = q->surface_volume_error < 2 * q->volume_error;
+    const bool network = !sdm_voxels_explain_volume(q->surface_volume_error, q->volume_error);
     const struct {
-        const char *name, *lines; // of `unfit`; NULL: the figure has no parameter
+        const char *name;  // of the figure
+        const char *lines; // how its lines in `unfit` begin, which name parameters; NULL: none do
         double error, bad;
         const char *remedy;
     } figures[] =

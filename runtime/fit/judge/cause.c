@@ -23,13 +23,13 @@
 
 static const char *data_name(const fit_problem *p)
 {
-    return p->target->kind == SDM_FIT_POINTS ? "points" : sdm_fit_is_image(p) ? "image" : "labels";
+    return p->target->kind == SDM_FIT_POINTS ? "points" : fit_is_image(p) ? "image" : "labels";
 }
 
 // whether the fit lies beside the shape of the data
 static bool is_lost(const fit_problem *p, const fit_misfit *m, const fit_suspects *other)
 {
-    const bool image = sdm_fit_is_image(p), points = p->target->kind == SDM_FIT_POINTS;
+    const bool image = fit_is_image(p), points = p->target->kind == SDM_FIT_POINTS;
     return (image && other->no_shape) || m->empty > LOST ||
            (!image && m->missing > (points ? LOST_POINTS : LOST));
 }
@@ -38,7 +38,7 @@ static bool is_lost(const fit_problem *p, const fit_misfit *m, const fit_suspect
 static bool is_absent(const fit_problem *p)
 {
     const fit_observation *o = &p->observation;
-    bool absent = sdm_fit_is_image(p) && o->n_in > 0;
+    bool absent = fit_is_image(p) && o->n_in > 0;
     for (size_t i = 0; i < o->n_in; i++) absent = absent && p->absent[i];
     return absent;
 }
@@ -102,7 +102,7 @@ static void name_cause(const fit_problem *p, const fit_misfit *m, const fit_susp
                  "%s%s, or the organ differs from the model (then say by how much it may: "
                  "sdm_fit_opts.tolerance)",
                  other->refused ? "another shape lies there"
-                 : sdm_fit_is_image(p)
+                 : fit_is_image(p)
                      ? m->worst[1].more
                            ? "the fit stopped beside the best place, another shape or a part that "
                              "this one lacks lies there, or the texture of the image is coarse"
@@ -128,7 +128,7 @@ void sdm_fit_beside_explain(const fit_problem *p, const fit_misfit *m, char text
     char place[FIT_PLACE_MAX];
     name_place(p, worst, place, sizeof place);
     snprintf(text, FIT_CAUSE_MAX, "%s: look there at a picture of the fit; %s", place,
-             sdm_fit_is_image(p)
+             fit_is_image(p)
                  ? "other things of the inside's material (sdm_fit_opts.cavity), or another shape"
              : worst->more ? "the shape is too thin or too short, or the data show another one"
                            : "the shape is too thick or too long, or the data show another one");

@@ -83,7 +83,7 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
         v, SDM_FIT_CHECK_CONVERGED, r->converged, SDM_FIT_FAILED, (double)r->n_iterations, NAN,
         "not converged after %zu iterations (%.120s); allow more of them, or give a nearer start",
         r->n_iterations, r->reason);
-    if (sdm_fit_is_image(p)) {
+    if (fit_is_image(p)) {
         sdm_fit_judge_add(
             v, SDM_FIT_CHECK_NO_SHAPE, r->evidence > SDM_FIT_PREFERRED, SDM_FIT_FAILED, r->evidence,
             SDM_FIT_PREFERRED,
@@ -168,7 +168,7 @@ static void check_residuals(const fit_problem *p, const fit_misfit *own, const f
 {
     const fit_misfit *m = own;
     const double voxel = fit_longest_edge(&p->maps.grid), beyond = m->chi_square[1] / m->limit[1];
-    const bool image = sdm_fit_is_image(p), points = p->target->kind == SDM_FIT_POINTS,
+    const bool image = fit_is_image(p), points = p->target->kind == SDM_FIT_POINTS,
                serious = m->empty + m->missing > SERIOUS_MIN,
                thin = voxel > COARSE * sdm_fit_inradius(&p->maps),
                refused = image ? p->maps.share && (serious || (thin && beyond > THIN_BEYOND))
@@ -221,10 +221,10 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
                           sdm_fit_verdict *v)
 {
     const bool points = p->target->kind == SDM_FIT_POINTS;
-    const char *what = sdm_fit_is_image(p) ? "image" : "labels";
-    const bool biased = sdm_fit_is_image(p) && !p->maps.share;
+    const char *what = fit_is_image(p) ? "image" : "labels";
+    const bool biased = fit_is_image(p) && !p->maps.share;
     const double most = fmax(p->opts->tolerance, biased ? VOLUME_MIN_BIASED : VOLUME_MIN),
-                 beside = sdm_fit_is_image(p) ? fmax(p->opts->beside, most) : most;
+                 beside = fit_is_image(p) ? fmax(p->opts->beside, most) : most;
     if (points)
         sdm_fit_judge_add(v, SDM_FIT_CHECK_EMPTY, m->empty <= most, SDM_FIT_FAILED, m->empty, most,
                           "points lie inside the shape: the space between them and its surface is "
@@ -253,8 +253,8 @@ static void check_volumes(const fit_problem *p, const fit_misfit *m, const sdm_f
             v, SDM_FIT_CHECK_MISSING, m->missing <= beside, SDM_FIT_FAILED, m->missing, beside,
             "beside the shape the %s hold%s as much of its material as %.3g %% of its volume, "
             "allowed %.0f %% (%s)",
-            what, sdm_fit_is_image(p) ? "s" : "", 100 * m->missing, 100 * beside,
-            sdm_fit_is_image(p) ? "sdm_fit_opts.beside" : "sdm_fit_opts.tolerance");
+            what, fit_is_image(p) ? "s" : "", 100 * m->missing, 100 * beside,
+            fit_is_image(p) ? "sdm_fit_opts.beside" : "sdm_fit_opts.tolerance");
 }
 
 // Doubts a fit to labels whose checks "empty" and "missing" pass, although some voxels far from the
@@ -419,11 +419,11 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     sdm_status s = sdm_fit_residuals_create(p, &residuals, err);
     const double robust = s ? 0 : sdm_fit_residual_correlation(&residuals);
     *factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
-    if (sdm_fit_is_image(p)) r->evidence = evidence_of(p, r, *factor);
-    fit_coarseness coarse = sdm_fit_coarseness(p, sdm_fit_is_image(p) ? r->blur : 0);
+    if (fit_is_image(p)) r->evidence = evidence_of(p, r, *factor);
+    fit_coarseness coarse = sdm_fit_coarseness(p, fit_is_image(p) ? r->blur : 0);
     if (!r->converged) coarse.blind = false; // the shape may be small on its way
     fit_at_bounds bounds = sdm_fit_at_bounds(p, r, *factor);
-    const bool points = p->target->kind == SDM_FIT_POINTS, labels = !points && !sdm_fit_is_image(p);
+    const bool points = p->target->kind == SDM_FIT_POINTS, labels = fit_is_labels(p);
     if (!s && labels) s = sdm_fit_measure_beyond(p, r, &bounds, err);
     check_basics(p, r, v);
     check_maps(p, v);
@@ -443,7 +443,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     // strays that form a surface belong to the data: they show how long these are
     if (!s && points && !has_passed(v, SDM_FIT_CHECK_PATCH))
         s = sdm_fit_measure_beyond(p, r, &bounds, err);
-    if (!s && sdm_fit_is_image(p)) check_tissues(p, &residuals, r, v);
+    if (!s && fit_is_image(p)) check_tissues(p, &residuals, r, v);
     if (!s && (points || p->given_labels) && !p->is_rival && v->grade != SDM_FIT_FAILED)
         s = sdm_fit_check_offset(p, v, err);
     if (!s) check_bounds(p, &misfit, &bounds, r, v);

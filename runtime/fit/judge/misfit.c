@@ -261,7 +261,7 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
     double volume = 0;
     for (size_t i = 0; i < r->n; i++) volume += r->expected[i];
     // labels show the place of the surface to 0.12 of their voxels
-    const bool labels = p->given_labels || p->target->kind == SDM_FIT_LABEL;
+    const bool labels = fit_is_labels(p);
     const double least = labels ? fmax(LABEL_ERROR / r->edge[0], MEAN_SD_MIN) : MEAN_SD_MIN;
     const double factor = points ? points_volume_factor(p) : 1;
     double correlation = 1, sum[2][2] = {{0}};

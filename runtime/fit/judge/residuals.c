@@ -42,17 +42,13 @@
 #define CORRELATION_MIN 0.05
 
 static bool is_voxels(const fit_problem *p) { return p->target->kind != SDM_FIT_POINTS; }
-static bool is_labels(const fit_problem *p)
-{
-    return p->given_labels || p->target->kind == SDM_FIT_LABEL;
-}
 
 // share of the inside that the shape predicts; where the field is the distance: the edge of labels
 // or of the point spread
 static double predicted_share(const fit_problem *p, double field)
 {
     if (p->maps.share) return fmin(fmax(field, 0), 1);
-    if (is_labels(p)) return fmin(fmax(0.5 - field / p->target->grid.spacing[0], 0), 1);
+    if (fit_is_labels(p)) return fmin(fmax(0.5 - field / p->target->grid.spacing[0], 0), 1);
     return 0.5 * erfc(field / p->opts->blur * 0.70710678118654752);
 }
 
@@ -142,7 +138,7 @@ static double side_value(const fit_problem *p, const fit_residuals *r, size_t i,
 // middle and spread of the values on one side
 static void side_measure(const fit_problem *p, fit_residuals *r, int side, double *list)
 {
-    const bool image = !is_labels(p);
+    const bool image = !fit_is_labels(p);
     size_t least = image && side == 1 ? INSIDE_MIN : DEEP_MIN;
     double limit = DEEP;
     size_t n = 0;
@@ -167,7 +163,7 @@ static void side_measure(const fit_problem *p, fit_residuals *r, int side, doubl
         const sdm_fit_law *tissue = main_tissue(p, side);
         r->middle[side] = tissue->mean, r->spread[side] = tissue->sd;
     }
-    if (!is_labels(p)) return;
+    if (!fit_is_labels(p)) return;
     r->middle[side] = side;
     // labels have no noise: where they vary deep inside, the shape lies on two materials
     if (r->n_deep[side] >= DEEP_LEAST) r->spread[side] = 0;
@@ -333,7 +329,7 @@ static void map_errors_fill(const fit_problem *p, fit_residuals *r, double radiu
 {
     const double error = maps_error(p, radius), h = is_voxels(p) ? p->target->grid.spacing[0] : 0,
                  width = hypot(p->state.blur, h / sqrt(12));
-    r->label_width = is_voxels(p) && is_labels(p) ? width / h : 0;
+    r->label_width = is_voxels(p) && fit_is_labels(p) ? width / h : 0;
     for (size_t i = 0; i < r->n; i++)
         r->map_error[i] = is_voxels(p) ? error * 1.6 * r->expected[i] * (1 - r->expected[i]) / width
                                        : error / radius;

@@ -14,14 +14,9 @@
 // loss of log-likelihood, below the worse one of the two, that is no valley
 #define VALLEY 0.5
 
-bool sdm_fit_is_image(const fit_problem *p)
-{
-    return p->target->kind == SDM_FIT_IMAGE && !p->given_labels;
-}
-
 sdm_status sdm_fit_stand(const fit_problem *p, double factor, fit_standing *out, sdm_error *err)
 {
-    if (sdm_fit_is_image(p)) {
+    if (fit_is_image(p)) {
         *out = (fit_standing){.log_likelihood = p->information.log_likelihood, .factor = factor};
         return SDM_OK;
     }

@@ -16,9 +16,6 @@ typedef struct fit_standing {
     size_t n_points; /* points: number of them that are no strays; else 0 */
 } fit_standing;
 
-/* Whether the target is an image: its voxels have tissues. */
-bool sdm_fit_is_image(const fit_problem *p);
-
 /* Fills *out from p->samples and p->information. factor: as fit_standing. SDM_E_NOMEM. */
 sdm_status sdm_fit_stand(const fit_problem *p, double factor, fit_standing *out, sdm_error *err);
 

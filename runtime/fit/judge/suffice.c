@@ -186,7 +186,7 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
     const double thinnest = thinnest_part(p);
     if (sdm_too_thin(thinnest, voxel))
         coarseness_limit(&c, thinnest / VOXEL_DIAGONAL, "the thinnest part of the shape");
-    if (p->given_labels || p->target->kind == SDM_FIT_LABEL)
+    if (fit_is_labels(p))
         coarseness_limit(&c, VOXEL_OVER_LABEL_MAX * fit_longest_edge(&p->target->grid),
                          "the voxels of the labels");
     if (blur > 0) coarseness_limit(&c, VOXEL_OVER_BLUR_MAX * blur, "the point spread of the image");

@@ -114,6 +114,18 @@ typedef struct fit_problem {
     const double *search_best;
 } fit_problem;
 
+/* Whether the target is an image: its voxels have tissues. */
+static inline bool fit_is_image(const fit_problem *p)
+{
+    return p->target->kind == SDM_FIT_IMAGE && !p->given_labels;
+}
+
+/* Whether the target is a label map. */
+static inline bool fit_is_labels(const fit_problem *p)
+{
+    return p->given_labels || p->target->kind == SDM_FIT_LABEL;
+}
+
 /* Whether parameter k keeps its start value. */
 static inline bool fit_param_is_kept(const fit_problem *p, size_t k)
 {

@@ -134,7 +134,8 @@ static sdm_status finer_maps_create(const fit_problem *p, double by, double plac
     return s;
 }
 
-// change[N]: what a finer map changes in the derivatives of the log-likelihood
+// change[N] = the derivatives of the log-likelihood by the unknowns with the finer maps, less those
+// with the maps of the fit
 static sdm_status finer_score_change(const fit_problem *p, const fit_maps *finer, double *change,
                                      sdm_error *err)
 {

@@ -172,8 +172,7 @@ sdm_status sdm_fit_posterior(fit_problem *p, sdm_fit_result *out, sdm_error *err
     memset(bias, 0, n * n * sizeof *bias);
     if (!s && known && p->target->kind == SDM_FIT_POINTS && !fit_maps_direct(&p->maps))
         s = sdm_fit_map_bias(p, influence, bias, err);
-    if (!s && known && !p->is_rival && p->target->kind == SDM_FIT_IMAGE && !p->given_labels &&
-        p->maps.share && p->maps.exact)
+    if (!s && known && !p->is_rival && fit_is_image(p) && p->maps.share && p->maps.exact)
         s = sdm_fit_finer_map_bias(p, influence, bias, err);
     bool measured = !s && known && !p->is_rival && sdm_fit_can_measure_network(p);
     if (measured) {

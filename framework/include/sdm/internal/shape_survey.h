@@ -226,9 +226,9 @@ bool sdm_survey_winds_wrongly(const sdm_shape_survey *s);
 
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
  * are usable, but a training or derivatives would suffer: parts that are inside out (also those
- * that the engine turns), parts without thickness or a
- * thousand times smaller than others, walls that pass through each other or outlines
- * that cross themselves or wind more than once, sizes, triangles or vertices that jump, a grid that
+ * that the engine turns), parts without thickness or SDM_SURVEY_TINY times smaller than others,
+ * walls that pass through each other, outlines that cross themselves or wind more than once, sizes,
+ * triangles or vertices that jump, a grid that
  * cuts, is too coarse for a part or far too large, wrong velocities, results that differ from call
  * to call, or an odd size or speed (another unit than mm, or a parameter that does nothing). Else
  * SDM_OK. */

@@ -37,14 +37,15 @@ expect 0 - sdmgen fit $start --mirror no --cases cohort/cases.csv -o cohort/out 
 [ "$(sed 's/.*\("translation_mm": [^]]*\).*/\1/' cohort/out/a/fit.json)" = "$(sed 's/.*\("translation_mm": [^]]*\).*/\1/' fit.json)" ] ||
     bad "the fit of a table differs: $(cat cohort/out/a/log.txt)"
 
-# Exact maps of the model's shape on its grid, and the same fit started with the network.
-expect 0 "$kept" sdmgen fit $model ct.nii $start $coarse --keep parameters --exact -o exact.nrrd --json
+# Exact maps of the model's shape on its grid, and the same fit started with the network. The tissues are stated, as the image holds no air: where maps are coarse, a second
+# tissue outside may take a part of the bone, and the likelihood then has two maxima.
+tissues='--inside 40,170 --outside 1300,270'
+expect 0 "$kept" sdmgen fit $model ct.nii $start $coarse $tissues --keep parameters --exact -o exact.nrrd --json
 [ "$(json maps_network)" = 0 ] && [ "$(json maps_exact)" -gt 0 ] || bad 'maps must be exact'
 for i in 1 2 3; do exact[i]=$(pose translation_mm $i); done
-expect 0 "$kept" sdmgen fit $model ct.nii $start $coarse --keep parameters --polish -o polished.nrrd --json
+expect 0 "$kept" sdmgen fit $model ct.nii $start $coarse $tissues --keep parameters --polish -o polished.nrrd --json
 [ "$(json maps_network)" -gt 0 ] && [ "$(json maps_exact)" -gt 0 ] || bad 'maps must be of both kinds'
-# both ends have their own weights of the priors
-for i in 1 2 3; do near "$(pose translation_mm $i)" "${exact[i]}" 0.04; done
+for i in 1 2 3; do near "$(pose translation_mm $i)" "${exact[i]}" 0.02; done
 for file in exact polished; do
     sdmgen info $file.nrrd | grep -Eq 'exact: cochlea' || bad "$file.nrrd must be an exact map"
 done

@@ -15,9 +15,11 @@
 enum { TRUTH_BYTES_MAX = 1 << 20 };
 
 /* Beyond this angle (degrees) a rotation may lead to the same surface of a symmetric shape; it does
- * if both have this Dice coefficient. */
+ * if both have this Dice coefficient, and no part of the surfaces lies farther apart than this many
+ * voxels. */
 #define TURNED_MIN 10.0
 #define SAME_DICE 0.96
+#define SAME_APART 1.5
 
 /* Degrees in a radian; variance of an angle that may be any, rad^2: pi^2 / 3. */
 static const double DEGREES = 57.295779513082321, ANY_ANGLE = 3.2898681336964529;
@@ -172,7 +174,8 @@ static double pose_in_sd(const cli_fit *f)
 sdm_status cli_fit_compare_truth(cli_fit *f, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&f->map_grid);
-    double degrees, here[3], there[3], both = 0, all = 0;
+    const double *h = f->map_grid.spacing, edge = fmax(fmax(h[0], h[1]), h[2]);
+    double degrees, here[3], there[3], both = 0, all = 0, apart = 0;
     float *turned = NULL;
     if (!f->has_truth_pose) return SDM_OK;
     (void)compare_pose(f, &degrees);
@@ -189,8 +192,10 @@ sdm_status cli_fit_compare_truth(cli_fit *f, sdm_error *err)
     for (size_t i = 0; i < n && !s; i++) {
         both += f->map[i] < 0 && turned[i] < 0;
         all += (f->map[i] < 0) + (turned[i] < 0);
+        if (fabs((double)f->map[i]) < edge)
+            apart = fmax(apart, fabs((double)f->map[i] - (double)turned[i]));
     }
-    f->truth_same = !s && 2 * both > SAME_DICE * all;
+    f->truth_same = !s && 2 * both > SAME_DICE * all && apart < SAME_APART * edge;
     sdm_free(turned);
     return s;
 }

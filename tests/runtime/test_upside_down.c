@@ -1,7 +1,8 @@
 /* A pin, a shaft with a ball on either end, one a little larger than the other: upside down it has
  * almost the same surface. A fit to labels that starts upside down is refused, because the right
  * pose explains them better; a pin with equal balls has two right poses. A knob with three lobes
- * has three, and the turn between them is named. Tests: next_pose.c */
+ * has three, and the turn between them is named. A block whose front differs from its back by a
+ * small collar alone has one. Tests: next_pose.c rival.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,7 +11,9 @@
 
 #include <cmocka.h>
 
+#include "oracle/exact_meshes.h"
 #include "oracle/fit_tools.h"
+#include "oracle/give_mesh.h"
 #include "oracle/revolved.h"
 
 enum { LENGTH, LOWER, PIN_PARAMS };
@@ -140,12 +143,85 @@ static void test_third_of_a_turn_is_named(void **state)
     sdm_fit_dispose(&r);
 }
 
+/* A block whose front, the side of negative y, has a collar of 0.9 % of its volume. */
+static const double BLOCK[3] = {10, 5.5, 16}, COLLAR_LOW[3] = {-3, -7, -7},
+                    COLLAR_HIGH[3] = {3, -4, -1};
+
+static int block_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                      const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    const double low[3] = {-p[0], -BLOCK[1], -BLOCK[2]}, high[3] = {p[0], BLOCK[1], BLOCK[2]};
+    sdm_mesh m = {0}, collar = {0};
+    mesh_box(&m, low, high);
+    mesh_box(&collar, COLLAR_LOW, COLLAR_HIGH);
+    mesh_append(&m, &collar);
+    return give_mesh(host, out, &m);
+}
+
+static const sdm_param block_params[1] = {{"half_width", "mm", 8, 12, 10, ""}};
+static const sdm_shape block = {.abi = SDM_SHAPE_ABI,
+                                .size = sizeof(sdm_shape),
+                                .name = "block",
+                                .summary = "a block with a collar",
+                                .params = block_params,
+                                .n_params = 1,
+                                .mesh = block_mesh};
+
+/* Fits points of the block, 1.5 mm apart, half a turn about z from its pose or in it. */
+static void check_block(bool turned, sdm_status expected)
+{
+    enum { POINTS_MAX = 2000 };
+    sdm_instance *shape = NULL;
+    sdm_fit_opts o = sdm_fit_defaults();
+    sdm_fit_result r;
+    sdm_error err = {0};
+    double *points = calloc(3 * POINTS_MAX, sizeof *points);
+    if (!points || sdm_instance_create(&block, NULL, 0, NULL, &shape, NULL)) abort();
+    size_t n = 0;
+    for (int side = 0; side < 6; side++)
+        for (int i = 0; i < 22; i++)
+            for (int j = 0; j < 22; j++) {
+                const size_t a = (size_t)side / 2, b = (a + 1) % 3, c = (a + 2) % 3;
+                double x[3];
+                x[a] = side % 2 ? BLOCK[a] : -BLOCK[a];
+                x[b] = 1.5 * i + 0.4 - BLOCK[b], x[c] = 1.5 * j + 0.7 - BLOCK[c];
+                if (x[b] > BLOCK[b] || x[c] > BLOCK[c]) continue;
+                if (side == 2 && fabs(x[0]) < COLLAR_HIGH[0] && fabs(x[2] + 4) < 3)
+                    x[1] = COLLAR_LOW[1];
+                for (int k = 0; k < 3; k++, n++)
+                    points[n] = x[k] + 0.1 * sin(7.3 * (double)n + 0.9 * (double)(n * n % 97));
+            }
+    if (turned) o.start_pose.rotation[2] = 3.141592653589793;
+    const sdm_fit_source source = {
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){48, 32, 64}, 0.6, (double[3]){0, 0, 0})};
+    const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = points, .n_points = n / 3};
+    const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);
+    const sdm_fit_finding *f = next_pose(&r);
+    if (s != expected || !f || (f->grade == SDM_FIT_PASSED) != (expected == SDM_OK))
+        fail_msg("turned %d: %s (%s); %s", turned, sdm_status_name(s), err.text,
+                 f ? f->text : "no next pose");
+    if (turned) assert_non_null(strstr(f->text, "in another pose, rotation ("));
+    sdm_fit_dispose(&r);
+    sdm_instance_free(shape);
+    free(points);
+}
+
+static void test_back_to_front_is_refused(void **state)
+{
+    (void)state;
+    check_block(false, SDM_OK);
+    check_block(true, SDM_E_QUALITY);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_upside_down_is_refused),
         cmocka_unit_test(test_both_ways_of_a_symmetric_pin_pass),
         cmocka_unit_test(test_third_of_a_turn_is_named),
+        cmocka_unit_test(test_back_to_front_is_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

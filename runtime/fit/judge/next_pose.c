@@ -21,12 +21,15 @@
 #include "sdm/internal/rotation.h"
 #include "sdm/internal/vec3.h"
 
-// a surface that has this Dice coefficient with that of the fit is no rival
 // log-likelihood by which another shape or pose must be better to refuse a fit to points
 #define CLEARLY_BETTER 30.0
+// a surface that has this Dice coefficient with the surface of the fit is no rival
 #define ALIKE 0.9
-// a turn to a surface with a higher one is a symmetry of the shape, up to the voxels of the map
+// a turn to a surface with a higher one is a symmetry of the shape, up to the voxels of the map, if
+// no part of the surfaces lies farther apart than this many voxels: a small collar may be all that
+// tells the front from the back
 #define SYMMETRIC 0.9875
+#define APART 1.5
 // a rival that ends with a higher one has the surface of the fit
 #define SAME 0.975
 // turns by less than this, rad, are no symmetries
@@ -63,6 +66,7 @@ typedef struct nearest {
     double gain;
     size_t param;       /* as fit_start.param */
     double value;       /* of this parameter */
+    double rotation[3]; /* rotation vector of the shape, rad */
     char symmetry[240]; /* how the surface may be turned and stays the same; "": not at all */
 } nearest;
 
@@ -118,31 +122,41 @@ static sdm_status own_create(const fit_problem *p, own_fit *own, sdm_error *err)
     return SDM_OK;
 }
 
-// Dice coefficient of the fit and of the shape with the map distance[n_voxels] and this volume in
-// the state `other`
-static double likeness(const own_fit *own, const double *distance, double volume,
-                       const fit_state *other)
+/* How much another surface is like the surface of the fit. */
+typedef struct likeness {
+    double dice;  // Dice coefficient of the volumes
+    double apart; // largest difference of the distances in the fit and at its surface, voxels
+} likeness;
+
+// the fit, and the shape with the map distance[n_voxels] and this volume in the state `other`
+static likeness compare(const own_fit *own, const double *distance, double volume,
+                        const fit_state *other)
 {
     const fit_maps *m = &own->p->maps;
     const fit_field f = {.grid = &m->grid, .packed = distance, .n_fields = 1, .distance = true};
     const size_t step = (size_t)(own->volume / VOXELS_ALIKE) + 1;
     double x[3], world[3], both = 0, tried = 0;
+    likeness like = {0};
     size_t seen = 0;
     for (size_t v = 0; v < m->n_voxels; v++) {
         const double part = part_inside(m, own->distance[v]);
         if (!(part > 0) || seen++ % step) continue;
         place_of(&m->grid, v, x);
         sdm_fit_to_world(&own->state, x, world);
+        const double there = sdm_fit_field_at(&f, other, world);
         tried += part;
-        both += fmin(part, part_inside(m, sdm_fit_field_at(&f, other, world)));
+        both += fmin(part, part_inside(m, there));
+        like.apart = fmax(like.apart, fabs(there - own->distance[v]));
     }
-    return tried > 0 ? 2 * (both / tried) * own->volume / (own->volume + volume) : 0;
+    like.apart /= fit_longest_edge(&m->grid);
+    if (tried > 0) like.dice = 2 * (both / tried) * own->volume / (own->volume + volume);
+    return like;
 }
 
 // the same of the fit and of the shape with the latest map in the state `other`
-static double map_likeness(const own_fit *own, const fit_maps *m, const fit_state *other)
+static likeness compare_map(const own_fit *own, const fit_maps *m, const fit_state *other)
 {
-    return likeness(own, m->distance, volume_of(m, m->distance), other);
+    return compare(own, m->distance, volume_of(m, m->distance), other);
 }
 
 // rotation i of the cube's: a permutation of the axes with signs, and no reflection; 0: identity
@@ -214,13 +228,13 @@ static void turns_rank(const own_fit *own, turns *t)
     for (size_t i = 0; i < N_TURNS; i++) {
         fit_start one = {0};
         turned(own, i, &one.state);
-        const double dice = likeness(own, own->distance, own->volume, &one.state);
-        if (dice > SYMMETRIC) {
-            same_take(own, &one.state, dice, t);
+        const likeness like = compare(own, own->distance, own->volume, &one.state);
+        if (like.dice > SYMMETRIC && like.apart < APART) {
+            same_take(own, &one.state, like.dice, t);
             continue;
         }
         one.log_likelihood = sdm_fit_likelihood_at(own->p, &one.state, SAMPLES_RANKED);
-        one.keep_params = dice <= ALIKE;
+        one.keep_params = like.dice <= ALIKE;
         if (one.keep_params)
             sdm_fit_start_insert(t->other, &t->n_other, N_TURNS, &one);
         else
@@ -241,15 +255,16 @@ static sdm_status climb(fit_problem *p, bool keep_params, size_t steps, sdm_erro
     return sdm_fit_newton(p, &newton, &end, err);
 }
 
-// how well the state of *p explains the samples after some iterations; *other: the Dice coefficient
-// of its surface with that of the fit is at most `dice`
-static sdm_status challenge(fit_problem *p, const own_fit *own, const fit_start *from, double dice,
-                            bool *other, fit_standing *standing, sdm_error *err)
+// how well the state of *p explains the samples after some iterations; *other: its surface is
+// another one than the fit's, less like it than `most`
+static sdm_status challenge(fit_problem *p, const own_fit *own, const fit_start *from,
+                            likeness most, bool *other, fit_standing *standing, sdm_error *err)
 {
     p->state = from->state;
     sdm_status s = climb(p, from->keep_params, STEPS, err);
     if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
-    *other = !s && map_likeness(own, &p->maps, &p->state) <= dice;
+    const likeness like = s ? most : compare_map(own, &p->maps, &p->state);
+    *other = !s && (like.dice <= most.dice || like.apart > most.apart);
     if (s == SDM_E_QUALITY) return SDM_OK; // a state that cannot be fitted is no rival
     if (!s) s = sdm_fit_stand(p, own->factor, standing, err);
     // where the data tell little, a maximum is wide, and it holds surfaces that differ
@@ -274,7 +289,7 @@ static sdm_status value_find(fit_problem *p, const own_fit *own, size_t k, fit_s
         if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
         if (s == SDM_E_NOMEM || s == SDM_E_CANCELLED) return s;
         // parameters without a shape are no rival
-        if (!s && map_likeness(own, &p->maps, &one.state) <= ALIKE) *best = one;
+        if (!s && compare_map(own, &p->maps, &one.state).dice <= ALIKE) *best = one;
     }
     return SDM_OK;
 }
@@ -303,6 +318,7 @@ static void nearest_take(nearest *least, const fit_problem *p, const fit_standin
     least->gain = gain;
     least->param = param;
     if (param) least->value = p->state.params[param - 1];
+    sdm_rotation_vector(p->state.rotation, least->rotation);
 }
 
 // Lowers *least where the fit, turned to a surface that is nearly its own, climbs to a better
@@ -311,14 +327,16 @@ static void nearest_take(nearest *least, const fit_problem *p, const fit_standin
 static sdm_status compare_alike(fit_problem *p, own_fit *own, const turns *t, nearest *least,
                                 sdm_error *err)
 {
+    const likeness same = {.dice = SAME, .apart = APART};
     fit_standing fit, rival;
     bool other;
     if (!t->n_alike || p->opts->keep_params) return SDM_OK;
     const fit_start here = {.state = own->state};
-    sdm_status s = challenge(p, own, &here, SAME, &other, &fit, err);
+    sdm_status s = challenge(p, own, &here, same, &other, &fit, err);
     for (size_t i = 0; i < t->n_alike && !s; i++) {
-        s = challenge(p, own, &t->alike[i], SAME, &other, &rival, err);
-        if (!s && other && fit.chi_square >= BETTER * rival.chi_square &&
+        s = challenge(p, own, &t->alike[i], same, &other, &rival, err);
+        if (!s && other &&
+            sdm_fit_chi_square(&fit, &rival) >= BETTER * sdm_fit_chi_square(&rival, &fit) &&
             sdm_fit_gain(&fit, &rival) < -SDM_FIT_PREFERRED)
             nearest_take(least, p, &fit, &rival, 0);
     }
@@ -341,6 +359,8 @@ static void tell_symmetry(const turns *t, nearest *least)
 // the least gain over the runner-up of the search, over the best turn, and over the best values
 static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_error *err)
 {
+    // a start that ends near the fit, if not in it, is no rival
+    const likeness alike = {.dice = ALIKE, .apart = INFINITY};
     turns *t = NULL;
     fit_start *value = NULL;
     fit_standing rival;
@@ -359,16 +379,16 @@ static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_e
     if (!s) tell_symmetry(t, least);
     if (!s && p->has_runner_up) {
         const fit_start from = {.state = p->runner_up};
-        s = challenge(p, own, &from, ALIKE, &other, &rival, err);
+        s = challenge(p, own, &from, alike, &other, &rival, err);
         if (!s && other) nearest_take(least, p, fit, &rival, 0);
     }
     other = false;
     for (size_t i = 0; !s && i < t->n_other && i < TRIES_MAX && !other; i++) {
-        s = challenge(p, own, &t->other[i], ALIKE, &other, &rival, err);
+        s = challenge(p, own, &t->other[i], alike, &other, &rival, err);
         if (!s && other) nearest_take(least, p, fit, &rival, 0);
     }
     for (size_t i = 0; i < n_values && !s; i++) {
-        s = challenge(p, own, &value[i], ALIKE, &other, &rival, err);
+        s = challenge(p, own, &value[i], alike, &other, &rival, err);
         if (!s && other) nearest_take(least, p, fit, &rival, value[i].param);
     }
     if (!s) s = compare_alike(p, own, t, least, err);
@@ -376,6 +396,9 @@ static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_e
     sdm_free(value);
     return s;
 }
+
+// to a thousandth, and without the sign of -0
+static double rounded(double radians) { return round(1000 * radians) / 1000 + 0.0; }
 
 sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdict *v,
                                    sdm_error *err)
@@ -415,7 +438,10 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     }
     const char *name = NULL;
     double low, high;
-    char where[100] = "in another pose", text[300];
+    const double *r = least.rotation;
+    char where[100], text[300];
+    snprintf(where, sizeof where, "in another pose, rotation (%.3g, %.3g, %.3g) rad,",
+             rounded(r[0]), rounded(r[1]), rounded(r[2]));
     if (least.param) sdm_fit_bounds(p->source, least.param - 1, &low, &high, &name);
     if (name)
         snprintf(where, sizeof where, "with another value of %.60s, %.4g,", name, least.value);
@@ -424,7 +450,7 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
              "%.2g): %s",
              where, least.gain < 0 ? "better" : "as well", least.gain,
              name ? "start from this value (sdm_fit_opts.start_params)"
-                  : "give a nearer start, or more turns");
+                  : "start from this pose, or try more turns");
     // errors of coarse maps at sharp edges weigh more in fits to points than a small gain
     const bool doubt = points && least.gain > -CLEARLY_BETTER;
     sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, false, doubt ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED,

@@ -9,7 +9,7 @@
 
 // a chi-square is at least this: residuals without any noise
 #define CHI_SQUARE_MIN 1e-3
-// of points that a rival takes for strays
+// of points that only one of two shapes takes for strays
 #define CHI_SQUARE_STRAY 9.0
 // loss of log-likelihood, below the worse one of the two, that is no valley
 #define VALLEY 0.5
@@ -37,14 +37,19 @@ double sdm_fit_units_gain(double n, double chi_square, double rival_chi_square)
     return 0.5 * n * log(fmax(rival_chi_square, CHI_SQUARE_MIN) / fmax(chi_square, CHI_SQUARE_MIN));
 }
 
+double sdm_fit_chi_square(const fit_standing *s, const fit_standing *against)
+{
+    if (s->n_points >= against->n_points) return s->chi_square;
+    const double kept = (double)s->n_points / (double)against->n_points;
+    return kept * s->chi_square + (1 - kept) * CHI_SQUARE_STRAY;
+}
+
 double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival)
 {
     if (fit->factor > 0) return (fit->log_likelihood - rival->log_likelihood) / fit->factor;
     if (!fit->n_units || !rival->n_units) return NAN;
-    const double kept =
-        rival->n_points < fit->n_points ? (double)rival->n_points / (double)fit->n_points : 1;
-    return sdm_fit_units_gain(0.5 * (double)(fit->n_units + rival->n_units), fit->chi_square,
-                              kept * rival->chi_square + (1 - kept) * CHI_SQUARE_STRAY);
+    return sdm_fit_units_gain(0.5 * (double)(fit->n_units + rival->n_units),
+                              sdm_fit_chi_square(fit, rival), sdm_fit_chi_square(rival, fit));
 }
 
 bool sdm_fit_same_maximum(const fit_problem *p, const fit_standing *fit, const double *field,

@@ -19,9 +19,12 @@ typedef struct fit_standing {
 /* Fills *out from p->samples and p->information. factor: as fit_standing. SDM_E_NOMEM. */
 sdm_status sdm_fit_stand(const fit_problem *p, double factor, fit_standing *out, sdm_error *err);
 
-/* Gain of the fit over a rival that was measured on the same samples. The share of points that the
- * rival alone takes for strays counts with mean residuals of 3 deviations. NaN: points lie too far
- * apart to tell. */
+/* chi_square of one standing beside another on the same samples: points that it alone takes for
+ * strays count with residuals of 3 deviations. */
+double sdm_fit_chi_square(const fit_standing *s, const fit_standing *against);
+
+/* Gain of the fit over a rival that was measured on the same samples. Of labels and points it is
+ * computed from sdm_fit_chi_square() of both. NaN: points lie too far apart to tell. */
 double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival);
 
 /* Log-likelihood ratio of mean residuals of n neighbourhoods whose common variance is estimated. */

@@ -413,6 +413,17 @@ static void uses_and_spacing(void **state)
                                "square of the shapes)\n");
     // one rule for the shapes of a training and for a single shape
     assert_true(sdm_spacing_for_volume(0.8, 0.029) == sdm_verdict_spacing(&v));
+    // fits want more voxels across the thinnest part than surfaces do
+    v.volume_error = v.surface_volume_error = 0.004, v.thickness_mm = 2.9 * v.coarse_mm;
+    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and measurements");
+    sdm_verdict_unfit(&v, lines);
+    assert_string_equal(lines, "exact fits by the network alone: its thinnest part, 2.3 mm thick "
+                               "in a few held-out shapes, has 2.9 voxels across, and fits need "
+                               "four: fit --exact --spacing 0.57\n");
+    v.thickness_mm = NAN;
+    sdm_verdict_unfit(&v, lines);
+    assert_string_equal(lines, "");
+    v.thickness_mm = 5, v.surface_volume_error = 0.029;
     // a finer grid does not help where the network errs
     v.volume_error = 0.025;
     assert_true(isnan(sdm_verdict_spacing(&v)));

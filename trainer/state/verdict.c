@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "sdm/internal/part_audit.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/volume_cause.h"
 
 const char *sdm_cause_name(sdm_cause cause)
@@ -91,11 +92,15 @@ const char *sdm_grade_text(const sdm_verdict *v, char *text)
 {
     // a volume is a measurement
     const bool measures = !(v->volume_error > SDM_VOLUME_BAD) && !sdm_verdict_surfaces_off(v) &&
-                          !sdm_verdict_lacks_part(v);
+                          !sdm_verdict_lacks_part(v),
+               fits = isnan(sdm_verdict_fit_spacing(v));
     if (v->grade == SDM_GRADE_POOR) return poor_text(v, text);
     if (v->grade == SDM_GRADE_GOOD)
-        snprintf(text, SDM_GRADE_TEXT, "for level sets, surfaces%s fits to images",
-                 measures ? ", measurements and" : " and");
+        snprintf(text, SDM_GRADE_TEXT, "for level sets%s",
+                 fits       ? measures ? ", surfaces, measurements and fits to images"
+                                       : ", surfaces and fits to images"
+                 : measures ? ", surfaces and measurements"
+                            : " and surfaces");
     else
         snprintf(text, SDM_GRADE_TEXT, "for pictures, segmentations and first fits%s",
                  measures ? "; for measurements check maps with --max-error" : "");
@@ -113,6 +118,12 @@ double sdm_spacing_for_volume(double spacing, double off)
 {
     // the volume that edges and thin walls lose is about quadratic in the spacing
     return rounded_down(0.9 * sqrt(SDM_VOLUME_BAD / off) * spacing);
+}
+
+double sdm_verdict_fit_spacing(const sdm_verdict *v)
+{
+    return v->thickness_mm < SDM_GRID_THIN_VOXELS * v->coarse_mm ? rounded_down(v->thickness_mm / 4)
+                                                                 : NAN;
 }
 
 double sdm_verdict_spacing(const sdm_verdict *v)

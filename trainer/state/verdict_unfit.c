@@ -62,6 +62,12 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
             percent(v->surface_volume_error, text), v->coarse_mm, 100 * SDM_VOLUME_BAD, spacing);
     else if (sdm_verdict_surfaces_off(v))
         add(l, "volumes of surfaces (.stl): off by %s %%", percent(v->surface_volume_error, text));
+    const double finer = sdm_verdict_fit_spacing(v);
+    if (finer > 0 && !sdm_verdict_lacks_part(v))
+        add(l,
+            "exact fits by the network alone: its thinnest part, %.2g mm thick in a few held-out "
+            "shapes, has %.2g voxels across, and fits need four: fit --exact --spacing %.2g",
+            v->thickness_mm, v->thickness_mm / v->coarse_mm, finer);
 }
 
 void sdm_verdict_unfit(const sdm_verdict *v, char text[SDM_MODEL_UNFIT])

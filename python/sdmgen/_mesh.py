@@ -83,7 +83,8 @@ class Report:
     #: number of parts that were inside out and were turned, apart from `turned`
     parts_turned: int
     #: volume outside, mm^3, that parts enclose which are inside out and meet others: they are subtracted
-    #: from these; by counting voxels, 64 along the longest edge, so smaller parts may be missed
+    #: from these; by counting voxels, 64 along the longest edge, so smaller parts may be missed; NaN in
+    #: the report of a map: not measured, because the mesh or its shape was examined before
     subtracted: float
     #: surface inside the union was removed
     unioned: bool
@@ -136,7 +137,7 @@ class _Engine(Handle):
             SIGNS[report.sign],
             report.turned,
             report.parts_turned,
-            0.0,
+            np.nan,
             report.unioned,
             report.n_tri_used,
             report.union_error_mm,
@@ -145,8 +146,14 @@ class _Engine(Handle):
     def call(self, name: str, *arguments: Any) -> None:
         self._callbacks.call(name, *arguments)
 
-    def subtracted(self) -> float:
-        """Report.subtracted. The engine turns parts that meet no others; open meshes have no such parts."""
+    def examined(self) -> Report:
+        """The report, with Report.subtracted measured once."""
+        if np.isnan(self.report.subtracted):
+            self.report = replace(self.report, subtracted=self._subtracted())
+        return self.report
+
+    def _subtracted(self) -> float:
+        """The engine turns parts that meet no others; open meshes have no such parts."""
         audit = self.report.audit
         several = audit.components > 1 or audit.nonmanifold_edges > 0
         meeting = audit.self_intersections > 0 or audit.nonmanifold_edges > 0
@@ -179,11 +186,11 @@ def _doubts(report: Report) -> list[str]:
     if report.parts_turned:
         n = report.parts_turned
         texts.append(f"{n} {'part is' if n == 1 else 'parts are'} inside out; distances are those of the turned parts")
-    if report.subtracted:
+    if report.subtracted > 0:
         texts.append(
             "a part of the mesh is inside out, or passes through itself, and meets another one: it is subtracted from "
             f"what it overlaps and is not solid itself (about {report.subtracted:.2g} mm^3); reverse the vertices of "
-            "its triangles (sdmgen mesh --audit lists the parts, --turn-parts mends them)"
+            "its triangles (mesh.write(FILE.ply) and sdmgen mesh FILE.ply --audit name the part)"
         )
     return texts
 
@@ -192,6 +199,20 @@ def _pointed(name: str, at: int) -> Any:
     from ._abi import structs
 
     return structs[name].from_address(at)
+
+
+class Examined:
+    """Whether a mesh, or one mesh of a shape, was examined at its first distance."""
+
+    def __init__(self) -> None:
+        self._done = False
+        self._lock = threading.Lock()
+
+    def first(self) -> bool:
+        """True at the first call."""
+        with self._lock:
+            first, self._done = not self._done, True
+        return first
 
 
 class Mesh:
@@ -212,7 +233,7 @@ class Mesh:
         )
         self._engines: dict[tuple[int, bool, int], _Engine] = {}
         self._lock = threading.Lock()
-        self._judged = False
+        self._examined = Examined()
 
     @classmethod
     def read(cls, path: Any) -> Mesh:
@@ -237,8 +258,7 @@ class Mesh:
 
     def report(self, sign: str = "auto", keep_overlap: bool = False, threads: int = 0) -> Report:
         """How the exact engine understands the mesh."""
-        engine = self._engine(sign, keep_overlap, threads)
-        return replace(engine.report, subtracted=engine.subtracted())
+        return self._engine(sign, keep_overlap, threads).examined()
 
     def _engine(self, sign: str, keep_overlap: bool, threads: int) -> _Engine:
         key = (choice(sign, SIGNS, "sign"), flag(keep_overlap, "keep_overlap"), whole(threads, "threads", 0))
@@ -250,9 +270,7 @@ class Mesh:
     def _prepared(self, sign: str, keep_overlap: bool, threads: int) -> _Engine:
         """The engine for distances; the first one warns of a mesh that is open or inside out."""
         engine = self._engine(sign, keep_overlap, threads)
-        with self._lock:
-            first, self._judged = not self._judged, True
-        for text in _doubts(replace(engine.report, subtracted=engine.subtracted())) if first else ():
+        for text in _doubts(engine.examined()) if self._examined.first() else ():
             warn(text)
         return engine
 

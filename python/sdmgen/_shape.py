@@ -17,7 +17,7 @@ from . import _abi
 from ._arrays import Float64, address, float64, indices, named_values, number, path_bytes, text_bytes, whole
 from ._errors import Error, ShapeError, argument_error
 from ._library import Callbacks, Handle, array, call, function, make
-from ._mesh import Mesh, taken_mesh
+from ._mesh import Examined, Mesh, taken_mesh
 
 Params = Union[None, ArrayLike, Mapping[str, float]]
 MeshFunction = Callable[..., Any]
@@ -137,6 +137,7 @@ class Shape:
         **options: Any,
     ) -> None:
         self._registry = Registry(plugin)
+        self._examined = Examined()
         self._python: Optional[_PythonShape] = None
         self.name: str
         if isinstance(shape, str):
@@ -189,7 +190,7 @@ class Shape:
         mesh = make("sdm_mesh")
         self.call("sdm_instance_mesh", self, address(p), byref(mesh))
         result = Mesh(*taken_mesh(mesh))
-        result._judged = True  # `sdmgen shapes check` judges all meshes of a shape
+        result._examined = self._examined  # the first mesh with distances stands for the shape
         return result
 
     def velocity(self, params: Params = None, **named: float) -> Float64:
@@ -235,6 +236,7 @@ class InstanceShape(Shape):
 
     def __init__(self, registry: Registry, instance: Handle, name: str) -> None:
         self._registry = registry
+        self._examined = Examined()
         self._python = None
         self._instance = instance
         self.name = name

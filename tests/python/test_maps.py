@@ -290,6 +290,24 @@ def test_warnings_of_meshes():
             assert mesh.report().subtracted == 0 and mesh.distance([[99, 0, 0]]) > 0
 
 
+def test_a_shape_is_examined_once():
+    """The first distances of a shape warn of its mesh; reports tell what was not measured."""
+
+    def balls(shift):
+        mesh = two_balls(shift, True)
+        return mesh.vertices, mesh.triangles
+
+    shape = sdmgen.Shape(balls, [sdmgen.Param("shift", 0.5, 1.5, unit="mm")])
+    with pytest.warns(UserWarning, match="a part of the mesh is inside out") as told:
+        first = sdmgen.exact(shape, spacing=0.5)
+        again = sdmgen.exact(shape, spacing=0.5, params={"shift": 1.2})
+    assert len(told) == 1 and told[0].filename == __file__
+    assert first.report.subtracted > 1 and np.isnan(again.report.subtracted)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert sdmgen.exact(sdmgen.Shape("torus"), spacing=1.0).report.subtracted == 0
+
+
 def test_surfaces():
     mesh = sdmgen.Mesh(*ball(2.0, n=30))
     map = sdmgen.exact(mesh, spacing=0.1)

@@ -243,10 +243,10 @@ const char *cli_fit_grade_name(sdm_fit_grade grade);
 enum { FIT_WORDS_MAX = 80 };
 void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX]);
 
-/* After a trustworthy fit whose maps are doubtful, coarse or a network's: prints the command that
- * goes on from its result with exact maps of the voxels that are needed, or with a polish; nothing
- * where the exact shape is not known. After a fit that only stopped too early: prints the command
- * that goes on with more iterations. */
+/* After a fit that only its maps, coarse or a network's, make doubtful or refuse: prints the
+ * command that goes on from its result with exact maps of the voxels that are needed, or with a
+ * polish; nothing where the exact shape is not known. After a fit that only stopped too early:
+ * prints the command that goes on with more iterations. */
 void cli_fit_print_next(const cli_fit *f);
 
 /* After the fit: a shape that was changed after the training of the network makes the check of the
@@ -277,8 +277,12 @@ sdm_status cli_fit_astray(const cli_fit *f, char *text, size_t size, sdm_error *
  * nothing to add. Returns text. */
 const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size);
 
-/* Is the fit refused, and may a wrong start be the cause? Exchanged tissues, and a failed check
- * "map voxels" alone, have another cause. */
+/* Do the voxels of the maps explain why the fit is refused: they are too coarse, and nothing but
+ * them and residuals refuses it? */
+bool cli_fit_voxels_refuse(const cli_fit *f);
+
+/* Is the fit refused, and may a wrong start be the cause? Exchanged tissues and coarse maps are
+ * other causes. */
 bool cli_fit_start_is_suspect(const cli_fit *f);
 
 /* Computes f->map and f->surface of the estimate. */

@@ -1,4 +1,5 @@
 /* The command that goes on from a fit: with finer or exact maps, or with more iterations. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,12 +37,12 @@ static bool is_unfinished(const cli_fit *f)
            f->result.n_iterations >= f->opts.max_iterations;
 }
 
-/* The finding of this kind where it is doubtful, else NULL. */
-static const sdm_fit_finding *doubtful(const cli_fit *f, sdm_fit_check_kind kind)
+/* The finding of this kind where it did not pass, else NULL. */
+static const sdm_fit_finding *unpassed(const cli_fit *f, sdm_fit_check_kind kind)
 {
     for (size_t i = 0; i < f->result.verdict.n_findings; i++) {
         const sdm_fit_finding *x = &f->result.verdict.findings[i];
-        if (x->kind == kind && x->grade == SDM_FIT_DOUBTFUL) return x;
+        if (x->kind == kind && x->grade != SDM_FIT_PASSED) return x;
     }
     return NULL;
 }
@@ -64,14 +65,15 @@ void cli_fit_print_next(const cli_fit *f)
 {
     const cli_args *a = f->args;
     const sdm_fit_result *r = &f->result;
-    const sdm_fit_finding *voxels = doubtful(f, SDM_FIT_CHECK_VOXELS);
+    const sdm_fit_finding *voxels = unpassed(f, SDM_FIT_CHECK_VOXELS);
     // --exact and --polish need the exact shape
-    const bool more = is_unfinished(f), exact = !f->source.model || f->shape || f->judge_shape;
-    if ((!exact && !more) || (f->doubt.status && !more) || f->other_side || f->n_candidates ||
-        a->cohort.cases || (!voxels && !more && !doubtful(f, SDM_FIT_CHECK_NETWORK_ERROR)))
+    const bool more = is_unfinished(f), refused = f->doubt.status && !cli_fit_voxels_refuse(f),
+               exact = !f->source.model || f->shape || f->judge_shape;
+    if ((!exact && !more) || (refused && !more) || f->other_side || f->n_candidates ||
+        a->cohort.cases || (!voxels && !more && !unpassed(f, SDM_FIT_CHECK_NETWORK_ERROR)))
         return;
     sdm_text t = {0};
-    char text[96];
+    char text[96], price[48] = "";
     sdm_text_add(&t, "sdmgen fit");
     for (size_t i = 0; i < a->files.n; i++) cli_add_next_word(&t, a->files.items[i]);
     for (size_t i = 0; i < a->n_given; i++) {
@@ -89,6 +91,8 @@ void cli_fit_print_next(const cli_fit *f)
     if (voxels && !more) {
         snprintf(text, sizeof text, "%.2g", r->advised_voxel_mm);
         add_option(&t, "spacing", text);
+        snprintf(price, sizeof price, "; %.2g times as many voxels",
+                 pow(cli_fit_map_voxel(f) / r->advised_voxel_mm, 3));
     }
     for (size_t i = 0; i < f->n_params; i++) {
         snprintf(text, sizeof text, "%.60s=%.7g", f->params[i].name, r->params[i]);
@@ -98,10 +102,10 @@ void cli_fit_print_next(const cli_fit *f)
     add_three(&t, "rotation", r->pose.rotation);
     add_three(&t, "translation", r->pose.translation);
     if (!t.failed)
-        printf("%s from here, without a search:\n  %s\n",
+        printf("%s from here, without a search%s:\n  %s\n",
                more     ? "more iterations"
                : voxels ? "finer maps"
                         : "a polish with exact maps",
-               t.data);
+               voxels && !more ? price : "", t.data);
     sdm_text_dispose(&t);
 }

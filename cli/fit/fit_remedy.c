@@ -66,19 +66,23 @@ static bool lies_on_points(const cli_fit *f)
            !found(f, SDM_FIT_CHECK_RESIDUALS, SDM_FIT_FAILED, -INFINITY);
 }
 
-/* Are the voxels of the maps, which are longer than the shape is thick, all that refuses the fit?
- */
-static bool is_blind(const cli_fit *f)
+bool cli_fit_voxels_refuse(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
-    size_t failed = 0;
-    for (size_t i = 0; i < v->n_findings; i++) failed += v->findings[i].grade == SDM_FIT_FAILED;
-    return failed == 1 && found(f, SDM_FIT_CHECK_VOXELS, SDM_FIT_FAILED, -INFINITY);
+    if (v->grade != SDM_FIT_FAILED || !found(f, SDM_FIT_CHECK_VOXELS, SDM_FIT_DOUBTFUL, -INFINITY))
+        return false;
+    for (size_t i = 0; i < v->n_findings; i++) {
+        const sdm_fit_finding *x = &v->findings[i];
+        if (x->grade == SDM_FIT_FAILED && x->kind != SDM_FIT_CHECK_VOXELS &&
+            x->kind != SDM_FIT_CHECK_RESIDUALS)
+            return false;
+    }
+    return true;
 }
 
 bool cli_fit_start_is_suspect(const cli_fit *f)
 {
-    return f->result.verdict.grade == SDM_FIT_FAILED && !f->exchanged && !is_blind(f);
+    return f->result.verdict.grade == SDM_FIT_FAILED && !f->exchanged && !cli_fit_voxels_refuse(f);
 }
 
 /* Writes into `text` that a wrong start may be the cause of the failure, and the options that
@@ -132,7 +136,7 @@ const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
     }
     // tissues that are the wrong way round are no matter of the start
     else if (!(f->found && found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY)) &&
-             !is_blind(f))
+             !cli_fit_voxels_refuse(f))
         name_start(f, text, size);
     return text;
 }

@@ -168,11 +168,23 @@ static void warn_network_volume(const char *path, const cli_map *map, const doub
         path, volume[0], 100 * fabs(more), more < 0 ? "less" : "more", volume[1], measured);
 }
 
+/* Warns of a surface that cannot be compared with its shape, if the training found volumes of such
+ * surfaces to be off. */
+static void warn_unknown_volume(const char *path, const cli_map *map)
+{
+    const double error = map->quality ? map->quality->surface_volume_error : NAN;
+    if (error > VOLUME_OFF_MAX && sdm_grid_coarsest(map->grid) >= map->trained_mm)
+        cli_warn("%s: the training found volumes of such surfaces off by %.2g %% (root mean "
+                 "square); --plugin with the shape tells this one's",
+                 path, 100 * error);
+}
+
 /* Warns if the surface has more pieces than the shape whose map it was made from, or encloses
  * another volume. */
 static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *surface)
 {
     sdm_audit audit;
+    if (!(map->volume > 0)) warn_unknown_volume(path, map);
     if (!(map->volume > 0) || sdm_mesh_audit(surface, &audit, NULL) || !audit.closed) return;
     const double more = fabs(audit.volume) / map->volume - 1, voxel = sdm_grid_coarsest(map->grid);
     const bool trained = map->trained_mm >= voxel; // a finer grid shows no more of the shape

@@ -101,7 +101,7 @@ void cli_print_verdict(const sdm_verdict *v)
         printf("  template    at the vertices: frames and amplitudes %.2g mm, warp %.2g mm\n",
                v->motion_mm, v->warp_mm);
     if (isfinite(v->fall))
-        printf("  steps       the last third of them lowered what the bases do not explain by "
+        printf("  steps       the last third of them lowered the error of the network by "
                "%.0f %%\n",
                100 * v->fall);
     if (isfinite(v->thin)) {

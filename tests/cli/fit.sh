@@ -90,7 +90,7 @@ has 'reference: Dice 0.9'
 has 'converged after'
 has '^  map voxels   doubtful  0.35, need at most 0.2.*coarse beside the point spread of the image: .*with voxels of 0.2[0-9]* mm \(--exact --spacing\)'
 # the command that goes on from here with finer maps
-has '^finer maps from here, without a search:$'
+has '^finer maps from here, without a search; [0-9.]+ times as many voxels:$'
 eval "$(sed -n 's/^  sdmgen fit ct/expect 0 - sdmgen fit ct/p' out)"
 has '^  map voxels   passed '
 # the truth of the test image beside the estimate; that of another shape, and a file without parameters, are refused

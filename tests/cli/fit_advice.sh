@@ -47,11 +47,15 @@ has '^  bounds       doubtful .* \(minor\): the data may want minor to be more t
 has '^  missing      FAILED .*: points lie outside of the shape: the space between them and its surface is as large as 1[0-9.]* % of its volume, allowed 5 %'
 has '^  empty        passed .* space between the surface and points inside of it, over the volume$'
 
-# Maps that are too coarse for the shape are the reason: no advice on the start.
+# Maps that are too coarse for the shape are the reason: no advice on the start, but the command that goes on with finer ones.
 expect 0 - sdmgen phantom --shape torus -p minor=0.6 --spacing 0.3 -o thin.nii --label thin-label.nii --quiet
 expect 4 'error: thin-label.nii: the voxels of the maps are coarse beside ' \
     sdmgen fit --shape torus thin-label.nii --label 1 --rotation 0,0,0 --spacing 1 --quiet
 grep -q -- '--rotation gives one start' out && bad 'advice on the start beside coarse maps'
+grep -q 'a wrong start' err && bad 'a wrong start is named beside coarse maps'
+has '^finer maps from here, without a search; [0-9.]+ times as many voxels:$'
+eval "$(sed -n 's/^  sdmgen fit/expect 0 - sdmgen fit/p' out)"
+has '^verdict: (passed|doubtful)$'
 
 # Exchanged values of a thin shape beside its place: as much of both tissues lies within the start as around it.
 expect 0 - sdmgen phantom --shape torus -O edge=0.5 --spacing 0.4 -o torus.nii --quiet

@@ -396,16 +396,21 @@ static void uses_and_spacing(void **state)
     sdm_verdict v = figures();
     v.coarse_mm = v.voxel_mm, v.thickness_mm = 5, v.volume_error = v.surface_volume_error = 0.01;
     assert_string_equal(sdm_grade_text(&v, text),
-                        "for level sets, surfaces, measurements and fits to images");
+                        "for level sets, surfaces, measurements and fits to images with voxels of "
+                        "0.8 mm or more");
     assert_true(isnan(sdm_verdict_spacing(&v)));
     char lines[SDM_MODEL_UNFIT];
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "");
     // volumes that are off, edges that are cut, a part that is broken: no measurements
     v.volume_error = 0.03;
-    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and fits to images");
+    assert_string_equal(
+        sdm_grade_text(&v, text),
+        "for level sets, surfaces and fits to images with voxels of 0.8 mm or more");
     v.volume_error = 0.004, v.surface_volume_error = 0.029;
-    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and fits to images");
+    assert_string_equal(
+        sdm_grade_text(&v, text),
+        "for level sets, surfaces and fits to images with voxels of 0.8 mm or more");
     assert_true(fabs(sdm_verdict_spacing(&v) - 0.59) < 1e-9);
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "volumes of surfaces (.stl): off by 2.9 %, voxels of 0.8 mm cut "

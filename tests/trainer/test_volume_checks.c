@@ -150,9 +150,8 @@ static void lists_of_derivatives(void **state)
     trainer_list_small(p, (double[]){NAN, 0.2}, 2, text);
     assert_string_equal(text, "");
     trainer_list_small(p, (double[]){0.1, 0.35}, 2, text);
-    assert_string_equal(text,
-                        "b: off by 35 % of their own size: these parameters hardly change the "
-                        "volume");
+    assert_string_equal(text, "b: off by 35 % of their own size: this parameter hardly changes the "
+                              "volume");
     trainer_list_small(p, (double[]){0.3, INFINITY, 1.4, 0.9, 0.8, 0.7}, 6, text);
     assert_string_equal(text,
                         "b: off by over 1000 % of their own size; by c: off by 140 %; by d: off by "

@@ -352,12 +352,14 @@ void trainer_list_small(const sdm_param *p, const double *error, size_t n,
                         char text[SDM_VERDICT_LIST])
 {
     static const char why[] = ": these parameters hardly change the volume",
+                      single[] = ": this parameter hardly changes the volume",
                       sign[] = ", and the sign may be wrong";
     const size_t worst = next_worst(error, n, n),
                  room = SDM_VERDICT_LIST - sizeof why - sizeof sign;
     list(p, error, n, " of their own size", SMALL_NAMED, room, text);
     if (worst == n) return;
     const size_t used = strlen(text);
-    snprintf(text + used, SDM_VERDICT_LIST - used, "%s%s", why,
+    const bool several = next_worst(error, n, worst) < n;
+    snprintf(text + used, SDM_VERDICT_LIST - used, "%s%s", several ? why : single,
              error[worst] < SIGN_WRONG ? "" : sign);
 }

@@ -88,19 +88,26 @@ static const char *poor_text(const sdm_verdict *v, char *text)
     return text;
 }
 
+/* Images show a shape about as finely as their voxels are; coarser maps bias fits to them. */
+static void write_good_uses(const sdm_verdict *v, bool measures, char *text)
+{
+    if (!isnan(sdm_verdict_fit_spacing(v)))
+        snprintf(text, SDM_GRADE_TEXT, "for level sets%s",
+                 measures ? ", surfaces and measurements" : " and surfaces");
+    else
+        snprintf(text, SDM_GRADE_TEXT,
+                 "for level sets, surfaces%s fits to images with voxels of %.2g mm or more",
+                 measures ? ", measurements and" : " and", v->coarse_mm);
+}
+
 const char *sdm_grade_text(const sdm_verdict *v, char *text)
 {
     // a volume is a measurement
     const bool measures = !(v->volume_error > SDM_VOLUME_BAD) && !sdm_verdict_surfaces_off(v) &&
-                          !sdm_verdict_lacks_part(v),
-               fits = isnan(sdm_verdict_fit_spacing(v));
+                          !sdm_verdict_lacks_part(v);
     if (v->grade == SDM_GRADE_POOR) return poor_text(v, text);
     if (v->grade == SDM_GRADE_GOOD)
-        snprintf(text, SDM_GRADE_TEXT, "for level sets%s",
-                 fits       ? measures ? ", surfaces, measurements and fits to images"
-                                       : ", surfaces and fits to images"
-                 : measures ? ", surfaces and measurements"
-                            : " and surfaces");
+        write_good_uses(v, measures, text);
     else
         snprintf(text, SDM_GRADE_TEXT, "for pictures, segmentations and first fits%s",
                  measures ? "; for measurements check maps with --max-error" : "");

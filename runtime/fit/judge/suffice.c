@@ -175,15 +175,15 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
     fit_coarseness c = {INFINITY, INFINITY, "", false};
     if (fit_maps_direct(&p->maps)) return c;
     const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
-                 details = detail_share(&p->maps);
-    const double thick = VOXEL_OVER_RADIUS_MAX * radius,
+                 thinnest = thinnest_part(p), details = detail_share(&p->maps);
+    // coarse maps show the largest ball inside too small; no part is thicker than it
+    const double thick = VOXEL_OVER_RADIUS_MAX * fmax(radius, 0.5 * thinnest),
                  // at edges the share grows with the voxel
         edges = voxel * DETAILS_MAX / details * (1 + LIMIT_ERROR),
                  // in walls thinner than two voxels all of the surface bends at once
         walls = details > WALLS_MIN ? fmin(thick, 0.5 * voxel) : 0;
     if (details > 0) coarseness_limit(&c, fmax(edges, walls), "the details of the shape");
     coarseness_limit(&c, thick, "the thickness of the shape");
-    const double thinnest = thinnest_part(p);
     if (sdm_too_thin(thinnest, voxel))
         coarseness_limit(&c, thinnest / VOXEL_DIAGONAL, "the thinnest part of the shape");
     if (fit_is_labels(p))

@@ -193,14 +193,14 @@ static sdm_status open_shape(job *j, sdm_error *err)
                   : s;
 }
 
-/* Warns of labels and of the volume in the JSON, if those of the model are off by over 2 %. */
-static void warn_volumes(const job *j)
+/* Warns of labels of a model whose volumes are off by over 2 %. */
+static void warn_label_volumes(const job *j)
 {
     sdm_error why = {0};
-    bool volumes = j->args->json && !j->args->rows && !j->banded;
+    bool labels = false;
     for (size_t i = 0; i < j->args->outputs.n; i++)
-        volumes = volumes || cli_ends_with(j->args->outputs.items[i], ".seg.nrrd");
-    if (volumes && sdm_model_check_use(j->model, SDM_USE_VOLUME, &why) == SDM_E_QUALITY)
+        labels = labels || cli_ends_with(j->args->outputs.items[i], ".seg.nrrd");
+    if (labels && sdm_model_check_use(j->model, SDM_USE_VOLUME, &why) == SDM_E_QUALITY)
         cli_warn("%s: %s", j->args->files.items[0], why.text);
 }
 
@@ -284,7 +284,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     sdm_status s = open_model(j, err);
     if (!s) s = choose_grid(j, err);
     if (!s) j->thin = cli_warn_thin_model(args->files.items[0], j->info, &j->grid);
-    if (!s) warn_volumes(j);
+    if (!s) warn_label_volumes(j);
     if (!s) warn_far(j);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
@@ -534,7 +534,13 @@ static sdm_status print_json(const job *j, sdm_error *err)
     if (j->shape && (j->args->check || j->args->max_error > 0)) add_check_json(j, &json);
     sdm_json_real(&json, "error_rmse_mm", j->info->accuracy.rmse_mm);
     sdm_json_real(&json, "error_between_mm", j->own ? 0 : j->info->quality.between_mm);
-    if (j->n_rows == 1) sdm_json_real(&json, "volume_mm3", j->volume);
+    if (j->n_rows == 1) {
+        sdm_json_real(&json, "volume_mm3", j->volume);
+        sdm_json_real(&json, "volume_error",
+                      j->n_exact ? 0
+                      : j->own   ? j->info->quality.volume_error
+                                 : NAN);
+    }
     if (j->args->measure) cli_json_measures(&j->measures, false, &json);
     sdm_json_text(&json, "values_crc64", hash);
     sdm_json_grid(&json, "grid", &j->grid, false);

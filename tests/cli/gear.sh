@@ -32,6 +32,8 @@ has '^  (next|better) +sdmgen train .*gear\.yaml .*=[0-9.]+( network\.kind=(pod|
 expect 0 - sdmgen generate run/model.sdm -p angle=0.1 -o map.npy
 expect 0 'warning: gear\.stl: the surface encloses .* than the shape, .*: voxels of 0\.9 mm cut its edges and thin parts; about 2 % for this shape with a training with grid\.spacing 0\.[0-9]+$' sdmgen generate run/model.sdm -o gear.stl --plugin $plugin
 present map.npy
+# without the shape the error that the training has measured is told
+expect 0 'warning: alone\.stl: the training found volumes of such surfaces off by [0-9.]+ % \(root mean square\); --plugin ' sdmgen generate run/model.sdm -o alone.stl
 # measures are those of the shape itself
 expect 3 "^sdmgen: error: --measure needs the exact shape: .*'gear', which is not known here: load its plug-in \(--plugin FILE\)" sdmgen generate run/model.sdm --measure
 expect 3 "^sdmgen: error: --measure needs the exact shape: .*'gear', which is not known here: load its plug-in \(--plugin FILE\)" sdmgen fit run/model.sdm map.npy --measure

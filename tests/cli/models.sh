@@ -13,6 +13,7 @@ has '^parameters +a +2 \.\. 5 mm, default [0-9.]+, uniform$'
 has '^verdict +(good|usable|poor) \(from 8 shapes only\); the grid cuts [0-9.]+ % of the held-out shapes$'
 expect 0 "warning: .*volumes of its maps are off by [0-9.]+ %, more than 2 %" sdmgen generate $model -o labels.seg.nrrd -q
 expect 0 - sdmgen info $model --json
+off=$(json volume_error)
 has '"quality": *\{"grade": *"(good|usable|poor)", "cut": [0-9.]+, "between_mm": [0-9.e-]+, "thickness_mm": [0-9.e-]+, "volume_error": [0-9.e-]+, "derivative_error": [0-9.e-]+, "volume_derivative_error": [0-9.e-]+, "surface_volume_error": [0-9.e-]+, "far_error_mm": [0-9.e-]+, "unfit": "volumes of maps: off by'
 for key in checksum train_seconds rmse_mm q99_mm weight_bytes; do [ -n "$(json $key)" ] || bad "info: no $key"; done
 
@@ -23,6 +24,7 @@ expect 0 'warning: m.ply: the surface encloses .* less than the shape' sdmgen ge
 present m.nii m.nii.gz m.nrrd m.mha m.npy m.ply m.png m.svg m.pdf
 near "$(json a)" 4.2 0
 near "$(json maps)" 1 0
+near "$(json volume_error)" "$off" 0 # beside volume_mm3
 hash=$(json values_crc64)
 [ "$(wc -c <m.npy)" -ge $((16 * 14 * 12 * 4 + 64)) ] || bad 'm.npy is too small'
 expect 0 - sdmgen generate $model -p alpha=0.6 -p a=4.2 --threads 1 --json

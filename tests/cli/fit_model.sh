@@ -57,6 +57,25 @@ sdmgen fit $model ct.nii $start -p a=5.5 --keep parameters --policy clamp --json
 grep -q 'the start parameters were clamped to their range: ' err || bad "no notice of the start: $(cat err)"
 expect 5 "shape 'cochlea': parameter 'a' = 50 mm, allowed 2 .. 5 mm\$" sdmgen fit $model ct.nii $start -p a=50 --policy exact -o no.nrrd
 
+# Points of an arm without its end: a kink of the likelihood leads plain steps to and fro until the iterations are over. Averaged derivatives end it.
+cat >link.yaml <<'END'
+shape: {name: linkage, options: {motion: planar, links: 2, edge: 0.5}}
+grid: {voxels: 40}
+network: {kind: template, depth: 1, width: 8}
+data: {start: 24, online: 0, holdout: 2}
+train: {steps: 4}
+threads: 1
+END
+sdmgen train link.yaml --out link --quiet >out 2>err || bad "link.yaml: $(cat err)"
+arm_without_its_end() { # SEED: writes upper-arm.csv
+    sdmgen phantom --shape linkage -O links=2 -O edge=0.5 --random-params --seed "$1" --spacing 2 -o arm.nii --surface arm.csv \
+        --surface-points 1500 --surface-noise 0.03 --quiet >out 2>err || bad "arm.csv: $(cat err)"
+    awk -F, 'NR == 1 || $1 < 2' arm.csv >upper-arm.csv
+}
+arm_without_its_end 9
+expect 0 - sdmgen fit link/model.sdm upper-arm.csv --rotation 0,0,0 --quiet
+has '^  convergence  passed '
+
 # An interrupt: no file is written.
 "$program" fit $model ct.nii --turns-sphere 4096 --start-centre 2,0,2 -o no.nrrd -o no.json --quiet >out 2>err &
 job=$!

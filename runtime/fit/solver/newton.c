@@ -24,6 +24,10 @@
 // multiplied by the noise factor for correlated ones. A step whose predicted gain is below this, or
 // below rounding errors, is "flat": it is accepted unless the objective clearly drops.
 #define GAIN_MIN 1e-3
+// Without such a gain in this number of iterations they go round, as two steps may that cross a
+// kink of the likelihood to and fro: one whose predicted gain is negligible, and one that is
+// damped.
+#define IDLE_MAX 8
 // the search for a damped step gives up above this factor
 #define DAMPING_MAX 1e8
 // above this damping the size of a step does not tell the distance to the maximum
@@ -161,6 +165,12 @@ typedef struct fit_damping {
     int flat;
 } fit_damping;
 
+// gains below this are negligible
+static double least_gain(const fit_problem *p)
+{
+    return fmax(p->information.rounding, GAIN_MIN * p->noise_factor);
+}
+
 // Moves by a step and evaluates. *gained = false: the objective dropped; state and information are
 // restored, but maps and samples stay those of the trial.
 static sdm_status step_try(fit_problem *p, const double *step, fit_damping *d, bool *gained,
@@ -174,7 +184,7 @@ static sdm_status step_try(fit_problem *p, const double *step, fit_damping *d, b
     const sdm_status s = sdm_fit_evaluate(p, err);
     if (s) return s;
     const double after = sdm_fit_objective(p);
-    const double least = fmax(p->information.rounding, GAIN_MIN * p->noise_factor);
+    const double least = least_gain(p);
     const bool flat = fabs(expected) < least;
     *gained = after > before || (flat && after > before - 2 * least);
     d->flat = flat ? d->flat + *gained : 0;
@@ -380,7 +390,8 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
     double step[FIT_UNKNOWNS_MAX], plain[FIT_UNKNOWNS_MAX], *work = NULL;
     fit_acceleration acceleration = {0};
     fit_damping damping = {.factor = opts->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4};
-    double taken_before = INFINITY;
+    double taken_before = INFINITY, best = -INFINITY;
+    int idle = 0; // small steps since the objective last rose by more than a negligible gain
     *out = (fit_newton_end){.step = INFINITY};
     sdm_status s = SDM_ALLOC(&work, 3 * n * n, "matrices of the fit", err);
     if (!s) s = sdm_fit_evaluate(p, err);
@@ -423,8 +434,12 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
         out->converged =
             steep || (t.size <= opts->eps && (opts->averaged || damping.factor <= DAMPING_SMALL));
         out->small = !out->converged && opts->eps_sd > 0 && t.deviations <= opts->eps_sd;
-        out->flat =
-            !out->converged && !out->small && opts->max_flat > 0 && damping.flat >= opts->max_flat;
+        const double objective = sdm_fit_objective(p);
+        const bool gained = objective > best + least_gain(p);
+        idle = gained || !(out->step <= ACCELERATED_BELOW) ? 0 : idle + 1;
+        if (gained) best = objective;
+        out->flat = !out->converged && !out->small && opts->max_flat > 0 &&
+                    (damping.flat >= opts->max_flat || idle >= IDLE_MAX);
         out->converged = out->converged || out->small || out->flat;
         s = iteration_record(p, opts, out->step, err);
     }

@@ -246,8 +246,13 @@ void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX]);
 /* After a fit that only its maps, coarse or a network's, make doubtful or refuse: prints the
  * command that goes on from its result with exact maps of the voxels that are needed, or with a
  * polish; nothing where the exact shape is not known. After a fit that only stopped too early:
- * prints the command that goes on with more iterations. */
+ * prints the command that goes on with more iterations or, where the data lack what it needs, with
+ * known values that are kept. */
 void cli_fit_print_next(const cli_fit *f);
+
+/* Did the fit only fail to converge, because the data hardly determine some of its parameters?
+ * Neither another start nor more iterations help it. */
+bool cli_fit_lacks_data(const cli_fit *f);
 
 /* After the fit: a shape that was changed after the training of the network makes the check of the
  * network doubtful. */

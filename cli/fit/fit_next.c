@@ -1,4 +1,5 @@
-/* The command that goes on from a fit: with finer or exact maps, or with more iterations. */
+/* The command that goes on from a fit: with finer or exact maps, with more iterations, or with
+ * known values. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -6,6 +7,7 @@
 
 #include "args/shell_word.h"
 #include "fit_command.h"
+#include "sdm/internal/hardly_known.h"
 
 /* Options that say where a fit starts and what it writes, or which maps it takes: the command has
  * its own. */
@@ -35,6 +37,15 @@ static bool is_unfinished(const cli_fit *f)
                   v->findings[i].kind != SDM_FIT_CHECK_CONVERGED;
     return v->n_findings && !failed && !f->result.converged &&
            f->result.n_iterations >= f->opts.max_iterations;
+}
+
+bool cli_fit_lacks_data(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    for (size_t i = 0; i < v->n_findings; i++)
+        if (v->findings[i].kind == SDM_FIT_CHECK_CONVERGED)
+            return is_unfinished(f) && strstr(v->findings[i].text, "the data hardly determine");
+    return false;
 }
 
 /* The finding of this kind where it did not pass, else NULL. */
@@ -86,8 +97,10 @@ void cli_fit_print_next(const cli_fit *f)
         }
     }
     if (f->model_path && !more) sdm_text_add(&t, voxels ? " --exact" : " --polish");
+    const bool lacks = cli_fit_lacks_data(f);
     const size_t iterations = 4 * f->opts.max_iterations, usual = sdm_fit_defaults().max_iterations;
-    if (more) sdm_text_add(&t, " --max-iterations=%zu", iterations > usual ? iterations : usual);
+    if (more && !lacks)
+        sdm_text_add(&t, " --max-iterations=%zu", iterations > usual ? iterations : usual);
     if (voxels && !more) {
         snprintf(text, sizeof text, "%.2g", r->advised_voxel_mm);
         add_option(&t, "spacing", text);
@@ -95,7 +108,12 @@ void cli_fit_print_next(const cli_fit *f)
                  pow(cli_fit_map_voxel(f) / r->advised_voxel_mm, 3));
     }
     for (size_t i = 0; i < f->n_params; i++) {
-        snprintf(text, sizeof text, "%.60s=%.7g", f->params[i].name, r->params[i]);
+        if (lacks && sdm_fit_hardly_known(r, i)) {
+            add_option(&t, "keep", f->params[i].name);
+            snprintf(text, sizeof text, "%.60s=VALUE", f->params[i].name);
+        } else {
+            snprintf(text, sizeof text, "%.60s=%.7g", f->params[i].name, r->params[i]);
+        }
         sdm_text_add(&t, " -p");
         cli_add_next_word(&t, text);
     }
@@ -103,7 +121,8 @@ void cli_fit_print_next(const cli_fit *f)
     add_three(&t, "translation", r->pose.translation);
     if (!t.failed)
         printf("%s from here, without a search%s:\n  %s\n",
-               more     ? "more iterations"
+               lacks    ? "known values in place of VALUE, for what the data hardly determine,"
+               : more   ? "more iterations"
                : voxels ? "finer maps"
                         : "a polish with exact maps",
                voxels && !more ? price : "", t.data);

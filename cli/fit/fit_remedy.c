@@ -82,7 +82,8 @@ bool cli_fit_voxels_refuse(const cli_fit *f)
 
 bool cli_fit_start_is_suspect(const cli_fit *f)
 {
-    return f->result.verdict.grade == SDM_FIT_FAILED && !f->exchanged && !cli_fit_voxels_refuse(f);
+    return f->result.verdict.grade == SDM_FIT_FAILED && !f->exchanged &&
+           !cli_fit_voxels_refuse(f) && !cli_fit_lacks_data(f);
 }
 
 /* Writes into `text` that a wrong start may be the cause of the failure, and the options that
@@ -111,7 +112,7 @@ const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
     const bool network = f->model && f->shape && !a->exact && !a->polish;
     const char *suspicion = f->suspicion ? f->suspicion : "";
     *text = '\0';
-    if (f->exchanged) return text;
+    if (f->exchanged || cli_fit_lacks_data(f)) return text;
     if (f->found && !r->converged && a->max_iterations &&
         r->n_iterations >= (size_t)a->max_iterations)
         snprintf(text, size, "; --max-iterations %lld ended it too early to judge the fit%s",

@@ -577,6 +577,7 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     if (!s) s = sdm_fit_posterior(p, out, err);
     if (!s && !p->is_rival) s = sdm_fit_flat_params_spread(p, out, err);
     if (s && s != SDM_E_QUALITY) return s;
+    if (!s) sdm_fit_network_error_find(p, out);
     out->inside_share = sdm_fit_inside_share(p);
     if (fit_is_image(p)) {
         const sdm_status found =

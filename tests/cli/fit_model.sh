@@ -75,6 +75,20 @@ arm_without_its_end() { # SEED: writes upper-arm.csv
 arm_without_its_end 9
 expect 0 - sdmgen fit link/model.sdm upper-arm.csv --rotation 0,0,0 --quiet
 has '^  convergence  passed '
+# the network is no cause of what the data do not determine
+has '^  q1 .* not determined: '
+has '^  network bias passed '
+has '^  covered      doubtful .*: the data do not determine q1: .*; the other parameters hold within their \+-$'
+
+# Steps that are too large for that: more iterations and another start do not help either. The command with a known value does.
+arm_without_its_end 4
+expect 4 'not converged after [0-9]* iterations \(.*\): the data hardly determine q1: keep it at a known value \(--keep NAME\), or give data that determine it$' \
+    sdmgen fit link/model.sdm upper-arm.csv --rotation 0,0,0 --quiet
+has '^known values in place of VALUE, for what the data hardly determine, from here, without a search:$'
+grep -q -- '--rotation gives one start\|max-iterations' out && bad "advice that does not help: $(cat out)"
+next=$(sed -n 's/^  \(sdmgen fit link.*\) -p q1=VALUE /\1 -p q1=-1.03 /p' out)
+expect 0 - $next --quiet
+has '^  convergence  passed '
 
 # An interrupt: no file is written.
 "$program" fit $model ct.nii --turns-sphere 4096 --start-centre 2,0,2 -o no.nrrd -o no.json --quiet >out 2>err &

@@ -476,6 +476,8 @@ static void test_a_second_pose_is_refused(void **state)
     assert_int_equal(f->grade, SDM_FIT_FAILED);
     assert_true(fabs(f->figure) < SDM_FIT_PREFERRED);
     assert_non_null(strstr(err.text, "in another pose"));
+    assert_non_null(strstr(err.text, ": the data do not tell the two apart; keep what is known"));
+    assert_null(strstr(err.text, "start from this pose"));
     sdm_fit_dispose(&r);
     free(v), free(w);
     sdm_instance_free(capsule);

@@ -318,19 +318,20 @@ static double radius_variance(const sdm_fit_result *r)
     return c[0] + 0.2 * c[1] + 0.01 * c[size + 1];
 }
 
-/* The check tells the change in the unit of its parameter, over the deviation without it; no figure
- * where the data do not determine the parameter. */
+/* The check tells the change in the unit of its parameter, over the deviation without it, which is
+ * that of a parameter that the data determine; no figure at the end of its range. */
 static void network_error_text(const sdm_fit_result *r)
 {
     const size_t k = r->network_error_param;
     const double alone = sqrt(r->sd[k] * r->sd[k] - r->network_error * r->network_error);
     size_t i = 0;
     char by[80];
+    assert_true(alone < r->prior_sd[k]);
     while (r->verdict.findings[i].kind != SDM_FIT_CHECK_NETWORK_ERROR) i++;
     const sdm_fit_finding *x = &r->verdict.findings[i];
     if (x->grade == SDM_FIT_PASSED) return;
     if (isnan(x->figure)) {
-        assert_true(r->at_bound[k] || r->by_prior[k]);
+        assert_true(r->at_bound[k]);
         assert_non_null(strstr(x->text, ", which "));
         return;
     }

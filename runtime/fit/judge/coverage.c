@@ -15,6 +15,7 @@
 #include "fit/data/surface_places.h"
 #include "fit/solver/prior.h"
 #include "noise.h"
+#include "sdm/internal/hardly_known.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/internal/vec3.h"
@@ -52,8 +53,6 @@
 // share of the surface that a parameter moves, weighted by the square of the motion, without points
 // from which on this is why the points do not determine the parameter
 #define UNSEEN_MIN 0.5
-// standard deviation of such a parameter, over that before the fit, from which on it is named
-#define HARDLY_KNOWN 0.25
 
 typedef struct cloud {
     double (*x)[3];
@@ -225,7 +224,7 @@ static double name_unseen(const fit_problem *p, const sdm_fit_result *r, const f
         double all = 0, unseen = 0, fastest = 0, low, high;
         const double sd = sdm_fit_prior_sd(p, k);
         const char *name = "";
-        if (fit_param_is_kept(p, k) || !(r->sd[k] > HARDLY_KNOWN * sd)) continue;
+        if (!sdm_fit_hardly_known(r, k)) continue;
         for (size_t i = 0; i < surface->n; i++) {
             const double by = surface->by[i * p->n_params + k];
             all += by * by;
@@ -272,7 +271,7 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
         const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
         judge_patches(p, &found, on.n + strays.n, stray, bare, v);
-        char names[200], unseen_text[300] = "", astray[80] = "", beside[90] = "";
+        char names[200], unseen_text[400] = "", astray[80] = "", beside[90] = "";
         const double voxel = fit_longest_edge(&p->maps.grid);
         char place[FIT_PLACE_NAME] = "";
         const double *middle = grown || other ? NULL : middle_of_bare(&surface, bare_at);
@@ -289,8 +288,9 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
             snprintf(unseen_text, sizeof unseen_text,
                      "the data do not determine %s: no points lie near the part of the surface "
                      "that %s; take points from there, or keep a known value "
-                     "(sdm_fit_opts.kept)",
-                     names, strchr(names, ',') ? "they move" : "it moves");
+                     "(sdm_fit_opts.kept)%s",
+                     names, strchr(names, ',') ? "they move" : "it moves",
+                     grown || other ? "" : "; the other parameters hold within their +-");
         const bool covered = bare <= UNCOVERED_MAX;
         if (covered && unseen > 0)
             sdm_fit_judge_add(v, SDM_FIT_CHECK_COVERED, false, SDM_FIT_DOUBTFUL, unseen, UNSEEN_MIN,
@@ -305,8 +305,10 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
                           "strays out (sdm_fit_opts.tolerance allows more)"
                 : other ? "most of it, and half of the parameters or more end at their bounds: the "
                           "data show another shape, or their lengths are in another unit"
-                : unseen > 0 ? ""
-                             : "the data lack a part of the shape, or it is too large",
+                : unseen > 0
+                    ? ""
+                    : "the data lack a part of the shape, or it is too large; if they lack "
+                      "it, all parameters hold within their +-",
                 (grown || other) && unseen > 0 ? "; " : "", unseen_text, beside);
     }
     sdm_free(bare_at);

@@ -370,22 +370,18 @@ static void check_network_error(const fit_problem *p, const sdm_fit_result *r, s
     if (isnan(r->network_error_sd)) return;
     const size_t k = r->network_error_param;
     const sdm_model_param *param = &sdm_model_get_info(p->source->model)->params[k];
-    const bool passed = r->network_error_sd <= NETWORK_ERROR_MAX,
-               known = passed || !(r->at_bound[k] || r->by_prior[k]);
-    char by[120];
+    const bool passed = r->network_error_sd <= NETWORK_ERROR_MAX, known = passed || !r->at_bound[k];
+    char by[120] = ", which is at the end of its range";
     if (known)
-        snprintf(by, sizeof by, "by about %.2g%s%s, %.2g times its standard deviation without this",
+        snprintf(by, sizeof by,
+                 " by about %.2g%s%s, %.2g times its standard deviation without this",
                  r->network_error, *param->unit ? " " : "", param->unit, r->network_error_sd);
-    else
-        snprintf(by, sizeof by, "%s",
-                 r->at_bound[k] ? "which is at the end of its range"
-                                : "which the data do not determine");
     sdm_fit_judge_add(v, SDM_FIT_CHECK_NETWORK_ERROR, passed, SDM_FIT_DOUBTFUL,
                       known ? r->network_error_sd : NAN, known ? NETWORK_ERROR_MAX : NAN,
-                      "exact maps would move '%s'%s %s: the error of the network limits this fit, "
+                      "exact maps would move '%s'%s: the error of the network limits this fit, "
                       "and the standard deviations contain an estimate of it; a polish with exact "
                       "maps (sdm_fit_opts.max_polish_iterations) ends it",
-                      param->name, known ? "" : ",", by);
+                      param->name, by);
 }
 
 // The finding that explains a refusal: the first one that failed. Points that show too little come

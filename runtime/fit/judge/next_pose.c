@@ -439,18 +439,22 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     const char *name = NULL;
     double low, high;
     const double *r = least.rotation;
-    char where[100], text[300];
+    char where[100], text[360];
     snprintf(where, sizeof where, "in another pose, rotation (%.3g, %.3g, %.3g) rad,",
              rounded(r[0]), rounded(r[1]), rounded(r[2]));
     if (least.param) sdm_fit_bounds(p->source, least.param - 1, &low, &high, &name);
     if (name)
         snprintf(where, sizeof where, "with another value of %.60s, %.4g,", name, least.value);
+    // a start from either leads to either
+    const bool equal = least.gain > -SDM_FIT_PREFERRED;
     snprintf(text, sizeof text,
              "the shape %s explains the data %s (log-likelihood of the fit less that of the other: "
              "%.2g): %s",
-             where, least.gain < 0 ? "better" : "as well", least.gain,
-             name ? "start from this value (sdm_fit_opts.start_params)"
-                  : "start from this pose, or try more turns");
+             where, equal ? "as well" : "better", least.gain,
+             equal  ? "the data do not tell the two apart; keep what is known "
+                      "(sdm_fit_opts.kept), or take data that show more of the shape"
+             : name ? "start from this value (sdm_fit_opts.start_params)"
+                    : "start from this pose, or try more turns");
     // errors of coarse maps at sharp edges weigh more in fits to points than a small gain
     const bool doubt = points && least.gain > -CLEARLY_BETTER;
     sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, false, doubt ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED,

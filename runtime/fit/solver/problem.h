@@ -103,6 +103,10 @@ typedef struct fit_problem {
     fit_recent recent;
     /* number of iterations so far, including those of the search */
     size_t n_steps;
+    /* whether the error of the network was measured, and what exact maps change in each parameter,
+     * see network_bias.h */
+    bool network_measured;
+    double network_change[FIT_PARAMS_MAX];
     /* true: the fit only serves to judge another one, see fit_rival.h */
     bool is_rival;
     /* the second best of several starts of the search; its objective */

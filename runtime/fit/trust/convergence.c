@@ -8,6 +8,7 @@
 
 #include "fit/data/source_params.h"
 #include "fit/solver/newton.h"
+#include "sdm/internal/hardly_known.h"
 
 // an unknown has converged when it moves by no more than this share of its sd
 #define UNREST_MAX 0.1
@@ -47,6 +48,22 @@ void sdm_fit_accept_small_steps(const fit_problem *p, sdm_fit_result *r)
              "the last steps move every unknown by at most %.2g of its standard deviation", most);
 }
 
+// text[size] = the parameters that the data hardly determine; empty: there are none, or too few
+// iterations were made to blame them
+static void name_hardly_known(const fit_problem *p, const sdm_fit_result *r, char *text,
+                              size_t size)
+{
+    *text = '\0';
+    for (size_t k = 0; k < p->n_params && r->n_iterations >= FIT_ITERATIONS_USUAL; k++) {
+        double low, high;
+        const char *name;
+        if (!sdm_fit_hardly_known(r, k)) continue;
+        sdm_fit_bounds(p->source, k, &low, &high, &name);
+        const size_t used = strlen(text);
+        snprintf(text + used, size - used, "%s%.40s", used ? ", " : "", name);
+    }
+}
+
 static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
 {
     static const char *const pose[6] = {"rotation about x",    "rotation about y",
@@ -59,7 +76,7 @@ static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_err
         sdm_fit_bounds(p->source, worst, &low, &high, &name);
     else
         name = pose[worst - p->n_params];
-    char moves[200] = "", keep[160] = "data that determine what still moves";
+    char moves[200] = "", keep[300] = "data that determine what still moves", unknown[200] = "";
     if (isnan(r->sd[worst]))
         snprintf(moves, sizeof moves, "; %.100s may still move, its standard deviation is unknown",
                  name);
@@ -67,15 +84,26 @@ static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_err
         snprintf(moves, sizeof moves,
                  "; %.100s still moves by %.2g of its standard deviation, need %.2g", name, most,
                  UNREST_MAX);
-    if (*moves && worst < p->n_params)
+    // what the data do not determine moves on with more iterations, too; where damping hides what
+    // moves, it is the likeliest
+    const bool may_be = !*moves || (worst < p->n_params && sdm_fit_hardly_known(r, worst));
+    if (may_be) name_hardly_known(p, r, unknown, sizeof unknown);
+    if (*unknown)
+        snprintf(keep, sizeof keep,
+                 "the data hardly determine %s: keep %s (sdm_fit_opts.kept), or give "
+                 "data that determine %s",
+                 unknown, strchr(unknown, ',') ? "them at known values" : "it at a known value",
+                 strchr(unknown, ',') ? "them" : "it");
+    else if (*moves && worst < p->n_params)
         snprintf(keep, sizeof keep,
                  "data that determine %.60s, or keep it at a known value (sdm_fit_opts.kept)",
                  name);
     // whoever has allowed more iterations already is not told to allow more
     const bool many = p->opts->max_iterations > FIT_ITERATIONS_USUAL;
-    sdm_fail(err, SDM_E_QUALITY,
-             "not converged after %zu iterations (%s%s): %sa nearer start, or %s", r->n_iterations,
-             r->reason, moves, many ? "" : "more of them (sdm_fit_opts.max_iterations), ", keep);
+    sdm_fail(err, SDM_E_QUALITY, "not converged after %zu iterations (%s%s): %s%s%s",
+             r->n_iterations, r->reason, moves,
+             many || *unknown ? "" : "more of them (sdm_fit_opts.max_iterations), ",
+             *unknown ? "" : "a nearer start, or ", keep);
 }
 
 void sdm_fit_name_restless(const fit_problem *p, sdm_fit_result *r, sdm_error *err)

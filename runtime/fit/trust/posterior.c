@@ -69,17 +69,6 @@ static double model_error(const fit_problem *p)
 // sd of a variance; NaN for a negative one, since 0 would mean that the unknown is known exactly
 static double sd_of(double variance) { return variance >= 0 ? sqrt(variance) : NAN; }
 
-// keeps the parameter that the error of the network moves most: by `change`; variance: that without
-// it
-static void network_error_add(sdm_fit_result *out, size_t param, double change, double variance)
-{
-    const double moves = variance > 0 ? fabs(change) / sqrt(variance) : 0;
-    if (out->network_error_sd >= moves) return;
-    out->network_error_sd = moves;
-    out->network_error_param = param;
-    out->network_error = fabs(change);
-}
-
 // covariance, sd and correlation from the sandwich; bias[n][n]: what the voxels of the maps add to
 // the covariance; change[n]: what exact maps change, NULL: not known; spread[n][n]: scratch memory
 static void covariance_fill(const fit_problem *p, const fit_score_covariance *scatter,
@@ -111,7 +100,6 @@ static void covariance_fill(const fit_problem *p, const fit_score_covariance *sc
             const double c = sandwich(n, influence, spread, i, j) + bias[i * n + j],
                          more = change ? change[i] * change[j] : 0;
             out->covariance[i * size + j] = out->covariance[j * size + i] = c + more;
-            if (change && i == j && i < p->n_params) network_error_add(out, i, change[i], c);
         }
     sdm_fit_pose_params_spread(p, out->covariance);
     for (size_t i = 0; i < 6; i++)
@@ -175,10 +163,13 @@ sdm_status sdm_fit_posterior(fit_problem *p, sdm_fit_result *out, sdm_error *err
     if (!s && known && !p->is_rival && fit_is_image(p) && p->maps.share && p->maps.exact)
         s = sdm_fit_finer_map_bias(p, influence, bias, err);
     bool measured = !s && known && !p->is_rival && sdm_fit_can_measure_network(p);
+    p->network_measured = false;
     if (measured) {
         s = sdm_fit_network_bias(p, change, err);
         // a shape without a mesh here leaves the error unknown
         measured = !s;
+        p->network_measured = measured;
+        if (measured) memcpy(p->network_change, change, p->n_params * sizeof *change);
         if (s != SDM_E_NOMEM && s != SDM_E_CANCELLED) s = SDM_OK;
     }
     if (!s && known)
@@ -189,4 +180,21 @@ sdm_status sdm_fit_posterior(fit_problem *p, sdm_fit_result *out, sdm_error *err
     sdm_free(work);
     sdm_fit_score_covariance_dispose(&scatter);
     return s;
+}
+
+void sdm_fit_network_error_find(const fit_problem *p, sdm_fit_result *out)
+{
+    if (!p->network_measured) return;
+    out->network_error_sd = 0;
+    for (size_t k = 0; k < p->n_params; k++) {
+        const double change = fabs(p->network_change[k]),
+                     variance = out->sd[k] * out->sd[k] - change * change,
+                     moves = variance > 0 ? change / sqrt(variance) : 0;
+        if (!(moves > out->network_error_sd) ||
+            sqrt(variance) > FIT_BY_PRIOR * sdm_fit_prior_sd(p, k))
+            continue;
+        out->network_error_sd = moves;
+        out->network_error_param = k;
+        out->network_error = change;
+    }
 }

@@ -12,6 +12,11 @@
    is singular; the matrices then keep their values. */
 sdm_status sdm_fit_posterior(fit_problem *p, sdm_fit_result *out, sdm_error *err);
 
+/* After sdm_fit_posterior() and all that widens standard deviations: if the error of the network
+   was measured, sets network_error and its companions of *out to the parameter that it moves most,
+   of those that the data determine but for this error. */
+void sdm_fit_network_error_find(const fit_problem *p, sdm_fit_result *out);
+
 /* Error (mm, rms) near the surface of the maps of the fit: of the network, measured on its held-out
    data; 0 for exact maps. */
 double sdm_fit_network_error(const fit_problem *p);

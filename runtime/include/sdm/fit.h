@@ -522,8 +522,9 @@ typedef struct sdm_fit_result {
        rad, mm; the same as in sd where there are none. NaN as sd */
     double pose_sd_determined[6];
     /* network, with the shape in the source: the largest change of a parameter, over its standard
-       deviation, if exact maps on the same grid took the place of the network's, to first order;
-       and the index of this parameter. The squared changes are part of the covariance. NaN: not
+       deviation without it, if exact maps on the same grid took the place of the network's, to
+       first order; and the index of this parameter. Of the parameters that the data determine: the
+       others lack data, whatever the maps. The squared changes are part of the covariance. NaN: not
        measured */
     double network_error_sd;
     size_t network_error_param;

@@ -318,7 +318,8 @@ bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text)
     cli_name_part(a, most, text);
     sdm_text_add(text,
                  "passes through itself, and %.2g %% of its surface faces the wrong way: what lies "
-                 "behind that is missing; is a fillet larger than half of the part is thick, or a "
+                 "behind that is missing; are two of its vertices exchanged, or does its outline "
+                 "cross itself, as where a fillet is larger than half of the part is thick, or a "
                  "wall thicker than the part is wide?",
                  100 * a->part[most].folded);
     return true;

@@ -512,7 +512,7 @@ static void tell_flat(teller *t)
         return;
     if (make(t->s, c->worst, &mesh, NULL) && !sdm_part_audit_make(&mesh, false, &audit, NULL)) {
         while (i + 1 < audit.n && !sdm_survey_part_is_flat(&audit, i)) i++;
-        if (audit.part[i].state == SDM_PART_FLAT)
+        if (audit.part[i].state == SDM_PART_FLAT || audit.part[i].doubled)
             sdm_text_add(&text, "walls lie on each other at ");
         else
             sdm_text_add(&text,

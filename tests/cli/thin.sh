@@ -16,12 +16,15 @@ cat >rings.c <<'C'
 #ifndef NECK
 #define NECK 5, 8, 6
 #endif
+#ifndef BOTTOM
+#define BOTTOM p[1]
+#endif
 #ifdef BAR
 #define RINGS {20, -30}, {20, -10}, {p[0], -8}, {p[0], 8}, {20, 10}, {20, 30}
 enum { N = 6 };
 #else
 #define RINGS                                                                                                                                    \
-    {20, -30}, {20, 10}, {p[0], 15}, {p[0], 30}, {p[0] - p[1], 30}, {p[0] - p[1], 15 - p[1]}, {20 - p[1], 10 - p[1]}, {20 - p[1], p[1] - 30}
+    {20, -30}, {20, 10}, {p[0], 15}, {p[0], 30}, {p[0] - p[1], 30}, {p[0] - p[1], 15 - p[1]}, {20 - p[1], 10 - p[1]}, {20 - p[1], BOTTOM - 30}
 enum { N = 8 };
 #endif
 static const sdm_param PARAMS[] = {{"neck", "mm", NECK, "half the width of the neck"},
@@ -84,6 +87,12 @@ build none -DWALL_MIN=0
 expect 4 mend sdmgen shapes check --plugin ./none.so --samples 8
 has '^warning +walls lie on each other at neck=5 wall=0 \(in [0-9]+ of 13 shapes\): no grid shows it; let the range of its thickness begin higher'
 expect 0 - sdmgen shapes test none.so
+# A bottom without thickness, whose inner and outer triangles differ; with voxels no spacing is advised.
+build bottom -DBOTTOM=0
+printf 'shape: {name: rings}\ngrid: {size: [36, 36, 56], spacing: 1.2, centre: [0, 0, 0]}\ntrain: {minutes: 0.1}\n' >bottom.yaml
+expect 4 mend sdmgen shapes check bottom.yaml --plugin ./bottom.so --samples 8
+has '^warning +walls lie on each other at neck=6 wall=2.5 \(in all 13 shapes\): no grid shows it'
+if grep -q 'too thin for voxels' out; then bad "a spacing for walls that lie on each other: $(cat out)"; fi
 build crossed -DWALL_MAX=6
 expect 4 mend sdmgen shapes check --plugin ./crossed.so --samples 8
 has '^warning +walls pass through each other in .* to neck=5 wall=6 [0-9.]+ % of the surface turns over, at about neck=5\.[0-9]+ wall=5'

@@ -362,11 +362,27 @@ static void test_outline_that_crosses_itself(void **state)
         if (sdm_part_audit_make(&m, true, &a, &err)) fail_msg("%s", err.text);
         assert_int_equal(a.n, 1);
         assert_int_equal(a.part[0].state, SDM_PART_SOLID);
-        // beyond radius 2.8: 27.6 of 94.2 mm^2
+        // beyond the crossing, at radius 2.714: 32.7 of 94.2 mm^2
         if (crossed)
-            assert_true(a.part[0].crossed > 0 && fabs(a.part[0].folded - 0.293) < 0.02);
+            assert_true(a.part[0].crossed > 0 && fabs(a.part[0].folded - 0.347) < 0.02);
         else
             assert_true(a.part[0].crossed == 0 && a.part[0].folded == 0);
+        sdm_part_audit_dispose(&a);
+    }
+}
+
+// A disc whose poles are exchanged: its faces are cones that cross at half of the radius, and each
+// triangle reaches from the axis to the rim. A quarter of the cones faces the wrong way.
+static void test_poles_exchanged(void **state)
+{
+    (void)state;
+    for (int exchanged = 0; exchanged < 2; exchanged++) {
+        const double z = exchanged ? 1 : -1, outline[4][2] = {{0, z}, {3, -1}, {3, 1}, {0, -z}};
+        const sdm_mesh m = revolve(outline, 4);
+        sdm_part_audit a = audit_of(&m);
+        assert_int_equal(a.part[0].state, SDM_PART_SOLID);
+        // cones of 68 mm^2 and a rim of 37.7 mm^2
+        assert_true(exchanged ? fabs(a.part[0].folded - 0.161) < 0.02 : a.part[0].folded == 0);
         sdm_part_audit_dispose(&a);
     }
 }
@@ -388,7 +404,7 @@ static void test_loop_in_another_part(void **state)
         sdm_part_audit a;
         if (sdm_part_audit_make(&m, true, &a, &err)) fail_msg("%s", err.text);
         assert_int_equal(a.n, (size_t)boxes + 1);
-        assert_true(fabs(a.part[boxes].folded - (boxes == 1 ? 0.293 : 0.293 / 2)) < 0.02);
+        assert_true(fabs(a.part[boxes].folded - (boxes == 1 ? 0.347 : 0.347 / 2)) < 0.02);
         sdm_part_audit_dispose(&a);
         sdm_mesh_dispose(&m);
     }
@@ -434,6 +450,43 @@ static void test_thickness_of_necks(void **state)
     assert_true(fabs(thickness_of(dumbbell) - 0.1) < 0.005);
 }
 
+/* A cup of radius 3 and height 4, with a bottom of this thickness, tilted so that coordinates of
+ * the bottom are rounded. */
+static sdm_mesh cup(double bottom)
+{
+    const double outline[6][2] = {{0, 0}, {3, 0}, {3, 4}, {2, 4}, {2, bottom}, {0, bottom}};
+    const sdm_mesh m = revolve(outline, 6);
+    for (size_t v = 0; v < m.n_vert; v++) {
+        double *x = m.vert + 3 * v;
+        const double y = 0.8 * x[1] - 0.6 * x[2];
+        x[2] = 0.6 * x[1] + 0.8 * x[2];
+        x[1] = y;
+    }
+    return m;
+}
+
+// A bottom without thickness, whose faces have different triangles: nothing is between them, and
+// the thickness is that of the wall. Of parts that touch along a face none has walls on each other.
+static void test_walls_in_one_place(void **state)
+{
+    (void)state;
+    for (int none = 0; none < 2; none++) {
+        const sdm_mesh m = cup(none ? 0 : 1e-3);
+        sdm_part_audit a = audit_of(&m);
+        assert_int_equal(a.part[0].state, SDM_PART_SOLID);
+        assert_int_equal(a.part[0].doubled, none);
+        assert_true(fabs(a.part[0].thick - (none ? 1 : 1e-3)) < (none ? 0.02 : 1e-9));
+        sdm_part_audit_dispose(&a);
+    }
+    sdm_mesh m = {0};
+    add_box(&m, 0, 1, 4, false);
+    add_box(&m, 1, 2, 3, false);
+    sdm_part_audit a = audit_of(&m);
+    assert_true(a.n == 2 && !a.part[0].doubled && !a.part[1].doubled);
+    sdm_part_audit_dispose(&a);
+    sdm_mesh_dispose(&m);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -444,7 +497,9 @@ int main(void)
         cmocka_unit_test(test_gap_of_a_bar),
         cmocka_unit_test(test_groups),
         cmocka_unit_test(test_open_and_flat_parts),
+        cmocka_unit_test(test_poles_exchanged),
         cmocka_unit_test(test_thickness),
+        cmocka_unit_test(test_walls_in_one_place),
         cmocka_unit_test(test_thickness_of_necks),
         cmocka_unit_test(test_outline_that_crosses_itself),
         cmocka_unit_test(test_loop_in_another_part),

@@ -241,6 +241,27 @@ static void a_part_in_metres(void **state)
     sdm_shape_survey_dispose(&s);
 }
 
+// Two triangles that are each other's other side enclose nothing: they have no size to compare.
+static void a_part_without_volume(void **state)
+{
+    (void)state;
+    double vert[33] = {0};
+    uint32_t tri[42];
+    sdm_mesh_out box = {.vert = vert, .tri = tri};
+    faulty_box(&box, 0, (const double[3]){-2, -2, -2}, (const double[3]){2, 2, 2}, 0);
+    vert[24] = vert[27] = vert[30] = 3;
+    vert[28] = vert[32] = 1e-17;
+    memcpy(tri + 36, (const uint32_t[]){8, 9, 10, 8, 10, 9}, 6 * sizeof *tri);
+    const sdm_mesh m = {.vert = vert, .tri = tri, .n_vert = 11, .n_tri = 14};
+    sdm_part_audit a;
+    size_t shortest, longest;
+    if (sdm_part_audit_make(&m, false, &a, &err)) fail_msg("%s", err.text);
+    assert_int_equal(a.n, 2);
+    assert_true(sdm_survey_part_lengths(&a, &shortest, &longest) == 0);
+    assert_true(sdm_survey_part_is_flat(&a, 1));
+    sdm_part_audit_dispose(&a);
+}
+
 static void breaks_along_a_parameter(void **state)
 {
     (void)state;
@@ -553,3 +574,4 @@ int main(void)
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
+        cmocka_unit_test(a_part_without_volume),

@@ -9,13 +9,13 @@
 #include <math.h>
 
 #include "mesh/crossings.h"
+#include "part_places.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
-// Triangles of a part that are looked at.
-#define TRIANGLES 1000
-// Distance of the point in front of a triangle from it, over the longest edge of the box of the
-// mesh.
+// Places on the surface of a part that are looked at.
+enum { PLACES = 1000 };
+// Distance of the point in front of a place from it, over the longest edge of the box of the mesh.
 #define IN_FRONT 1e-6
 
 /* The mesh, and one part of it alone if it meets others. */
@@ -24,27 +24,36 @@ typedef struct fold {
     const sdm_bvh *tree;
     sdm_mesh alone; /* shares the vertices of m; without triangles: the part meets no other */
     sdm_bvh alone_tree;
-    double ahead; /* distance of the point in front of a triangle, mm */
-    double area, folded;
+    double ahead; /* distance of the point in front of a place, mm */
+    part_places at;
+    size_t folded; /* places that face the wrong way */
 } fold;
 
-/* Adds the area of triangle t to f->area, and to f->folded if it faces the wrong way. */
-static void triangle_add(fold *f, size_t t)
+/* Does the place x on the surface, where it has this unit normal, face the wrong way? */
+static bool is_folded(const fold *f, const double x[3], const double normal[3])
+{
+    double ahead[3];
+    v3_along(x, f->ahead, normal, ahead);
+    const int winding = sdm_ray_winding_along(f->m, f->tree, ahead, normal, NULL, 0);
+    return winding < 0 ||
+           (winding == 0 && f->alone.n_tri &&
+            sdm_ray_winding_along(&f->alone, &f->alone_tree, ahead, normal, NULL, 0) < 0);
+}
+
+/* Looks at the places in triangle t of a part. */
+static void look_at(fold *f, const sdm_part *part, size_t t)
 {
     const sdm_mesh *m = f->m;
-    const double *p[3];
+    const uint32_t *v = m->tri + 3 * t;
     double normal[3], x[3];
-    for (size_t k = 0; k < 3; k++) p[k] = m->vert + 3 * (size_t)m->tri[3 * t + k];
-    v3_triangle_normal(p[0], p[1], p[2], normal);
+    v3_triangle_normal(m->vert + 3 * (size_t)v[0], m->vert + 3 * (size_t)v[1],
+                       m->vert + 3 * (size_t)v[2], normal);
     const double length = v3_norm(normal);
     if (!(length > 0)) return;
-    for (int a = 0; a < 3; a++)
-        x[a] = (p[0][a] + p[1][a] + p[2][a]) / 3 + f->ahead * normal[a] / length;
-    f->area += 0.5 * length;
-    const int winding = sdm_ray_winding_along(m, f->tree, x, normal, NULL, 0);
-    const bool hole = winding == 0 && f->alone.n_tri &&
-                      sdm_ray_winding_along(&f->alone, &f->alone_tree, x, normal, NULL, 0) < 0;
-    if (winding < 0 || hole) f->folded += 0.5 * length;
+    for (int d = 0; d < 3; d++) normal[d] /= length;
+    f->at.area += 0.5 * length;
+    while (part_places_next(&f->at, PLACES, part->area, m, t, x))
+        f->folded += is_folded(f, x, normal);
 }
 
 /* Collects the triangles of part `index`, which has n of them, and builds their tree. */
@@ -71,10 +80,9 @@ static sdm_status find_fold(const sdm_mesh *m, const sdm_bvh *tree, const uint32
     sdm_arena arena = {0};
     sdm_status s = SDM_OK;
     if (part->met) s = set_alone(&f, part_of, index, part->n_tri, &arena, err);
-    const size_t each = (part->n_tri + TRIANGLES - 1) / TRIANGLES;
-    for (size_t t = part->first_tri, k = 0; t < m->n_tri && k < part->n_tri && !s; t++)
-        if (part_of[t] == index && k++ % each == 0) triangle_add(&f, t);
-    if (f.area > 0 && !s) part->folded = f.folded / f.area;
+    for (size_t t = part->first_tri; t < m->n_tri && f.at.n < PLACES && !s; t++)
+        if (part_of[t] == index) look_at(&f, part, t);
+    if (f.at.n && !s) part->folded = (double)f.folded / (double)f.at.n;
     sdm_arena_dispose(&arena);
     sdm_free(f.alone.tri);
     return s;

@@ -2,12 +2,15 @@
  * the normal, to the wall of the union on the other side. The thickness is the length that a
  * fiftieth of the surface does not reach, among chords between walls that are nearly parallel: at a
  * neck they are, at edges and tips, where chords of every solid shrink to nothing, they are not.
- * Where hardly any walls are parallel (a cone), it is the median of all chords. */
+ * Where hardly any walls are parallel (a cone), it is the median of all chords. Where the other
+ * wall lies in the same place, there is no part to measure. */
 #include "part_thickness.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 
+#include "part_places.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
@@ -26,6 +29,7 @@ typedef struct crossing {
 typedef struct ray {
     double from[3], dir[3]; /* dir: a unit vector */
     uint32_t triangle;      /* on which it begins */
+    double touch;           /* triangles no farther from `from` go through it: rounding, mm */
     crossing found[CROSSINGS_MAX];
     size_t n;      /* of all crossings, also of those without a place in found[] */
     int64_t inner; /* winding number just behind `from` */
@@ -33,15 +37,16 @@ typedef struct ray {
 
 /* The chords of one part. */
 typedef struct chords {
-    double area; /* of its triangles so far, mm^2 */
-    size_t tried, n, n_parallel;
+    part_places begin;
+    size_t n, n_parallel;
+    size_t n_none;           /* of length 0: they do not count for the thickness */
     double length[CHORDS];   /* [n] mm */
     double parallel[CHORDS]; /* [n_parallel] mm, of those between parallel walls */
 } chords;
 
 static bool meets_box(const ray *r, const sdm_bvh_node *node)
 {
-    double first = 0, last = INFINITY;
+    double first = -r->touch, last = INFINITY;
     for (int d = 0; d < 3; d++) {
         const double a = (node->lo[d] - r->from[d]) / r->dir[d],
                      b = (node->hi[d] - r->from[d]) / r->dir[d];
@@ -72,12 +77,13 @@ static void cross(ray *r, const sdm_mesh *m, uint32_t t)
     v3_cross(w, u, q);
     const double det = v3_dot(u, p), a = v3_dot(w, p) / det, b = v3_dot(r->dir, q) / det,
                  at = v3_dot(v, q) / det;
-    if (t == r->triangle || !(det != 0 && a >= 0 && b >= 0 && a + b <= 1 && at > 0)) return;
+    if (t == r->triangle || !(det != 0 && a >= 0 && b >= 0 && a + b <= 1 && at >= -r->touch))
+        return;
     // det > 0: the triangle faces the origin of the ray
     const int step = det > 0 ? 1 : -1;
     // far away the winding number is 0: that at the origin is minus the sum of all steps
     r->inner -= step;
-    if (r->n < CROSSINGS_MAX) r->found[r->n] = (crossing){at, step, t};
+    if (r->n < CROSSINGS_MAX) r->found[r->n] = (crossing){at > r->touch ? at : 0, step, t};
     r->n++;
 }
 
@@ -96,10 +102,11 @@ static void follow(ray *r, const sdm_mesh *m, const sdm_bvh *tree)
     }
 }
 
+/* In one place the ray enters a solid before it leaves another one: solids that touch are one. */
 static int by_place(const void *a, const void *b)
 {
-    const double x = ((const crossing *)a)->at, y = ((const crossing *)b)->at;
-    return (x > y) - (x < y);
+    const crossing *x = a, *y = b;
+    return x->at != y->at ? (x->at > y->at) - (x->at < y->at) : y->step - x->step;
 }
 
 /* The first place outside the union; NULL: the origin does not lie on the surface of the union. */
@@ -115,23 +122,23 @@ static const crossing *way_out(ray *r)
     return NULL;
 }
 
-/* Starts chord number k in triangle t, whose normal is n[3]. The places follow the golden ratio, so
- * that no ray meets an edge on the other side of a symmetric part. */
-static void add_chord(const sdm_mesh *m, const sdm_bvh *tree, uint32_t t, const double n[3],
-                      chords *c)
+/* Adds the chord that begins at `from` in triangle t, whose normal is n[3]. */
+static void add_chord(const sdm_mesh *m, const sdm_bvh *tree, uint32_t t, const double from[3],
+                      const double n[3], chords *c)
 {
-    const double length = v3_norm(n), x = fmod(0.754877666 * (double)(c->tried + 1), 1),
-                 y = fmod(0.569840291 * (double)(c->tried + 1), 1), root = sqrt(x),
-                 share[3] = {1 - root, root * (1 - y), root * y};
     ray r = {.triangle = t};
-    for (size_t d = 0; d < 3; d++) {
-        for (size_t k = 0; k < 3; k++) r.from[d] += share[k] * corner(m, t, k)[d];
+    const double length = v3_norm(n);
+    for (int d = 0; d < 3; d++) {
+        r.from[d] = from[d];
         r.dir[d] = -n[d] / length;
+        r.touch = fmax(r.touch, 64 * DBL_EPSILON *
+                                    fmax(fabs(tree->node[0].lo[d]), fabs(tree->node[0].hi[d])));
     }
-    c->tried++;
     follow(&r, m, tree);
     const crossing *end = way_out(&r);
     if (!end) return;
+    c->n_none += end->at == 0;
+    if (end->at == 0) return;
     double wall[3];
     normal_of(m, end->triangle, wall);
     c->length[c->n++] = end->at;
@@ -162,15 +169,14 @@ sdm_status sdm_part_thickness(const sdm_mesh *m, const sdm_bvh *tree, const uint
     for (uint32_t t = 0; t < m->n_tri; t++) {
         const uint32_t i = part_of[t];
         if (i >= n || parts[i].state != SDM_PART_SOLID) continue;
-        double normal[3];
+        double normal[3], from[3];
         normal_of(m, t, normal);
-        of[i].area += 0.5 * v3_norm(normal);
-        // chord k begins where the sum of the areas passes (k + 1/2) / CHORDS of the whole
-        while (of[i].tried < CHORDS &&
-               CHORDS * of[i].area > ((double)of[i].tried + 0.5) * parts[i].area)
-            add_chord(m, tree, t, normal, &of[i]);
+        of[i].begin.area += 0.5 * v3_norm(normal);
+        while (part_places_next(&of[i].begin, CHORDS, parts[i].area, m, t, from))
+            add_chord(m, tree, t, from, normal, &of[i]);
     }
     for (size_t i = 0; i < n; i++) {
+        parts[i].doubled = of[i].n_none > THIN_RANK;
         if (of[i].n >= CHORDS_MIN) parts[i].thick = thickness(&of[i]);
     }
     sdm_free(of);

@@ -87,7 +87,7 @@ bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i)
     const sdm_part *p = &a->part[i];
     double size = 0;
     for (int d = 0; d < 3; d++) size = fmax(size, a->mesh.max[d] - a->mesh.min[d]);
-    return p->state == SDM_PART_FLAT || p->thick < SDM_SURVEY_FLAT * size;
+    return p->state == SDM_PART_FLAT || p->doubled || p->thick < SDM_SURVEY_FLAT * size;
 }
 
 double sdm_survey_part_lengths(const sdm_part_audit *a, size_t *shortest, size_t *longest)
@@ -95,6 +95,7 @@ double sdm_survey_part_lengths(const sdm_part_audit *a, size_t *shortest, size_t
     double least = INFINITY, most = 0;
     for (size_t i = 0; i < a->n; i++) {
         double length = 0;
+        if (a->part[i].state == SDM_PART_FLAT) continue; // told as such
         for (int d = 0; d < 3; d++) length = fmax(length, a->part[i].max[d] - a->part[i].min[d]);
         if (length > 0 && length < least) least = length, *shortest = i;
         if (length > most) most = length, *longest = i;
@@ -319,7 +320,7 @@ static void sum_up(survey *v)
             s->high[a] = fmax(s->high[a], f->max[a]);
         }
         count_beyond(s, i, f);
-        if (v->opts->grid) count_thin(s, i, f->thick, sdm_grid_coarsest(v->opts->grid));
+        if (v->opts->grid && !f->flat) count_thin(s, i, f->thick, sdm_grid_coarsest(v->opts->grid));
     }
     s->overlaps_begin = s->overlaps.shapes && !v->found[0].status && !v->found[0].overlaps;
     double sum = 0;

@@ -53,6 +53,9 @@ typedef struct sdm_part {
      * the mesh is open, the part is not solid or lies inside others, or it is not one of the first
      * 1000 parts. */
     double thick;
+    /* over a fiftieth of the surface of a solid part has the opposite wall in the same place, with
+     * nothing between: these chords do not count for the thickness */
+    bool doubled;
     /* share of the area, of a solid part that meets itself, that faces the wrong way: an outline
      * that crosses itself, or a wall thicker than the part is wide. What lies behind it counts as
      * outside, also where another part is solid. 0 in an open mesh and for parts after the first

@@ -144,8 +144,9 @@ typedef struct sdm_shape_survey {
     size_t slow; /* parameters that are odd by themselves: sdm_survey_is_slow() */
     /* groups of parts that meet each other, but no part of another group; amount: their number */
     sdm_survey_count apart;
-    /* parts that enclose nothing, or are thinner than SDM_SURVEY_FLAT times the longest edge of the
-     * box of the shape: two walls of a part lie on each other */
+    /* parts that enclose nothing, also in a piece of them (sdm_part.doubled), or are thinner than
+     * SDM_SURVEY_FLAT times the longest edge of the box of the shape: two walls of a part lie on
+     * each other */
     sdm_survey_count flat;
     /* parts whose box is SDM_SURVEY_TINY times shorter than that of the longest part, or more: one
      * of both is likely to be in another unit; amount: how many times, of the shortest part */
@@ -154,8 +155,8 @@ typedef struct sdm_shape_survey {
 
     /* the samples whose vertices lie beyond the centres of the outer voxels; amount: mm beyond */
     sdm_survey_count cut;
-    /* shapes with a part that is too thin for the grid (part_audit.h); amount: the largest spacing
-     * of the grid, in thicknesses of the part */
+    /* shapes that are not `flat` with a part too thin for the grid (part_audit.h); amount: the
+     * largest spacing of the grid, in thicknesses of the part */
     sdm_survey_count thin;
     double beyond[3][2]; /* mm, of all shapes: below the first and above the last voxel of each axis
                             of the grid; 0: not beyond */
@@ -208,8 +209,9 @@ bool sdm_survey_has_twins(const sdm_shape_survey *s);
 /* Does part i of an audited mesh count for sdm_shape_survey.flat? */
 bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i);
 
-/* The parts whose boxes have the shortest and the longest edge of all. Returns how many times
- * longer the longest edge of the second is; 0: there are not two parts with a length. */
+/* The parts whose boxes have the shortest and the longest edge of all that enclose something.
+ * Returns how many times longer the longest edge of the second is; 0: there are not two such
+ * parts. */
 double sdm_survey_part_lengths(const sdm_part_audit *a, size_t *shortest, size_t *longest);
 
 /* How often part i of an audited mesh winds around its inside, at least and on average: its volume

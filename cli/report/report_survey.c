@@ -234,12 +234,21 @@ static void tell_swings(teller *t)
     const sdm_param *p = &sdm_instance_params(t->s->shape, NULL)[c->angle];
     sdm_text text = {0};
     if (!c->swings) return;
-    sdm_text_add(
-        &text,
-        "the vertices turn back %zu times while the parameter '%s' goes from %g to %g%s%s, "
-        "as cos() and sin() of so many rad do; if these are degrees, multiply them by "
-        "0.017453 in mesh(); mend this first: other lines may follow from it",
-        c->swings, p->name, p->min, p->max, *p->unit ? " " : "", p->unit);
+    if (c->poles)
+        sdm_text_add(
+            &text,
+            "the vertices move beyond all bounds %zu times, at %.4g, %.4g and so on, while the "
+            "parameter '%s' goes from %g to %g%s%s, as tan() of so many rad does",
+            c->swings, c->pole[0], c->pole[1], p->name, p->min, p->max, *p->unit ? " " : "",
+            p->unit);
+    else
+        sdm_text_add(
+            &text,
+            "the vertices turn back %zu times while the parameter '%s' goes from %g to %g%s%s, as "
+            "cos() and sin() of so many rad do",
+            c->swings, p->name, p->min, p->max, *p->unit ? " " : "", p->unit);
+    sdm_text_add(&text, "; if these are degrees, multiply them by 0.017453 in mesh(); mend this "
+                        "first: other lines may follow from it");
     tell(t, SDM_E_QUALITY, &text);
 }
 

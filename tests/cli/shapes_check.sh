@@ -272,6 +272,14 @@ cc -shared -fPIC -I"$source_folder/framework/include" lean.c -o lean.so -lm || b
 expect 4 'mend' sdmgen shapes check --plugin ./lean.so --samples 4
 has "^warning +the parameter 'radius' ranges from 1.5 to 2 mm, which moves no vertex of a shape of 90[0-9] mm by more than 0.6 mm; does mesh\(\) give 'lean' \(10 \.\. 11 deg\) to cos\(\) or sin\(\)\? These want rad"
 if grep -q 'are these m ' out; then bad "degrees, and a question about metres: $(cat out)"; fi
+# one that goes to tan(): it comes first
+sed -E 's/enum \{ RADIUS \}/enum { RADIUS, RISE }/; s/p\[RADIUS\]/(p[RADIUS] + 0.1 * tan(p[RISE]))/g
+    s/^static const sdm_param PARAMS.*/&\n    [RISE] = {.name = "rise", .unit = "", .min = 0, .max = 20, .def = 10, .help = "rise"},/' \
+    "$source_folder/examples/plugin/octahedron.c" >rise.c
+cc -shared -fPIC -I"$source_folder/framework/include" rise.c -o rise.so -lm || bad 'the plug-in rise.so was not built'
+sdmgen shapes check --plugin ./rise.so --samples 4 >out 2>err
+grep -Em1 '^(warning|broken)' out >first
+grep -q "^warning  the vertices move beyond all bounds 6 times, at 1.571, 4.712 and so on, while the parameter 'rise' goes from 0 to 20, as tan() of so many rad does; if these are degrees, multiply them by 0.017453 in mesh(); mend this first" first || bad "degrees that go to tan() do not come first: $(cat out)"
 sed 's/"mm"/"m"/' "$source_folder/examples/plugin/octahedron.c" >unit.c
 cc -shared -fPIC -I"$source_folder/framework/include" unit.c -o unit.so -lm || bad 'the plug-in unit.so was not built'
 expect 4 'mend' sdmgen shapes check --plugin ./unit.so --samples 4

@@ -1,7 +1,7 @@
 /* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
  * known from the source; shapes without faults pass.
- * Tests: shape_survey.c survey_fold.c survey_line.c survey_meeting.c survey_repeat.c
- * survey_scale.c survey_still.c survey_swing.c units.c */
+ * Tests: shape_survey.c survey_fold.c survey_line.c survey_meeting.c survey_pole.c
+ * survey_repeat.c survey_scale.c survey_still.c survey_swing.c units.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -374,46 +374,104 @@ static void meshes_made_again(void **state)
         }
 }
 
-/* A body and a handle that goes up and down with sin() of the parameter times the option. */
+/* What swinging_mesh() makes of an angle in rad. */
+static double wave(const char *function, double angle)
+{
+    if (!strcmp(function, "tan")) return tan(angle);
+    if (!strcmp(function, "half")) return tan(0.5 * angle);
+    if (!strcmp(function, "secant")) return 1 / cos(angle);
+    if (!strcmp(function, "steep")) return exp(0.5 * angle);
+    if (!strcmp(function, "saw")) return angle - floor(angle);
+    return sin(angle);
+}
+
+/* A body and a handle that goes up and down with a function of the parameter times the factor. */
 static int swinging_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                          const double *p, sdm_mesh_out *out)
 {
     (void)self;
     const int failed = host->reserve(host, out, 16, 24);
     if (failed) return failed;
-    const double z = sin(p[0] * options[0].number);
+    const double z = wave(options[1].text, p[0] * options[0].number);
     faulty_box(out, 0, (const double[3]){-2, -2, -2}, (const double[3]){2, 2, 2}, 0);
     faulty_box(out, 1, (const double[3]){1, -1, z - 0.5}, (const double[3]){4, 1, z + 0.5}, 0);
     return 0;
 }
 
+/* A brief survey of the swinging shape with one parameter, which is multiplied by the factor. */
+static sdm_shape_survey survey_swinging(sdm_param param, const char *function, const char *factor)
+{
+    static const sdm_option options[] = {
+        {"factor", SDM_OPTION_REAL, "", 0, 1, 1, NULL, "x"},
+        {"function", SDM_OPTION_CHOICE, "", 0, 0, 0, "sin|tan|half|secant|steep|saw", "x"}};
+    const sdm_shape shape = {.abi = SDM_SHAPE_ABI,
+                             .size = sizeof(sdm_shape),
+                             .name = "swinging",
+                             .summary = "test",
+                             .params = &param,
+                             .n_params = 1,
+                             SDM_OPTIONS(options),
+                             .mesh = swinging_mesh};
+    const sdm_named_text given[] = {{"factor", factor}, {"function", function}};
+    sdm_instance *instance = NULL;
+    sdm_shape_survey s;
+    if (sdm_instance_create(&shape, given, 2, NULL, &instance, &err) ||
+        sdm_shape_survey_make(instance, &(sdm_survey_opts){.brief = true}, &s, &err))
+        fail_msg("%s", err.text);
+    sdm_instance_free(instance);
+    return s;
+}
+
+static const char *const ANGLE_UNITS[] = {"deg", "rad", ""};
+
 // An angle in degrees that goes to sin() as it is, and one that is converted.
 static void degrees_that_go_to_sin(void **state)
 {
     (void)state;
-    static const char *const units[] = {"deg", "rad", ""};
     for (size_t i = 0; i < 6; i++) {
-        const sdm_param params[] = {{"angle", units[i / 2], -30, 60, 10, "x"}};
-        const sdm_option options[] = {{"factor", SDM_OPTION_REAL, "", 0, 1, 1, NULL, "x"}};
-        const sdm_shape shape = {.abi = SDM_SHAPE_ABI,
-                                 .size = sizeof(sdm_shape),
-                                 .name = "swinging",
-                                 .summary = "test",
-                                 SDM_PARAMS(params),
-                                 SDM_OPTIONS(options),
-                                 .mesh = swinging_mesh};
-        const sdm_named_text factor = {"factor", i % 2 ? "0.017453" : "1"};
-        sdm_instance *instance = NULL;
-        sdm_shape_survey s;
-        if (sdm_instance_create(&shape, &factor, 1, NULL, &instance, &err) ||
-            sdm_shape_survey_make(instance, &(sdm_survey_opts){.brief = true}, &s, &err))
-            fail_msg("%s", err.text);
+        sdm_shape_survey s =
+            survey_swinging((sdm_param){"angle", ANGLE_UNITS[i / 2], -30, 60, 10, "x"}, "sin",
+                            i % 2 ? "0.017453" : "1");
         // from -30 to 60 rad sin() turns back at 28 or 29 multiples of pi
         assert_true(i % 2 ? s.scale.swings == 0 : s.scale.swings >= 28 && s.scale.swings <= 29);
+        assert_false(s.scale.poles);
         if (!(i % 2)) assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
         sdm_shape_survey_dispose(&s);
-        sdm_instance_free(instance);
     }
+}
+
+// The same for functions with poles: tan(), also of half of the angle, and a division by cos(). A
+// range in mm, and functions without poles, are none.
+static void degrees_that_go_to_tan(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *function, *factor;
+        double max;
+        size_t poles;
+    } cases[] = {{"tan", "1", 20, 6},    {"tan", "1", 5, 2},         {"half", "1", 30, 5},
+                 {"secant", "1", 20, 6}, {"tan", "0.017453", 20, 0}, {"tan", "1", 1.5, 0},
+                 {"steep", "1", 60, 0},  {"saw", "1", 20, 0}};
+    const double pi = acos(-1);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        for (size_t unit = 0; unit < 3; unit++) {
+            sdm_shape_survey s =
+                survey_swinging((sdm_param){"angle", ANGLE_UNITS[unit], 0, cases[i].max, 1, "x"},
+                                cases[i].function, cases[i].factor);
+            const double turn = i == 2 ? 2 : 1;
+            if (s.scale.poles != (cases[i].poles > 0))
+                fail_msg("%s up to %g", cases[i].function, cases[i].max);
+            if (s.scale.poles) {
+                assert_int_equal(s.scale.swings, cases[i].poles);
+                assert_true(fabs(s.scale.pole[0] - turn * pi / 2) < 1e-5);
+                assert_true(fabs(s.scale.pole[1] - turn * 3 * pi / 2) < 1e-5);
+                assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+            }
+            sdm_shape_survey_dispose(&s);
+        }
+    sdm_shape_survey s = survey_swinging((sdm_param){"length", "mm", 0, 20, 1, "x"}, "tan", "1");
+    assert_false(s.scale.poles);
+    sdm_shape_survey_dispose(&s);
 }
 
 static void a_grid_that_cuts(void **state)
@@ -558,11 +616,13 @@ int main(void)
         cmocka_unit_test(parts_in_the_same_place),
         cmocka_unit_test(vertices_in_metres),
         cmocka_unit_test(a_part_in_metres),
+        cmocka_unit_test(a_part_without_volume),
         cmocka_unit_test(breaks_along_a_parameter),
         cmocka_unit_test(a_step_moves_vertices),
         cmocka_unit_test(walls_that_pass_through_each_other),
         cmocka_unit_test(time_is_short),
         cmocka_unit_test(degrees_that_go_to_sin),
+        cmocka_unit_test(degrees_that_go_to_tan),
         cmocka_unit_test(callbacks),
         cmocka_unit_test(meshes_made_again),
         cmocka_unit_test(a_grid_that_cuts),
@@ -574,4 +634,3 @@ int main(void)
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
-        cmocka_unit_test(a_part_without_volume),

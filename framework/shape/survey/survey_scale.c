@@ -7,6 +7,7 @@
 
 #include "sdm/internal/units.h"
 #include "sdm/memory.h"
+#include "survey_pole.h"
 #include "survey_swing.h"
 
 /* rad; larger angles are likely to be degrees. */
@@ -185,7 +186,9 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
     c->odd_size = c->size < SDM_SURVEY_SIZE_MIN || c->size > SDM_SURVEY_SIZE_MAX;
     status = find_speed(f, s, err);
     for (size_t k = 0; k < s->n_params && !status && !c->swings; k++) {
-        status = sdm_survey_swings(f, s->p, k, &c->swings, err);
+        status = sdm_survey_poles(f, s->p, k, c->pole, &c->swings, err);
+        c->poles = c->swings > 0;
+        if (!status && !c->poles) status = sdm_survey_swings(f, s->p, k, &c->swings, err);
         c->angle = k;
     }
     if (status) return status;

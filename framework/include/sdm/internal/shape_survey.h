@@ -85,6 +85,10 @@ typedef struct sdm_survey_scale {
     /* how often vertices of the first shape turn back along the parameter `angle`, which mesh() is
      * likely to give to cos() or sin() in degrees; 0: there is none such */
     size_t swings, angle;
+    /* they do not turn back, but move beyond all bounds, as for tan(), the first two times where
+     * the parameter is pole[] */
+    bool poles;
+    double pole[2];
     /* the unit that would explain both, and its length in mm; NULL: none would */
     const char *unit;
     double unit_mm;

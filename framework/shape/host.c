@@ -9,6 +9,7 @@
 #include "shape_internal.h"
 
 #define DATA_FILE_MAX (UINT64_C(1) << 32)
+#define MESH_MAX (((size_t)1 << 31) - SHAPE_BEHIND) // vertices, triangles
 
 /* Memory that is freed at the end of the callback. */
 typedef struct host_block {
@@ -34,6 +35,26 @@ static int mesh_out_set(sdm_mesh *m, sdm_mesh_out *out)
     return 0;
 }
 
+bool sdm_is_unused(const void *from, const void *to)
+{
+    const unsigned char *first = from, *end = to;
+    // the first byte, and each one as the one before it
+    return first == end ||
+           (*first == SHAPE_UNUSED && !memcmp(first, first + 1, (size_t)(end - first) - 1));
+}
+
+sdm_status sdm_host_check_behind(const sdm_mesh *m, sdm_error *err)
+{
+    const double *vert = m->vert + 3 * m->n_vert;
+    const uint32_t *tri = m->tri + 3 * m->n_tri;
+    const bool wide = !sdm_is_unused(vert, vert + 3 * SHAPE_BEHIND);
+    if (!wide && sdm_is_unused(tri, tri + 3 * SHAPE_BEHIND)) return SDM_OK;
+    return sdm_fail(err, SDM_E_PLUGIN,
+                    "mesh() has written beyond the %zu %s that it reserved: let it reserve as many "
+                    "as it writes",
+                    wide ? m->n_vert : m->n_tri, wide ? "vertices" : "triangles");
+}
+
 static int host_reserve(const sdm_host *host, sdm_mesh_out *out, size_t n_vert, size_t n_tri)
 {
     host_call *c = host_call_of(host);
@@ -43,11 +64,19 @@ static int host_reserve(const sdm_host *host, sdm_mesh_out *out, size_t n_vert, 
         if (!b) return (int)SDM_E_NOMEM;
         m = &b->mesh;
     }
-    const sdm_status s = sdm_mesh_reserve(m, n_vert, n_tri, &c->err);
+    if (n_vert > MESH_MAX || n_tri > MESH_MAX)
+        return (int)sdm_fail(&c->err, SDM_E_MESH,
+                             "mesh of %zu vertices and %zu triangles, at most %zu of each", n_vert,
+                             n_tri, MESH_MAX);
+    const sdm_status s = sdm_mesh_reserve(m, n_vert + SHAPE_BEHIND, n_tri + SHAPE_BEHIND, &c->err);
     if (s) return (int)s;
+    m->n_vert = n_vert;
+    m->n_tri = n_tri;
     // NaN and vertices that do not exist: what the callback forgets to write is refused
     memset(m->vert, c->fill, 3 * n_vert * sizeof *m->vert);
     memset(m->tri, c->fill, 3 * n_tri * sizeof *m->tri);
+    memset(m->vert + 3 * n_vert, SHAPE_UNUSED, 3 * SHAPE_BEHIND * sizeof *m->vert);
+    memset(m->tri + 3 * n_tri, SHAPE_UNUSED, 3 * SHAPE_BEHIND * sizeof *m->tri);
     if (c->fill_stack) sdm_fill_stack(c->fill);
     return mesh_out_set(m, out);
 }

@@ -187,13 +187,14 @@ sdm_status sdm_mesh_out_check(const sdm_mesh_out *out, const sdm_mesh_out *given
                           "they are");
 }
 
-/* The plug-in must have filled the arrays of host->reserve() with at least one triangle, valid
-   indices and finite coordinates. */
+/* The plug-in must have filled the arrays of host->reserve(), and nothing behind them, with at
+   least one triangle, valid indices and finite coordinates. */
 static sdm_status mesh_check(const sdm_mesh *m, const sdm_mesh_out *out, sdm_error *err)
 {
     const sdm_mesh_out given = {
         .vert = m->vert, .tri = m->tri, .n_vert = m->n_vert, .n_tri = m->n_tri};
-    const sdm_status s = sdm_mesh_out_check(out, &given, err);
+    sdm_status s = sdm_mesh_out_check(out, &given, err);
+    if (!s) s = sdm_host_check_behind(m, err);
     if (s) return s;
     if (m->n_tri == 0) return sdm_fail(err, SDM_E_PLUGIN, "the mesh has no triangle");
     for (size_t i = 0; i < 3 * m->n_tri; i++)

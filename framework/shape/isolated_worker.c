@@ -18,7 +18,6 @@
 #include "sdm/memory.h"
 
 #define ARRAY_MAX ((size_t)1 << 31) // vertices, triangles
-#define UNUSED 0xA5                 // the bytes around the arrays that a callback gets
 
 typedef struct worker {
     int socket, memory;
@@ -132,10 +131,10 @@ static bool lay_out(worker *w, size_t n_real, size_t n_index)
         take_back(w);
         return false;
     }
-    memset(at, UNUSED, page);
-    memset(at + reals - 16, UNUSED, 16);
-    memset(at + reals + page, UNUSED, page);
-    memset(at + reals + page + indices - 16, UNUSED, 16);
+    memset(at, SHAPE_UNUSED, page);
+    memset(at + reals - 16, SHAPE_UNUSED, 16);
+    memset(at + reals + page, SHAPE_UNUSED, page);
+    memset(at + reals + page + indices - 16, SHAPE_UNUSED, 16);
     return true;
 }
 
@@ -150,13 +149,6 @@ static uint32_t *indices_of(const worker *w)
     return (uint32_t *)(void *)(w->arrays + (w->layout.index - w->layout.real_pages) + page);
 }
 
-static bool is_unused(const uint8_t *from, const uint8_t *to)
-{
-    for (; from < to; from++)
-        if (*from != UNUSED) return false;
-    return true;
-}
-
 /* SDM_E_PLUGIN: the callback wrote next to its arrays. */
 static sdm_status check_around(worker *w, sdm_error *err)
 {
@@ -164,11 +156,11 @@ static sdm_status check_around(worker *w, sdm_error *err)
     const uint8_t *real = (const uint8_t *)reals_of(w), *index = (const uint8_t *)indices_of(w);
     const size_t before_real = l->real - l->real_pages, before_index = l->index - l->index_pages,
                  page = (size_t)sysconf(_SC_PAGESIZE);
-    if (is_unused(real - (before_real < page ? before_real : page), real) &&
-        is_unused(real + l->n_real * sizeof(double),
-                  w->arrays + (l->index_pages - l->real_pages)) &&
-        is_unused(index - (before_index < page ? before_index : page), index) &&
-        is_unused(index + l->n_index * sizeof(uint32_t), index + (l->size - l->index)))
+    if (sdm_is_unused(real - (before_real < page ? before_real : page), real) &&
+        sdm_is_unused(real + l->n_real * sizeof(double),
+                      w->arrays + (l->index_pages - l->real_pages)) &&
+        sdm_is_unused(index - (before_index < page ? before_index : page), index) &&
+        sdm_is_unused(index + l->n_index * sizeof(uint32_t), index + (l->size - l->index)))
         return SDM_OK;
     take_back(w); // the next call gets new ones
     return sdm_fail(err, SDM_E_PLUGIN, "%s() wrote outside of the arrays of reserve()",

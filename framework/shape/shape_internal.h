@@ -69,6 +69,17 @@ typedef struct host_call {
 void sdm_host_call_begin(host_call *c, sdm_mesh *mesh, bool files);
 void sdm_host_call_end(host_call *c);
 
+/* host.c: behind the arrays of reserve() lie so many vertices and triangles of this byte, which a
+ * callback must leave as they are. */
+#define SHAPE_BEHIND 64
+#define SHAPE_UNUSED 0xA5
+
+/* host.c: are the bytes from `from` to `to` SHAPE_UNUSED? */
+bool sdm_is_unused(const void *from, const void *to);
+
+/* host.c: SDM_E_PLUGIN: mesh() has written behind the arrays of m, which are those of reserve(). */
+sdm_status sdm_host_check_behind(const sdm_mesh *m, sdm_error *err);
+
 /* host.c: reports the error of a callback that returned non-zero: stores the message of the host,
  * or one with the name of the callback and the value returned. Returns SDM_E_NOMEM if memory was
  * short, else `otherwise`. */

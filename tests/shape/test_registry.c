@@ -32,7 +32,8 @@ enum { MODE, LEVEL, COUNT, DATA, N_OPTIONS };
 
 static const sdm_option OPTIONS[N_OPTIONS] = {
     [MODE] = {"mode", SDM_OPTION_CHOICE, "", 0, 0, 0,
-              "good|nan|infinite|index|empty|error|mute|resize|swap|skip|memory|file|huge|lazy",
+              "good|nan|infinite|index|empty|error|mute|resize|swap|skip|memory|file|huge|lazy|"
+              "vertex|triangle",
               "x"},
     [LEVEL] = {"level", SDM_OPTION_REAL, "mm", -1, 1.5, 0.25, NULL, "x"},
     [COUNT] = {"count", SDM_OPTION_INT, "", 1, 10, 4, NULL, "x"},
@@ -66,6 +67,10 @@ static int mesh(const void *self, const sdm_host *host, const sdm_option_value *
     if (!strcmp(mode, "nan")) out->vert[7] = NAN;
     if (!strcmp(mode, "infinite")) out->vert[3] = INFINITY;
     if (!strcmp(mode, "index")) out->tri[10] = 4;
+    double *volatile vert = out->vert; // so that the compiler does not know where it ends
+    uint32_t *volatile tri = out->tri;
+    if (!strcmp(mode, "vertex")) vert[12] = vert[13] = vert[14] = 0;
+    if (!strcmp(mode, "triangle")) tri[14] = 0;
     if (!strcmp(mode, "resize")) out->n_vert = 5;
     if (!strcmp(mode, "swap")) {
         static double other[12];
@@ -468,6 +473,8 @@ static void test_bad_meshes_are_refused(void **state)
         {"skip", SDM_E_PLUGIN, "mesh() must fill what reserve() gave"},
         {"file", SDM_E_PLUGIN, "/dev/null: files are read in create() alone"},
         {"memory", SDM_E_NOMEM, "shape 'tetra' at size=2.5"},
+        {"vertex", SDM_E_PLUGIN, "mesh() has written beyond the 4 vertices that it reserved"},
+        {"triangle", SDM_E_PLUGIN, "mesh() has written beyond the 4 triangles that it reserved"},
         {"huge", SDM_E_PLUGIN, "mesh of 1099511627776 vertices"},
     };
     const double p[2] = {2.5, -0.25};

@@ -21,9 +21,9 @@
 #include "report/terminal.h"
 #include "sdm/exact.h"
 #include "sdm/internal/block_border.h"
-#include "sdm/internal/box.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
+#include "sdm/internal/mesh_box.h"
 #include "sdm/internal/methods.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/shape_survey.h"
@@ -200,7 +200,7 @@ static sdm_status run_points(job *j, sdm_error *err)
     sdm_status s = cli_read_points(j->args->points, &x, NULL, &n, err);
     if (!s) {
         sdm_box shape = SDM_BOX_EMPTY;
-        sdm_box_add_points(&shape, j->mesh.vert, j->mesh.n_vert);
+        sdm_box_add_mesh(&shape, &j->mesh);
         cli_warn_points_unit(j->args->points, x, n, &shape, "the shape");
     }
     if (!s) s = cli_points_allocate(&j->points, n, err);
@@ -318,7 +318,7 @@ static void notice_mesh(job *j)
     float min, max;
     if (j->values) find_range(j, &min, &max, &inside);
     if (inside && map)
-        cli_warn_cut_shape(&j->grid, j->mesh.vert, j->mesh.n_vert,
+        cli_warn_cut_shape(&j->grid, &j->mesh,
                            "a larger grid (--size, --spacing, --origin) holds it");
     const double size = sqrt(v3_dist2(a->min, a->max));
     if (size > 0 && (size < SDM_SURVEY_SIZE_MIN || size > SDM_SURVEY_SIZE_MAX))

@@ -4,7 +4,7 @@
 
 #include "fit_command.h"
 #include "inputs/setup.h"
-#include "sdm/internal/box.h"
+#include "sdm/internal/mesh_box.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/memory.h"
 
@@ -14,12 +14,12 @@
 #define CELLS_MAX 127.0
 #define COUNT_MAX 1e6
 
-/* Enlarges the box by the vertices of the shape at p. */
+/* Enlarges the box by the shape at p. */
 static sdm_status add_shape(const cli_fit *f, const double *p, sdm_box *b, sdm_error *err)
 {
     sdm_mesh mesh = {0};
     const sdm_status s = sdm_instance_mesh(f->shape, p, &mesh, err);
-    if (!s) sdm_box_add_points(b, mesh.vert, mesh.n_vert);
+    if (!s) sdm_box_add_mesh(b, &mesh);
     sdm_mesh_dispose(&mesh);
     return s;
 }

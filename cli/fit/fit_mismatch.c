@@ -6,7 +6,7 @@
 #include "fit_command.h"
 #include "report/crop.h"
 #include "report/terminal.h"
-#include "sdm/internal/box.h"
+#include "sdm/internal/mesh_box.h"
 #include "sdm/internal/vec3.h"
 
 /* Least Dice of a reference of the same shape in the same place. */
@@ -18,7 +18,7 @@
 static double surface_middle(const cli_fit *f, double middle[3])
 {
     sdm_box b = SDM_BOX_EMPTY;
-    sdm_box_add_points(&b, f->surface.vert, f->surface.n_vert);
+    sdm_box_add_mesh(&b, &f->surface);
     for (int a = 0; a < 3; a++) middle[a] = (b.min[a] + b.max[a]) / 2;
     return sqrt(v3_dist2(b.min, b.max));
 }

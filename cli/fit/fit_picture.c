@@ -5,6 +5,7 @@
 
 #include "fit_command.h"
 #include "report/crop.h"
+#include "sdm/internal/mesh_box.h"
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 
@@ -46,13 +47,10 @@ static void sample_reference(const cli_fit *f, const sdm_grid *g, float *out)
  * and clipped to the image; the whole image if the shape lies outside. */
 static cli_block choose_block(const cli_fit *f)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY},
-           longest = 0;
-    for (size_t i = 0; i < 3 * f->surface.n_vert; i++) {
-        low[i % 3] = fmin(low[i % 3], f->surface.vert[i]);
-        high[i % 3] = fmax(high[i % 3], f->surface.vert[i]);
-    }
-    for (int a = 0; a < 3; a++) longest = fmax(longest, high[a] - low[a]);
+    sdm_box box = SDM_BOX_EMPTY;
+    double longest = 0;
+    sdm_box_add_mesh(&box, &f->surface);
+    for (int a = 0; a < 3; a++) longest = fmax(longest, box.max[a] - box.min[a]);
     cli_block b = cli_block_of_mesh(&f->target.grid, &f->surface, 0.5 * longest);
     if (cli_block_is_empty(&b))
         b = (cli_block){{0, 0, 0}, {f->target.grid.n[0], f->target.grid.n[1], f->target.grid.n[2]}};

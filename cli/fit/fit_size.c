@@ -6,7 +6,7 @@
 #include "fit_command.h"
 #include "measure/median.h"
 #include "report/terminal.h"
-#include "sdm/internal/box.h"
+#include "sdm/internal/mesh_box.h"
 #include "sdm/internal/units.h"
 #include "sdm/map.h"
 #include "sdm/memory.h"
@@ -60,7 +60,7 @@ static sdm_status shape_size(const cli_fit *f, const double *p, double *size, sd
     if (f->shape) {
         sdm_mesh mesh = {0};
         const sdm_status s = sdm_instance_mesh(f->shape, p, &mesh, err);
-        if (!s) sdm_box_add_points(&b, mesh.vert, mesh.n_vert);
+        if (!s) sdm_box_add_mesh(&b, &mesh);
         sdm_mesh_dispose(&mesh);
         *size = box_size(&b);
         return s;

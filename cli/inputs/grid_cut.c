@@ -1,4 +1,4 @@
-/* Warns of a grid that cuts a shape, by the vertices of its mesh or by its map, and of voxels that
+/* Warns of a grid that cuts a shape, by its mesh or by its map, and of voxels that
  * are too large for it. */
 #include "grid_cut.h"
 
@@ -27,10 +27,10 @@ static void warn(const char *where, const sdm_grid *g, double beyond[3][2], bool
                  where, faces, mend);
 }
 
-void cli_warn_cut_shape(const sdm_grid *g, const double *vertex, size_t n, const char *mend)
+void cli_warn_cut_shape(const sdm_grid *g, const sdm_mesh *mesh, const char *mend)
 {
     double beyond[3][2] = {{0}};
-    for (size_t v = 0; v < n; v++) sdm_grid_beyond(g, vertex + 3 * v, beyond);
+    sdm_grid_mesh_beyond(g, mesh, beyond);
     warn("", g, beyond, false, mend);
 }
 

@@ -4,10 +4,11 @@
 #include <stdbool.h>
 
 #include "sdm/blocks.h"
+#include "sdm/mesh.h"
 
-/* Warns in one line if a vertex[n][3] (mm) lies beyond the outer voxel centres of the grid: names
- * the faces and how far the shape reaches beyond each. mend: what the user can do. */
-void cli_warn_cut_shape(const sdm_grid *g, const double *vertex, size_t n, const char *mend);
+/* Warns in one line if the mesh reaches beyond the outer voxel centres of the grid: names the faces
+ * and how far the shape reaches beyond each. mend: what the user can do. */
+void cli_warn_cut_shape(const sdm_grid *g, const sdm_mesh *mesh, const char *mend);
 
 /* The same of a map: how far the shape reaches beyond the grid is known at least, since a point
  * that lies `depth` inside has a ball of this radius about it that is inside, too. `where` begins

@@ -7,6 +7,7 @@
 #include "report/files.h"
 #include "report/report_audit.h"
 #include "report/terminal.h"
+#include "sdm/internal/mesh_box.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/memory.h"
 
@@ -97,17 +98,16 @@ static void read_options(cli_phantom *p)
 /* ---- the grid ---- */
 
 /* Transforms the vertices from the shape's frame through the world into the frame of the image;
- * min .. max is their bounding box there. */
+ * min .. max is the bounding box of the mesh there. */
 static void mesh_to_image_frame(const cli_phantom *p, const sdm_pose *frame, sdm_mesh *mesh,
                                 double min[3], double max[3])
 {
     const sdm_pose back = sdm_pose_inverse(frame), all = sdm_pose_compose(&back, &p->pose);
-    for (int i = 0; i < 3; i++) min[i] = INFINITY, max[i] = -INFINITY;
-    for (size_t v = 0; v < mesh->n_vert; v++) {
-        double *x = mesh->vert + 3 * v;
-        sdm_pose_apply(&all, x, x);
-        for (int i = 0; i < 3; i++) min[i] = fmin(min[i], x[i]), max[i] = fmax(max[i], x[i]);
-    }
+    sdm_box box = SDM_BOX_EMPTY;
+    for (size_t v = 0; v < mesh->n_vert; v++)
+        sdm_pose_apply(&all, mesh->vert + 3 * v, mesh->vert + 3 * v);
+    sdm_box_add_mesh(&box, mesh);
+    for (int i = 0; i < 3; i++) min[i] = box.min[i], max[i] = box.max[i];
 }
 
 /* --crop: cuts the grid (in the frame of the image) so that one end lies inside the box min .. max
@@ -137,27 +137,16 @@ static sdm_status grid_crop(const cli_phantom *p, const double min[3], const dou
     return SDM_OK;
 }
 
-/* Warns if the box of the shape leaves the grid, both in the frame of the image. */
-static void warn_cut(const sdm_grid *g, const double min[3], const double max[3])
-{
-    const double ends[6] = {min[0], min[1], min[2], max[0], max[1], max[2]};
-    cli_warn_cut_shape(g, ends, 2, "a larger field of view (--size, --spacing, --origin) holds it");
-}
-
 /* Gives the image the grid of the file that --like names, and warns if the shape, moved to its pose
  * here, leaves this grid. */
 static sdm_status grid_like(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
 {
     const sdm_status s = cli_like_grid(p->args, &p->grid, err);
     if (s) return s;
-    for (size_t v = 0; v < mesh->n_vert; v++) {
-        double *x = mesh->vert + 3 * v, index[3];
-        sdm_pose_apply(&p->pose, x, x);
-        sdm_grid_index(&p->grid, x, index);
-        for (int i = 0; i < 3; i++) p->cut |= index[i] < 0 || index[i] > (double)(p->grid.n[i] - 1);
-    }
-    cli_warn_cut_shape(&p->grid, mesh->vert, mesh->n_vert,
-                       "another pose (--translation, --rotation) or grid holds it");
+    for (size_t v = 0; v < mesh->n_vert; v++)
+        sdm_pose_apply(&p->pose, mesh->vert + 3 * v, mesh->vert + 3 * v);
+    p->cut = sdm_grid_mesh_beyond(&p->grid, mesh, NULL) > 0;
+    cli_warn_cut_shape(&p->grid, mesh, "another pose (--translation, --rotation) or grid holds it");
     return SDM_OK;
 }
 
@@ -182,7 +171,9 @@ static sdm_status grid_make(cli_phantom *p, sdm_mesh *mesh, sdm_error *err)
     if (placed) // --origin is in the world, the grid still in the frame of the image
         sdm_pose_apply_inverse(&frame, p->grid.origin, p->grid.origin);
     s = grid_crop(p, min, max, &p->grid, err);
-    if (!s && isnan(args->phantom.crop[0])) warn_cut(&p->grid, min, max);
+    if (!s && isnan(args->phantom.crop[0]))
+        cli_warn_cut_shape(&p->grid, mesh,
+                           "a larger field of view (--size, --spacing, --origin) holds it");
     for (int i = 0; i < 3; i++) {
         const double end = p->grid.origin[i] + (double)(p->grid.n[i] - 1) * p->grid.spacing[i];
         p->cut |= min[i] < p->grid.origin[i] || max[i] > end;

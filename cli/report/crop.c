@@ -21,9 +21,9 @@ static cli_block block_of_box(const sdm_grid *g, const double low[3], const doub
 cli_block cli_block_of_mesh(const sdm_grid *g, const sdm_mesh *m, double pad)
 {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < m->n_vert; i++) {
+    for (size_t i = 0; i < 3 * m->n_tri; i++) {
         double at[3];
-        sdm_grid_index(g, m->vert + 3 * i, at);
+        sdm_grid_index(g, m->vert + 3 * (size_t)m->tri[i], at);
         for (int a = 0; a < 3; a++) low[a] = fmin(low[a], at[a]), high[a] = fmax(high[a], at[a]);
     }
     return block_of_box(g, low, high, pad);

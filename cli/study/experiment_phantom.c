@@ -6,6 +6,7 @@
 #include "experiment_phantom.h"
 #include "report/terminal.h"
 #include "sdm/fit.h"
+#include "sdm/internal/mesh_box.h"
 #include "sdm/internal/rng.h"
 #include "sdm/memory.h"
 #include "sdm/phantom.h"
@@ -56,12 +57,11 @@ static sdm_status find_box(const cli_experiment_job *job, const cli_experiment_p
 {
     sdm_mesh mesh = {0};
     const sdm_status s = sdm_instance_mesh(job->shape, p->truth, &mesh, err);
-    for (int i = 0; i < 3; i++) min[i] = INFINITY, max[i] = -INFINITY;
-    for (size_t v = 0; v < mesh.n_vert && !s; v++) {
-        double x[3];
-        sdm_pose_apply(&p->pose, mesh.vert + 3 * v, x);
-        for (int i = 0; i < 3; i++) min[i] = fmin(min[i], x[i]), max[i] = fmax(max[i], x[i]);
-    }
+    sdm_box box = SDM_BOX_EMPTY;
+    for (size_t v = 0; v < mesh.n_vert && !s; v++)
+        sdm_pose_apply(&p->pose, mesh.vert + 3 * v, mesh.vert + 3 * v);
+    if (!s) sdm_box_add_mesh(&box, &mesh);
+    for (int i = 0; i < 3; i++) min[i] = box.min[i], max[i] = box.max[i];
     sdm_mesh_dispose(&mesh);
     return s;
 }

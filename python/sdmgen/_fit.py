@@ -18,7 +18,7 @@ from ._files import IMAGES, MESHES, _ends, read_array, read_image
 from ._grid import Grid, Pose, grid_around
 from ._library import Callbacks, call, function, make
 from ._map import Image, Map, MapInfo
-from ._mesh import Mesh, Surface
+from ._mesh import Mesh, Surface, mesh_corners
 from ._model import POLICIES, Model
 from ._shape import Measure, Shape, measures_by
 from ._tables import read_points_table
@@ -344,7 +344,7 @@ def _exact_grid(shape: Shape, start: Float64, spacing: Any) -> Grid:
         for end in (p.min, p.max):
             at.append(start.copy())
             at[-1][i] = end
-    boxes = [(v.min(axis=0), v.max(axis=0)) for v in (shape.mesh(p).vertices for p in at)]
+    boxes = [(v.min(axis=0), v.max(axis=0)) for v in (mesh_corners(shape.mesh(p)) for p in at)]
     low = np.min([box[0] for box in boxes], axis=0)
     high = np.max([box[1] for box in boxes], axis=0)
     return grid_around([float(x) for x in low], [float(x) for x in high], None, spacing)

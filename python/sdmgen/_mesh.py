@@ -289,6 +289,14 @@ class Surface(Mesh):
         self.cut = cut
 
 
+def mesh_corners(mesh: Mesh) -> Float64:
+    """The vertices of the triangles, without those that belong to none: they count for no box."""
+    used = np.zeros(len(mesh.vertices), bool)
+    used[mesh.triangles.ravel()] = True
+    corners: Float64 = mesh.vertices[used]
+    return corners
+
+
 def taken_mesh(mesh: Any) -> Sequence[NDArray[Any]]:
     """Vertices and triangles of a C mesh, which is freed."""
     try:

@@ -13,6 +13,7 @@ from ._arrays import Float64, Triple, address, flag, float64, instance, number, 
 from ._grid import Grid, Pose, grid_around
 from ._library import Callbacks, function, make
 from ._map import Image
+from ._mesh import mesh_corners
 from ._shape import Shape
 
 
@@ -60,7 +61,7 @@ def phantom(
     p = instance(shape, Shape, "shape").values(params)
     at = Pose() if pose is None else instance(pose, Pose, "pose")
     if grid is None:
-        vertices = at.apply(shape.mesh(p).vertices)
+        vertices = at.apply(mesh_corners(shape.mesh(p)))
         low, high = ([float(x) for x in f(axis=0)] for f in (vertices.min, vertices.max))
         grid = grid_around(low, high, size, spacing, origin)
     instance(grid, Grid, "grid")

@@ -178,6 +178,27 @@ present z.nrrd
 expect 0 'the triangles get other vertices' sdmgen train good.yaml shape.options.fault=wires 'shape.ranges.size=[1,3]' data='{static: 0, start: 16, online: 0, holdout: 4}' --plugin "$plugin" --out wires -q
 has '^(  not for| ) +derivatives of exact maps \(exact --jacobian, fit --exact or --polish\) where the triangles change with size: vertices'
 
+# Vertices of no triangle, far away, change no box: pictures, grids, maps and fits are those of the shape without them.
+for fault in none spare; do
+    sdmgen shapes check faulty -O fault=$fault --plugin "$plugin" --samples 8 -o $fault.svg >out 2>err
+    has '^box +-3 -3 -3 \.\. 5 3 3 mm$'
+    sdmgen exact --shape faulty -O fault=$fault --plugin "$plugin" --json 2>err | grep -o '"values_crc64".*' >$fault.exact
+    if grep -q 'leaves the grid' err; then bad "the grid cuts vertices of no triangle: $(cat err)"; fi
+    sdmgen phantom --shape faulty -O fault=$fault --plugin "$plugin" --spacing 0.4 --rotation 0.1,0.2,0 -o $fault.nrrd --surface $fault.npy -q 2>err || bad "phantom: $(cat err)"
+    sdmgen info $fault.nrrd --json | grep -o '"grid": {[^}]*}' >$fault.phantom
+    sdmgen phantom --shape faulty -O fault=$fault --plugin "$plugin" --like none.nrrd -o like.nrrd >out 2>err || bad "phantom --like: $(cat err)"
+    if grep -q 'leaves the grid' err; then bad "the grid cuts vertices of no triangle: $(cat err)"; fi
+    sdmgen fit --shape faulty -O fault=$fault none.npy --plugin "$plugin" --rotation 0.1,0.2,0 --max-iterations 1 --force -o fit.nrrd -q >out 2>err
+    sdmgen info fit.nrrd --json | grep -o '"size": [^}]*' >$fault.fit
+    sdmgen config good.yaml grid=auto shape.options.fault=$fault --plugin "$plugin" >out 2>err || bad "config: $(cat err)"
+    grep '^sdmgen: grid: ' err >$fault.config
+    if grep -q 'as many voxels' err; then bad "a grid around vertices of no triangle: $(cat err)"; fi
+done
+for file in svg exact phantom fit config; do
+    present none.$file
+    cmp -s none.$file spare.$file || bad "vertices of no triangle change $file: $(diff none.$file spare.$file | head -n 5)"
+done
+
 # Several parts: all are named, once. Boxes along x, each overlapping the one before; those of which the digit is 1 are inside out.
 boxes() {
     awk -v parts="$1" 'BEGIN {

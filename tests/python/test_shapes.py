@@ -65,6 +65,19 @@ def test_measures():
         sdmgen.Shape("torus").measures(depths=[1])
 
 
+def test_vertices_of_no_triangle_are_in_no_box():
+    def spare(radius, stretch):
+        vertices, triangles = egg(radius, stretch)
+        return np.concatenate([vertices, [[500.0, 1, 2]]]), triangles
+
+    shapes = [sdmgen.Shape(f, PARAMS) for f in (egg, spare)]
+    phantoms = [sdmgen.phantom(shape, spacing=0.5) for shape in shapes]
+    assert phantoms[0].image.grid.size == phantoms[1].image.grid.size
+    points = shapes[0].mesh().vertices
+    maps = [sdmgen.fit(shape, points, keep="pose").map() for shape in shapes]
+    assert maps[0].grid.size == maps[1].grid.size
+
+
 def test_names_options_and_distributions():
     assert "torus" in sdmgen.shapes() and "egg" not in sdmgen.shapes()
     box = sdmgen.Shape(lambda radius, stretch: egg(radius, stretch), PARAMS, name="egg_2", summary="an egg")

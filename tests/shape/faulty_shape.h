@@ -20,7 +20,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
-     "meets|groups|crumb",
+     "meets|groups|crumb|spare|offset",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -115,7 +115,9 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     const int crumb = !strcmp(fault, "crumb");   // a part in m, which lies inside the body
     const size_t boxes = groups ? 4 : crumb || (!strcmp(fault, "sizes") && is_large) ? 3 : 2;
     const size_t less = !strcmp(fault, "open");
-    const int failed = host->reserve(host, out, 8 * boxes, 12 * boxes - less);
+    // 8 vertices far away, which no triangle uses
+    const size_t spare = strcmp(fault, "spare") ? 0 : 8;
+    const int failed = host->reserve(host, out, 8 * boxes + spare, 12 * boxes - less);
     if (failed) return failed;
     double shift = 0;
     if (!strcmp(fault, "jump")) shift = is_large ? 0.125 : 0;
@@ -165,6 +167,9 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         static const uint32_t OTHER[6] = {0, 2, 1, 1, 2, 3};
         memcpy(out->tri, OTHER, sizeof OTHER);
     }
+    for (size_t i = 0; i < 3 * spare; i++) out->vert[24 * boxes + i] = 500;
+    // the handle has vertices of the body, and leaves out its last four
+    for (size_t i = 36; i < 72 && !strcmp(fault, "offset"); i++) out->tri[i] -= 4;
     for (size_t i = 0; i < 24 * boxes && !strcmp(fault, "metres"); i++) out->vert[i] /= 1000;
     for (size_t i = 0; i < 24 * boxes && !strcmp(fault, "centimetres"); i++) out->vert[i] /= 10;
     for (size_t i = 24; i < 48 && !strcmp(fault, "small"); i++) out->vert[i] /= 1000; // the handle
@@ -177,11 +182,12 @@ static int faulty_velocity(const void *self, const sdm_host *host, const sdm_opt
 {
     (void)self, (void)host, (void)p;
     const int wrong = !strcmp(options[0].text, "velocity"),
-              moves = !strcmp(options[0].text, "meets"); // both ends of the handle
+              moves = !strcmp(options[0].text, "meets"), // both ends of the handle
+        spare = !strcmp(options[0].text, "spare");
     memset(velocity, 0, 6 * n_vert * sizeof *velocity);
     for (size_t v = 0; v < n_vert; v++) {
         for (size_t d = 0; d < 3 && v < 8; d++) velocity[3 * v + d] = v >> d & 1 ? 1 : -1;
-        if (v < 8 || v >= 24) continue;
+        if (v < 8 || v >= 24 || (spare && v >= 16)) continue;
         velocity[3 * v] = 1;
         velocity[3 * (n_vert + v)] = moves || v >= 16 || v & 1 ? (wrong ? 1.01 : 1) : 0;
     }

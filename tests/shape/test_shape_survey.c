@@ -537,6 +537,25 @@ static void a_grid_that_is_too_large(void **state)
     }
 }
 
+// Vertices far away that belong to no triangle change no box, and no grid cuts them.
+static void vertices_of_no_triangle(void **state)
+{
+    (void)state;
+    const sdm_grid grid =
+        sdm_grid_centred((const int64_t[3]){35, 25, 25}, 0.3, (const double[3]){1, 0, 0});
+    for (int brief = 0; brief < 2; brief++) {
+        const sdm_survey_opts opts = {.samples = 8, .grid = &grid, .brief = brief};
+        sdm_shape_survey s[2] = {survey_with("none", &opts), survey_with("spare", &opts)};
+        assert_int_equal(s[1].n_vert, s[0].n_vert + 8);
+        assert_memory_equal(s[0].low, s[1].low, sizeof s->low);
+        assert_memory_equal(s[0].high, s[1].high, sizeof s->high);
+        assert_memory_equal(s[0].beyond, s[1].beyond, sizeof s->beyond);
+        assert_true(s[0].surplus == s[1].surplus && s[0].scale.size == s[1].scale.size);
+        assert_int_equal(s[1].cut.shapes, 0);
+        for (int i = 0; i < 2; i++) sdm_shape_survey_dispose(&s[i]);
+    }
+}
+
 static void threads_and_brief_surveys(void **state)
 {
     (void)state;
@@ -628,6 +647,7 @@ int main(void)
         cmocka_unit_test(a_grid_that_cuts),
         cmocka_unit_test(a_grid_that_is_too_coarse),
         cmocka_unit_test(a_grid_that_is_too_large),
+        cmocka_unit_test(vertices_of_no_triangle),
         cmocka_unit_test(threads_and_brief_surveys),
         cmocka_unit_test(refusals),
         cmocka_unit_test(built_in_shapes_pass),

@@ -98,9 +98,7 @@ static sdm_status check_surface(const dataset *d, const sdm_exact *e, size_t sha
 
 bool trainer_is_cut(const sdm_mesh *m, const sdm_grid *g)
 {
-    for (size_t v = 0; v < m->n_vert; v++)
-        if (sdm_grid_beyond(g, m->vert + 3 * v, NULL) > 0) return true;
-    return false;
+    return sdm_grid_mesh_beyond(g, m, NULL) > 0;
 }
 
 sdm_status trainer_exact_within(const dataset *d, const double *p, int n_threads, sdm_exact **out,

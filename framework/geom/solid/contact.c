@@ -329,8 +329,8 @@ sdm_status sdm_contacts_find(const sdm_mesh *m, const sdm_topology *topo, const 
                              sdm_error *err)
 {
     double largest = 0;
-    for (size_t i = 0; i < 3 * m->n_vert; i++)
-        largest = fabs(m->vert[i]) > largest ? fabs(m->vert[i]) : largest;
+    for (int d = 0; d < 3; d++)
+        largest = fmax(largest, fmax(fabs(tree->node->lo[d]), fabs(tree->node->hi[d])));
     c->tolerance = 16 * DBL_EPSILON * largest;
     finder w = {.mesh = m, .topo = topo, .facets = facets, .out = c, .arena = arena, .err = err};
     // find the contacts, in the order of the pairs

@@ -80,15 +80,16 @@ static void scene_measure(scene *sc)
         }
     for (size_t k = 0; k < sc->n; k++) {
         const sdm_picture_surface *p = &sc->surfaces[k];
-        for (size_t i = 0; i < p->mesh->n_vert; i++) {
+        for (size_t i = 0; i < 3 * p->mesh->n_tri; i++) {
+            const size_t vertex = p->mesh->tri[i];
             for (int v = 0; v < N_VIEWS; v++)
                 for (int d = 0; d < 2; d++) {
-                    const double at = dot(p->mesh->vert + 3 * i, VIEWS[v].axis[d]);
+                    const double at = dot(p->mesh->vert + 3 * vertex, VIEWS[v].axis[d]);
                     sc->low[v][d] = fmin(sc->low[v][d], at);
                     sc->high[v][d] = fmax(sc->high[v][d], at);
                 }
-            if (p->values && isfinite(p->values[i]))
-                sc->limit = fmax(sc->limit, fabs(p->values[i]));
+            if (p->values && isfinite(p->values[vertex]))
+                sc->limit = fmax(sc->limit, fabs(p->values[vertex]));
         }
     }
 }

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "sdm/internal/mesh_box.h"
 #include "shape_family.h"
 
 enum { SEARCH_ROUNDS = 4 };
@@ -21,16 +22,12 @@ static sdm_status box_extend(shape_box *b, const shape_family *f, const double *
 {
     const sdm_status s = sdm_instance_mesh(f->shape, p, &b->mesh, err);
     if (s) return s;
-    double reach[6] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < 3 * b->mesh.n_vert; i++) {
-        const double x = b->mesh.vert[i];
-        const size_t lower = 2 * (i % 3);
-        reach[lower] = fmax(reach[lower], -x);
-        reach[lower + 1] = fmax(reach[lower + 1], x);
-    }
+    sdm_box box = SDM_BOX_EMPTY;
+    sdm_box_add_mesh(&box, &b->mesh);
     for (size_t k = 0; k < 6; k++) {
-        if (!(reach[k] > b->reach[k])) continue;
-        b->reach[k] = reach[k];
+        const double reach = k % 2 ? box.max[k / 2] : -box.min[k / 2];
+        if (!(reach > b->reach[k])) continue;
+        b->reach[k] = reach;
         memcpy(b->at[k], p, f->shape->n_params * sizeof *p);
     }
     return SDM_OK;

@@ -2,6 +2,7 @@
  * much larger than a box a grid is. */
 #include <math.h>
 
+#include "sdm/internal/mesh_box.h"
 #include "sdm/internal/shape_box.h"
 #include "two_digits.h"
 
@@ -49,6 +50,23 @@ double sdm_grid_beyond(const sdm_grid *g, const double x[3], double beyond[3][2]
             if (beyond) beyond[a][side] = fmax(beyond[a][side], mm[side]);
         }
     }
+    return most;
+}
+
+double sdm_grid_mesh_beyond(const sdm_grid *g, const sdm_mesh *m, double beyond[3][2])
+{
+    sdm_box box = SDM_BOX_EMPTY;
+    double most = 0;
+    sdm_box_add_mesh(&box, m);
+    for (int corner = 0; corner < 8; corner++) {
+        double x[3];
+        for (int a = 0; a < 3; a++) x[a] = corner >> a & 1 ? box.max[a] : box.min[a];
+        most = fmax(most, sdm_grid_beyond(g, x, NULL));
+    }
+    if (!(most > 0)) return 0; // a grid that holds the box holds the mesh
+    most = 0;
+    for (size_t i = 0; i < 3 * m->n_tri; i++)
+        most = fmax(most, sdm_grid_beyond(g, m->vert + 3 * (size_t)m->tri[i], beyond));
     return most;
 }
 

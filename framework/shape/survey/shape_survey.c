@@ -150,8 +150,7 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
     out->area = audit.union_area;
     memcpy(out->min, audit.mesh.min, sizeof out->min);
     memcpy(out->max, audit.mesh.max, sizeof out->max);
-    for (size_t v = 0; v < m->n_vert && opts->grid; v++)
-        sdm_grid_beyond(opts->grid, m->vert + 3 * v, out->beyond);
+    if (opts->grid) sdm_grid_mesh_beyond(opts->grid, m, out->beyond);
     sdm_part_audit_dispose(&audit);
     return SDM_OK;
 }

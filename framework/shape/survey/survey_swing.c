@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "sdm/internal/mesh_box.h"
 #include "sdm/memory.h"
 
 /* FOLLOWED: vertices, spread over the mesh. */
@@ -39,15 +40,10 @@ static void path_go(path *a, double to, double small)
 
 static double size_of(const sdm_mesh *m)
 {
+    sdm_box b = SDM_BOX_EMPTY;
     double most = 0;
-    for (int d = 0; d < 3; d++) {
-        double low = INFINITY, high = -INFINITY;
-        for (size_t v = 0; v < m->n_vert; v++) {
-            low = fmin(low, m->vert[3 * v + (size_t)d]);
-            high = fmax(high, m->vert[3 * v + (size_t)d]);
-        }
-        most = fmax(most, high - low);
-    }
+    sdm_box_add_mesh(&b, m);
+    for (int d = 0; d < 3; d++) most = fmax(most, b.max[d] - b.min[d]);
     return most;
 }
 

@@ -17,8 +17,11 @@ static const sdm_box SDM_BOX_EMPTY = {{INFINITY, INFINITY, INFINITY},
 /* Extends the box to the point x. */
 static inline void sdm_box_add(sdm_box *b, const double x[3])
 {
-    for (int a = 0; a < 3; a++)
-        b->min[a] = fmin(b->min[a], x[a]), b->max[a] = fmax(b->max[a], x[a]);
+    for (int a = 0; a < 3; a++) {
+        // a comparison with NaN is false
+        if (x[a] < b->min[a]) b->min[a] = x[a];
+        if (x[a] > b->max[a]) b->max[a] = x[a];
+    }
 }
 
 /* Extends the box to the points x[n][3]. */

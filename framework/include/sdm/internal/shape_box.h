@@ -2,13 +2,14 @@
 #pragma once
 
 #include "sdm/grid.h"
+#include "sdm/mesh.h"
 #include "sdm/registry.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* low[3] and high[3] = lowest and highest coordinates (mm) of the vertices of `shape` over several
+/* low[3] and high[3] = lowest and highest coordinates (mm) of `shape` over several
  * parameter vectors: the middle of the ranges; their corners, all of them for at most 6 parameters,
  * else 64 random ones; and `samples` random vectors (Sobol' points, which follow the distributions
  * that the shape states; 0 is allowed). From the farthest of these shapes a short search moves the
@@ -35,6 +36,9 @@ sdm_status sdm_shape_thickness(const sdm_instance *shape, const double (*range)[
  * where it is farthest, in mm; 0: within them. beyond[axis][side], unless NULL, is raised to the
  * distance below the first voxel (side 0) and above the last one (side 1). [any thread] */
 double sdm_grid_beyond(const sdm_grid *g, const double x[3], double beyond[3][2]);
+
+/* The same of the vertices of the triangles of the mesh. [any thread] */
+double sdm_grid_mesh_beyond(const sdm_grid *g, const sdm_mesh *m, double beyond[3][2]);
 
 /* along[axis] = length of the grid over that of the grid which holds the box low[3] .. high[3] (mm)
  * with a margin of SDM_GRID_MARGIN voxels of the same spacing. Returns their product: how many

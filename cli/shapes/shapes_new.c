@@ -125,11 +125,11 @@ static void print_text(const char *folder, const char *name, const char *prefix)
            "  cmake -S %s -B %s/build -DCMAKE_PREFIX_PATH=%s\n"
            "  cmake --build %s/build\n"
            "  ctest --test-dir %s/build --output-on-failure\n"
-           "  sdmgen shapes test %s/build/%s.so\n"
-           "  sdmgen exact --shape %s -o %s.png --plugin %s/build/%s.so\n"
+           "  sdmgen shapes check %s -o %s.png --plugin %s/build/%s.so\n"
+           "  sdmgen exact --shape %s -o %s-slices.png --plugin %s/build/%s.so\n"
            "  sdmgen train %s/%s.yaml --plugin %s/build/%s.so\n",
-           folder, folder, prefix, folder, folder, folder, name, name, name, folder, name, folder,
-           name, folder, name);
+           folder, folder, prefix, folder, folder, name, name, folder, name, name, name, folder,
+           name, folder, name, folder, name);
 }
 
 static sdm_status print_json(const char *folder, const char *name, const char *prefix,

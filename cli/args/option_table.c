@@ -61,9 +61,9 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "write the surface mesh of a shape, or audit and mend a mesh",
      "Makes the mesh of a shape or reads a mesh file (.ply .stl .obj .off .vtk .vtp, mm), and\n"
      "warns of defects. --audit prints the state of every part and the volume of the union.\n"
-     "Exit code of --audit and --json 3: the mesh is not closed; 4: parts are inside out, or it\n"
-     "encloses no volume; files are written all the same. --turn-parts turns parts that are\n"
-     "inside out.",
+     "Exit code of --audit and --json 3: the mesh is not closed; 4: vertices belong to no\n"
+     "triangle, parts are inside out or pass through themselves, or it encloses no volume;\n"
+     "files are written all the same. --turn-parts turns parts that are inside out.",
      "sdmgen mesh --shape torus -o torus.ply --audit", 0, 0},
     {"eval", "MODEL", "measure a network on new random shapes",
      "Draws random shapes that the training did not use and compares the network with the\n"

@@ -61,6 +61,7 @@ void cli_print_audit(const sdm_part_audit *audit)
 {
     const sdm_audit *a = &audit->mesh;
     printf("vertices             %zu\n", a->n_vert);
+    printf("unused vertices      %zu\n", audit->unused);
     printf("triangles            %zu\n", a->n_tri);
     printf("parts                %zu\n", audit->n);
     printf("closed               %s\n", a->closed ? "yes" : "no");
@@ -121,6 +122,7 @@ void cli_json_parts(sdm_json *json, const sdm_part_audit *a)
 {
     sdm_json_real(json, "union_volume_mm3", a->union_volume);
     sdm_json_real(json, "union_area_mm2", a->union_area);
+    sdm_json_int(json, "unused_vertices", (int64_t)a->unused);
     sdm_json_int(json, "parts_inside_out", (int64_t)count_parts(a, cli_part_inside_out));
     sdm_json_text(json, "verdict", cli_verdict_name(cli_audit_verdict(a, "", NULL)));
     sdm_json_open(json, "parts", '[');
@@ -249,6 +251,21 @@ void cli_describe_open(const sdm_part_audit *a, sdm_text *text)
                  a->part[most].open_edges, x[0], x[1], x[2]);
 }
 
+void cli_describe_unused(const sdm_part_audit *a, sdm_text *text)
+{
+    const size_t n = a->unused, run = n ? a->unused_last - a->unused_first + 1 : 0;
+    if (!n) return;
+    if (n == 1)
+        sdm_text_add(text, "vertex %zu belongs", a->unused_first);
+    else if (run == 1)
+        sdm_text_add(text, "%zu vertices (the first: %zu) belong", n, a->unused_first);
+    else
+        sdm_text_add(text, "%zu vertices (%s%zu .. %zu) belong", n, run < n ? "the first: " : "",
+                     a->unused_first, a->unused_last);
+    sdm_text_add(text, " to no triangle: is an offset of vertex indices wrong, so that triangles "
+                       "have vertices of another part? If they are left over, remove them");
+}
+
 static bool is_lost(const sdm_part_audit *a, size_t i)
 {
     return a->part[i].state == SDM_PART_INSIDE_OUT;
@@ -318,9 +335,9 @@ bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text)
     cli_name_part(a, most, text);
     sdm_text_add(text,
                  "passes through itself, and %.2g %% of its surface faces the wrong way: what lies "
-                 "behind that is missing; are two of its vertices exchanged, or does its outline "
-                 "cross itself, as where a fillet is larger than half of the part is thick, or a "
-                 "wall thicker than the part is wide?",
+                 "behind that is missing; are two of its vertices exchanged, is the radius of a "
+                 "fillet larger than half of the thickness, a wall thicker than the part is wide, or "
+                 "an angle in degrees given to cos() or sin()?",
                  100 * a->part[most].folded);
     return true;
 }
@@ -342,6 +359,14 @@ static void warn_open(const sdm_part_audit *audit)
     cli_warn(
         "the mesh is open: %zu boundary edges; inside is where the winding number exceeds 1/2%s%s",
         audit->mesh.boundary_edges, text.size ? "; " : "", text.size ? text.data : "");
+    sdm_text_dispose(&text);
+}
+
+static void warn_unused(const sdm_part_audit *audit)
+{
+    sdm_text text = {0};
+    cli_describe_unused(audit, &text);
+    if (text.data && !text.failed) cli_warn("%s", text.data);
     sdm_text_dispose(&text);
 }
 
@@ -395,6 +420,7 @@ bool cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend)
     sdm_part_audit audit;
     if (sdm_part_audit_make(mesh, false, &audit, NULL)) return false;
     warn_open(&audit);
+    warn_unused(&audit);
     cli_warn_audit(&audit.mesh);
     warn_inside_out(&audit, mend);
     notice_turned(&audit);
@@ -424,6 +450,14 @@ sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_erro
                                       "the mesh is not closed: %s; maps take for inside where the "
                                       "winding number exceeds 1/2",
                                       text.failed ? "edges are open" : text.data);
+        sdm_text_dispose(&text);
+        return s;
+    }
+    if (a->unused) { // other defects may follow from it
+        sdm_text text = {0};
+        cli_describe_unused(a, &text);
+        const sdm_status s = sdm_fail(err, SDM_E_QUALITY, "%s",
+                                      text.failed ? "vertices belong to no triangle" : text.data);
         sdm_text_dispose(&text);
         return s;
     }

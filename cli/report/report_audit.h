@@ -36,6 +36,9 @@ void cli_describe_inside_out(const sdm_part_audit *a, sdm_text *text);
  * edge is, and what to do; nothing if the mesh is closed. */
 void cli_describe_open(const sdm_part_audit *a, sdm_text *text);
 
+/* Writes one line about vertices of no triangle to `text`; nothing if there are none. */
+void cli_describe_unused(const sdm_part_audit *a, sdm_text *text);
+
 /* Writes one line about the part of which the largest share faces the wrong way to `text`. false:
  * there is none; `text` stays as it was. */
 bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text);
@@ -44,8 +47,9 @@ bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text);
  * size (mm), to `text`: where it is, what becomes of it, and which spacing shows it. */
 void cli_describe_thin(const sdm_part_audit *a, size_t index, double voxel, sdm_text *text);
 
-/* Judges the mesh. SDM_E_MESH: it is not closed; SDM_E_QUALITY: parts are inside out and not turned
- * by the engine, or it encloses no volume. The message says what is wrong and what the user can do
+/* Judges the mesh. SDM_E_MESH: it is not closed; SDM_E_QUALITY: vertices belong to no triangle,
+ * parts are inside out and not turned by the engine or pass through themselves, or it encloses no
+ * volume. The message says what is wrong and what the user can do
  * (mend, for parts that are inside out). */
 sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_error *err);
 
@@ -53,7 +57,7 @@ sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_erro
 const char *cli_verdict_name(sdm_status verdict);
 
 /* Audits the mesh and warns as cli_warn_audit() does, and of the part with most open edges, of
- * parts that are inside out, and of the thinnest
+ * vertices of no triangle, of parts that are inside out, and of the thinnest
  * part if it is too thin for voxels of this size (mm; 0: there is no grid). mend: what the user can
  * do about an inside-out part. Says nothing if the audit fails: the engine reports that. Returns
  * whether it warned of a thin part. */

@@ -133,6 +133,23 @@ static void tell_open(teller *t)
     sdm_part_audit_dispose(&audit);
 }
 
+/* Vertices of no triangle. Other findings may follow from them. */
+static void tell_unused(teller *t)
+{
+    const sdm_survey_count *c = &t->s->found.unused;
+    sdm_part_audit audit;
+    sdm_text text = {0};
+    if (!c->shapes) return;
+    if (audit_worst(t, c, &audit)) {
+        cli_describe_unused(&audit, &text);
+        sdm_text_add(&text, " (");
+        add_share(t->s, c, &text);
+        sdm_text_add(&text, "); mend this first: other lines may follow from it");
+        tell(t, SDM_E_QUALITY, &text);
+    }
+    sdm_part_audit_dispose(&audit);
+}
+
 /* Appends where a part turns over that is right in other shapes: by itself, a length that becomes
  * negative does that. */
 static void add_turn(const teller *t, size_t wrong, const sdm_part_audit *audit, sdm_text *text)
@@ -797,6 +814,7 @@ sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell_line, void *user,
     tell_swings(&t);
     tell_failed(&t);
     tell_open(&t);
+    tell_unused(&t);
     tell_inside_out(&t);
     tell_crossing(&t);
     tell_turned(&t);

@@ -177,6 +177,7 @@ static sdm_status print_json(const check *c, sdm_error *err)
         const sdm_survey_count *count;
     } counts[] = {{"failed", &f->failed},
                   {"open", &f->open},
+                  {"unused", &f->unused},
                   {"inside_out", &f->inside_out},
                   {"turned", &f->turned},
                   {"folded", &f->folded},

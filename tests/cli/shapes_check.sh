@@ -81,6 +81,15 @@ has '"verdict": "warning".*"jumps": \[\{"kind": "jump", "parameter": "size", "va
 faulty wound 4 '^warning +part 1 of 1 \(36 triangles, .*\) winds around its inside more than once: it encloses [0-9.]+ mm\^3, 2\.[0-9]+ times the volume that it fills, and [0-9]+ pairs of its triangles meet \(at size=[0-9.]+ reach=[0-9.]+; parts wind more than once in all 21 shapes\)$'
 has '^note +overlaps .*: the union counts; [0-9]+ of them within part 1 of 1 \(36 triangles, .* mm\) alone$'
 
+# Triangles that begin at a wrong vertex leave out vertices: the first line names the cause of the others.
+unused='belong to no triangle: is an offset of vertex indices wrong, so that triangles have vertices of another part\? If they are left over, remove them'
+faulty spare 4 "^warning +8 vertices \(16 \.\. 23\) $unused \(in all 21 shapes\); mend this first: other lines may follow from it\$"
+[ "$(grep -c '^warning' out)" -eq 1 ] || bad "vertices that are left over have other consequences: $(cat out)"
+faulty offset 4 "^warning +4 vertices \(12 \.\. 15\) $unused"
+grep '^warning' out | head -n 1 | grep -q 'belong to no triangle' || bad "the cause is not told first: $(cat out)"
+sdmgen shapes test faulty -O fault=spare --plugin "$plugin" --samples 4 >out 2>err
+has '^doubtful meshes +vertices belong to no triangle in 9 of 9 shapes, up to 8: is an offset of vertex indices wrong\?'
+
 # With a configuration: its ranges and its grid.
 cat >good.yaml <<'YAML'
 shape: {name: faulty, ranges: {size: [1, 2]}}
@@ -198,6 +207,48 @@ for file in svg exact phantom fit config; do
     present none.$file
     cmp -s none.$file spare.$file || bad "vertices of no triangle change $file: $(diff none.$file spare.$file | head -n 5)"
 done
+
+expect 4 "error: 4 vertices \(12 \.\. 15\) $unused" sdmgen mesh --shape faulty -O fault=offset --audit --plugin "$plugin"
+has '^unused vertices +4$'
+expect 0 "warning: 8 vertices \(16 \.\. 23\) $unused \(in all" sdmgen config good.yaml shape.options.fault=spare --plugin "$plugin" -q
+expect 0 "warning: 8 vertices \(16 \.\. 23\) $unused\$" sdmgen exact --shape faulty -O fault=spare --plugin "$plugin" -o x.npy -q
+spared() { # spared BEFORE BETWEEN AFTER: a tetrahedron among so many vertices of no triangle
+    printf 'OFF\n%d 4 0\n' $((4 + $1 + $2 + $3))
+    yes '9 9 9' | head -n "$1"
+    printf '0 0 0\n2 0 0\n0 2 0\n'
+    yes '9 9 9' | head -n "$2"
+    printf '0 0 2\n'
+    yes '9 9 9' | head -n "$3"
+    printf '3 %d %d %d\n' "$1" $(($1 + 2)) $(($1 + 1)) "$1" $(($1 + 1)) $(($1 + $2 + 3)) "$1" $(($1 + $2 + 3)) $(($1 + 2)) $(($1 + 1)) $(($1 + 2)) $(($1 + $2 + 3))
+}
+spared 0 0 1 >one.off
+expect 4 'error: vertex 4 belongs to no triangle: is an offset' sdmgen mesh --mesh one.off --json
+has '"unused_vertices": 1, "parts_inside_out": 0, "verdict": "warning"'
+spared 1 2 0 >runs.off
+expect 4 'error: 3 vertices \(the first: 0\) belong to no triangle' sdmgen mesh --mesh runs.off --audit
+spared 0 2 1 >runs.off
+expect 4 'error: 3 vertices \(the first: 3 \.\. 4\) belong to no triangle' sdmgen mesh --mesh runs.off --audit
+has '^box +0 0 0 \.\. 2 2 2 mm$'
+
+# The rim of a knob, half a circle in steps of 20: where the angles go to cos() in degrees, its outline crosses itself.
+knob() {
+    awk -v unit="$1" 'BEGIN {
+        n = 9; s = 24
+        print "OFF\n" n * s + 2, 2 * n * s, 0
+        for (i = 0; i < n; i++) for (j = 0; j < s; j++) {
+            a = (20 * i + 10) * unit; r = 4 * sin(a) + 6 * (i > 0 && i < n - 1); t = 6.283185307179586 * j / s
+            print r * cos(t), r * sin(t), -4 * cos(a) }
+        print "0 0 -4\n0 0 4"
+        for (j = 0; j < s; j++) {
+            k = (j + 1) % s
+            print 3, n * s, k, j "\n" 3, n * s + 1, (n - 1) * s + j, (n - 1) * s + k
+            for (i = 0; i + 1 < n; i++) { a = i * s + j; b = i * s + k; print 3, a, b, b + s "\n" 3, a, b + s, a + s } } }' >knob.off
+}
+knob 0.017453292519943295
+expect 0 - sdmgen mesh --mesh knob.off --audit
+knob 1
+expect 4 'part 1 of 1 .* passes through itself, and [0-9.]+ % of its surface faces the wrong way: what lies behind that is missing; is the radius of a fillet larger than half of the thickness, a wall thicker than the part is wide, or an angle in degrees given to cos\(\) or sin\(\)\?$' \
+    sdmgen mesh --mesh knob.off --audit
 
 # Several parts: all are named, once. Boxes along x, each overlapping the one before; those of which the digit is 1 are inside out.
 boxes() {

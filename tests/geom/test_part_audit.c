@@ -410,6 +410,34 @@ static void test_loop_in_another_part(void **state)
     }
 }
 
+// Vertices of no triangle: their number, and the first run of them.
+static void test_unused_vertices(void **state)
+{
+    (void)state;
+    static const struct {
+        size_t spare[2]; // before and after the boxes
+        size_t first, last;
+    } cases[] = {{{0, 0}, 0, 0}, {{0, 8}, 16, 23}, {{3, 0}, 0, 2}, {{1, 2}, 0, 0}};
+    for (size_t i = 0; i < 4; i++) {
+        const size_t before = cases[i].spare[0], n = before + cases[i].spare[1];
+        sdm_mesh m = {0};
+        add_box(&m, 0, 4, 2, false);
+        add_box(&m, 3, 6, 1, false);
+        if (sdm_mesh_reserve(&m, 16 + n, m.n_tri, &err)) fail_msg("%s", err.text);
+        memmove(m.vert + 3 * before, m.vert, 48 * sizeof *m.vert);
+        for (size_t k = 0; k < 3 * m.n_tri; k++) m.tri[k] += (uint32_t)before;
+        for (size_t k = 0; k < 3 * n; k++) m.vert[k < 3 * before ? k : k + 48] = 500;
+        sdm_part_audit a = audit_of(&m);
+        assert_int_equal(a.unused, n);
+        assert_int_equal(a.unused_first, cases[i].first);
+        assert_int_equal(a.unused_last, cases[i].last);
+        near(a.union_volume, 64 + 8);
+        assert_true(a.mesh.max[0] == 6);
+        sdm_part_audit_dispose(&a);
+        sdm_mesh_dispose(&m);
+    }
+}
+
 /* The thickness of a body whose radius is radius(z) for -1 <= z <= 1. */
 static double thickness_of(double (*radius)(double z))
 {
@@ -491,6 +519,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_overlapping_parts),
+        cmocka_unit_test(test_unused_vertices),
         cmocka_unit_test(test_parts_that_share_an_edge),
         cmocka_unit_test(test_boxes_with_a_common_face),
         cmocka_unit_test(test_cavity_and_parts_apart),

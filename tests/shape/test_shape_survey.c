@@ -552,6 +552,11 @@ static void vertices_of_no_triangle(void **state)
         assert_memory_equal(s[0].beyond, s[1].beyond, sizeof s->beyond);
         assert_true(s[0].surplus == s[1].surplus && s[0].scale.size == s[1].scale.size);
         assert_int_equal(s[1].cut.shapes, 0);
+        assert_int_equal(s[0].unused.shapes, 0);
+        assert_int_equal(s[1].unused.shapes, s[1].n);
+        assert_true(s[1].unused.amount == 8);
+        assert_int_equal(sdm_shape_survey_verdict(&s[0]), SDM_OK);
+        assert_int_equal(sdm_shape_survey_verdict(&s[1]), SDM_E_QUALITY);
         for (int i = 0; i < 2; i++) sdm_shape_survey_dispose(&s[i]);
     }
 }

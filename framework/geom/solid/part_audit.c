@@ -150,6 +150,23 @@ static void measure_parts(job *j)
     }
 }
 
+/* Counts the vertices of no triangle, and finds the first run of them. */
+static sdm_status find_unused(const sdm_mesh *m, sdm_part_audit *out, sdm_error *err)
+{
+    bool *used = NULL;
+    const sdm_status s = SDM_ALLOC(&used, m->n_vert, "vertices in use", err);
+    if (s) return s;
+    for (size_t i = 0; i < 3 * m->n_tri; i++) used[m->tri[i]] = true;
+    for (size_t v = 0; v < m->n_vert; v++) {
+        if (used[v]) continue;
+        if (!out->unused) out->unused_first = v;
+        if (v == out->unused_first + out->unused) out->unused_last = v;
+        out->unused++;
+    }
+    sdm_free(used);
+    return SDM_OK;
+}
+
 /* Notes that a triangle of part a meets one of part b, another one. */
 static void count_meeting(job *j, uint32_t a, uint32_t b)
 {
@@ -341,6 +358,7 @@ sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audi
     *out = (sdm_part_audit){.union_volume = NAN, .union_area = NAN};
     job j = {.given = m, .out = out};
     sdm_status s = find_parts(&j, err);
+    if (!s) s = find_unused(m, out, err);
     if (!s) s = measure_thickness(&j, err);
     if (!s && with_union) s = measure_union(&j, err);
     job_dispose(&j);

@@ -61,6 +61,15 @@ static const char *reason(const char *text)
 static void tell_meshes(tests *t)
 {
     const sdm_shape_survey *f = &t->found;
+    if (!f->failed.shapes && f->unused.shapes) {
+        at_shape(t,
+                 result(t, SDM_TEST_MESHES, SDM_TEST_DOUBTFUL, f->unused.amount,
+                        "vertices belong to no triangle in %zu of %zu shapes, up to %g: is an "
+                        "offset of vertex indices wrong?",
+                        f->unused.shapes, f->n, f->unused.amount),
+                 f->unused.worst);
+        return;
+    }
     if (!f->failed.shapes) {
         result(t, SDM_TEST_MESHES, SDM_TEST_PASSED, (double)f->n,
                "%zu meshes, the first with %zu vertices and %zu triangles", f->n, f->n_vert,

@@ -35,7 +35,7 @@ typedef struct finding {
     bool untested; /* for want of time; the status is then SDM_E_CANCELLED */
     size_t n_vert, n_tri;
     uint64_t crc_vert, crc_tri;
-    size_t open, inside_out, turned, apart, flat, overlaps, crossed, degenerate, duplicate;
+    size_t open, unused, inside_out, turned, apart, flat, overlaps, crossed, degenerate, duplicate;
     double volume, area, min[3], max[3];
     double times;        /* of sdm_survey_part_lengths() */
     double winding;      /* the largest of sdm_survey_part_winding() */
@@ -142,6 +142,7 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
     sdm_survey_contacts(&audit, &out->contacts);
     out->thick = sdm_part_audit_thickness(&audit);
     out->apart = audit.bodies > 1 ? audit.bodies : 0;
+    out->unused = audit.unused;
     out->inside_out = audit.inside_out;
     out->overlaps = audit.mesh.self_intersections;
     out->degenerate = audit.mesh.degenerate;
@@ -298,6 +299,7 @@ static void sum_up(survey *v)
             s->n_tri = f->n_tri;
         }
         count(&s->open, i, (double)f->open);
+        count(&s->unused, i, (double)f->unused);
         count(&s->inside_out, i, (double)f->inside_out);
         if (f->turned_over > SDM_PART_FOLDED_MIN) count(&s->crossing, i, f->turned_over);
         if (f->winding > SDM_SURVEY_WOUND) count(&s->wound, i, f->winding);
@@ -598,10 +600,11 @@ bool sdm_survey_has_twins(const sdm_shape_survey *s)
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
 {
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
-    bool bad = s->inside_out.shapes || s->crossing.shapes || sdm_survey_winds_wrongly(s) ||
-               s->folded.shapes || s->turned.shapes || s->resized.shapes || s->rewired.shapes ||
-               s->cut.shapes || s->thin.shapes || s->flat.shapes || s->tiny.shapes || s->narrow ||
-               s->repeat.unlike || s->surplus > SDM_SURVEY_SURPLUS_MAX ||
+    bool bad = s->unused.shapes || s->inside_out.shapes || s->crossing.shapes ||
+               sdm_survey_winds_wrongly(s) || s->folded.shapes || s->turned.shapes ||
+               s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->thin.shapes ||
+               s->flat.shapes || s->tiny.shapes || s->narrow || s->repeat.unlike ||
+               s->surplus > SDM_SURVEY_SURPLUS_MAX ||
                s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
                s->scale.odd_speed || s->scale.odd_angle || s->scale.other_length || s->scale.swings;
     for (size_t k = 0; k < s->n_params && s->jump; k++)

@@ -18,7 +18,8 @@ typedef enum sdm_test_outcome {
 
 /* The tests, in the order of the results. */
 enum {
-    SDM_TEST_MESHES = 0, /* mesh() makes a valid mesh all over the ranges */
+    SDM_TEST_MESHES = 0, /* mesh() makes a valid mesh all over the ranges; doubtful: vertices belong
+                            to no triangle */
     SDM_TEST_CLOSED,     /* every edge has as many triangles one way as the other */
     SDM_TEST_ORIENTED,   /* no part is inside out */
     SDM_TEST_TRIANGLES,  /* the same numbers and the same triangles everywhere */

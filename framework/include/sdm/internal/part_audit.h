@@ -72,6 +72,9 @@ typedef struct sdm_part_audit {
     bool turned;    /* the mesh as a whole is inside out, so the engine turns all of it */
     sdm_part *part; /* [n], by their lowest triangle; triangles that repeat a vertex have no part */
     size_t n;
+    /* vertices of no triangle, and the indices of the first run of them: with a wrong offset of
+     * vertex indices the triangles of a part use vertices of another one and leave out its own */
+    size_t unused, unused_first, unused_last;
     size_t inside_out; /* parts of this state */
     size_t bodies;     /* groups of parts with a solid part: what does not meet is counted apart */
     /* volume, mm^3, and area, mm^2, of the union, as the engine measures it: overlaps count once.

@@ -123,6 +123,7 @@ typedef struct sdm_shape_survey {
     /* the meshes: those that could not be made, and properties of the others */
     sdm_survey_count failed;
     sdm_survey_count open;       /* edges on which not as many triangles run each way: not closed */
+    sdm_survey_count unused;     /* vertices of no triangle */
     sdm_survey_count inside_out; /* parts of state SDM_PART_INSIDE_OUT (part_audit.h) */
     sdm_survey_count turned;     /* parts that are inside out and that the exact engine turns */
     /* parts that pass through themselves (sdm_part.folded); amount: the share that faces the wrong
@@ -231,13 +232,12 @@ double sdm_survey_part_winding(const sdm_part_audit *a, size_t i);
 bool sdm_survey_winds_wrongly(const sdm_shape_survey *s);
 
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
- * are usable, but a training or derivatives would suffer: parts that are inside out (also those
- * that the engine turns), parts without thickness or SDM_SURVEY_TINY times smaller than others,
- * walls that pass through each other, outlines that cross themselves or wind more than once, sizes,
- * triangles or vertices that jump, a grid that
- * cuts, is too coarse for a part or far too large, wrong velocities, results that differ from call
- * to call, or an odd size or speed (another unit than mm, or a parameter that does nothing). Else
- * SDM_OK. */
+ * are usable, but a training or derivatives would suffer: vertices of no triangle, parts that are
+ * inside out (also those that the engine turns), parts without thickness or SDM_SURVEY_TINY times
+ * smaller than others, walls that pass through each other, outlines that cross themselves or wind
+ * more than once, sizes, triangles or vertices that jump, a grid that cuts, is too coarse for a
+ * part or far too large, wrong velocities, results that differ from call to call, or an odd size or
+ * speed (another unit than mm, or a parameter that does nothing). Else SDM_OK. */
 sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 
 /* A smaller share of the area may turn over: slivers at a tip, rings of a tube that bends sharply

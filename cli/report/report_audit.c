@@ -333,12 +333,13 @@ bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text)
         if (a->part[i].folded > a->part[most].folded) most = i;
     if (!a->n || !(a->part[most].folded > SDM_PART_FOLDED_MIN)) return false;
     cli_name_part(a, most, text);
-    sdm_text_add(text,
-                 "passes through itself, and %.2g %% of its surface faces the wrong way: what lies "
-                 "behind that is missing; are two of its vertices exchanged, is the radius of a "
-                 "fillet larger than half of the thickness, a wall thicker than the part is wide, or "
-                 "an angle in degrees given to cos() or sin()?",
-                 100 * a->part[most].folded);
+    sdm_text_add(
+        text,
+        "passes through itself, and %.2g %% of its surface faces the wrong way: what lies "
+        "behind that is missing; are two of its vertices exchanged, is the radius of a "
+        "fillet larger than half of the thickness, a wall thicker than the part is wide, or "
+        "an angle in degrees given to cos() or sin()?",
+        100 * a->part[most].folded);
     return true;
 }
 

@@ -420,7 +420,7 @@ static sdm_status points_start(fit_problem *p, sdm_error *err)
 /* Points, after the fit: maximises again from the shape on whose surface they lie most evenly, and
  * keeps the better of both states. */
 static sdm_status maximise_from_even(fit_problem *p, fit_newton_opts *newton, fit_newton_end *end,
-                                     sdm_error *err)
+                                     size_t max_iterations, sdm_error *err)
 {
     const fit_state state = p->state;
     const fit_newton_end first = *end;
@@ -428,7 +428,7 @@ static sdm_status maximise_from_even(fit_problem *p, fit_newton_opts *newton, fi
     const fit_recent recent = p->recent;
     bool moved;
     sdm_status s = sdm_fit_even_points(p, &moved, err);
-    newton->max_iterations = p->opts->max_iterations;
+    newton->max_iterations = max_iterations;
     if (!s && moved) s = points_start(p, err);
     if (!s && moved) s = maximise_with_maps(p, newton, end, err);
     if (!s && moved && sdm_fit_objective(p) > objective + GAIN_EVEN) return SDM_OK;
@@ -437,6 +437,16 @@ static sdm_status maximise_from_even(fit_problem *p, fit_newton_opts *newton, fi
     *end = first;
     p->recent = recent;
     return sdm_fit_evaluate(p, err);
+}
+
+/* Maximises with maps of one kind; points twice, see maximise_from_even(). */
+static sdm_status maximise_twice(fit_problem *p, fit_newton_opts *newton, fit_newton_end *end,
+                                 sdm_error *err)
+{
+    const size_t max_iterations = newton->max_iterations;
+    const sdm_status s = maximise_with_maps(p, newton, end, err);
+    if (s || p->target->kind != SDM_FIT_POINTS || p->opts->keep_params) return s;
+    return maximise_from_even(p, newton, end, max_iterations, err);
 }
 
 static sdm_status start_find(fit_problem *p, sdm_fit_result *out, sdm_error *err)
@@ -461,9 +471,7 @@ static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
                               .max_iterations = o->max_iterations};
     fit_newton_end end = {0};
     // main phase
-    sdm_status s = maximise_with_maps(p, &newton, &end, err);
-    if (!s && p->target->kind == SDM_FIT_POINTS && !o->keep_params)
-        s = maximise_from_even(p, &newton, &end, err);
+    sdm_status s = maximise_twice(p, &newton, &end, err);
     const char *what = p->source->model ? "fit" : "fit with exact maps";
     // polish: the appearance restarts, because it may have modelled the network's errors as a
     // tissue
@@ -474,7 +482,7 @@ static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
         newton.phase = SDM_FIT_POLISH;
         newton.max_iterations = o->max_polish_iterations;
         what = "polish with exact maps";
-        s = maximise_with_maps(p, &newton, &end, err);
+        s = maximise_twice(p, &newton, &end, err);
     }
     out->converged = !s && end.converged;
     if (out->converged && end.small)

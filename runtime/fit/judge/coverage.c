@@ -53,6 +53,10 @@
 // share of the surface that a parameter moves, weighted by the square of the motion, without points
 // from which on this is why the points do not determine the parameter
 #define UNSEEN_MIN 0.5
+// motion of the surface by one standard deviation of such a parameter, over the standard deviation
+// of the points, from which on it is named, too: a single point on the part that it moves fastest
+// would tell as much
+#define MOTION_HARDLY_KNOWN 3.0
 
 typedef struct cloud {
     double (*x)[3];
@@ -224,14 +228,16 @@ static double name_unseen(const fit_problem *p, const sdm_fit_result *r, const f
         double all = 0, unseen = 0, fastest = 0, low, high;
         const double sd = sdm_fit_prior_sd(p, k);
         const char *name = "";
-        if (!sdm_fit_hardly_known(r, k)) continue;
+        if (fit_param_is_kept(p, k)) continue;
         for (size_t i = 0; i < surface->n; i++) {
             const double by = surface->by[i * p->n_params + k];
             all += by * by;
             unseen += bare[i] ? by * by : 0;
             fastest = fmax(fastest, fabs(by));
         }
-        if (!(fastest * sd > edge) || !(unseen > UNSEEN_MIN * all)) continue;
+        const double known =
+            fmin(SDM_FIT_HARDLY_KNOWN * sd, MOTION_HARDLY_KNOWN * p->state.point_sd / fastest);
+        if (!(fastest * sd > edge) || !(unseen > UNSEEN_MIN * all) || !(r->sd[k] > known)) continue;
         most = fmax(most, unseen / all);
         sdm_fit_bounds(p->source, k, &low, &high, &name);
         const size_t used = strlen(text);
@@ -286,9 +292,9 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
         const double unseen = name_unseen(p, r, &surface, bare_at, names, sizeof names);
         if (unseen > 0)
             snprintf(unseen_text, sizeof unseen_text,
-                     "the data do not determine %s: no points lie near the part of the surface "
-                     "that %s; take points from there, or keep a known value "
-                     "(sdm_fit_opts.kept)%s",
+                     "the data hardly determine %s: no points lie near the part of the fitted "
+                     "surface that %s; start from other values (sdm_fit_opts.start_params), take "
+                     "points from there, or keep a known value (sdm_fit_opts.kept)%s",
                      names, strchr(names, ',') ? "they move" : "it moves",
                      grown || other ? "" : "; the other parameters hold within their +-");
         const bool covered = bare <= UNCOVERED_MAX;

@@ -569,10 +569,9 @@ static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
     if (!s) s = sdm_fit_judge(p, r, &factor, err);
     if (s && s != SDM_E_QUALITY) return s;
     sdm_fit_name_restless(p, r, s ? err : NULL);
-    if (!p->opts->keep_pose && keeps_some(p)) {
-        const sdm_status kept = sdm_fit_judge_kept_params(p, r, err);
-        if (kept) return kept;
-    }
+    const sdm_status params = keeps_some(p) ? sdm_fit_judge_kept_params(p, r, err) : SDM_OK;
+    if (params && params != SDM_E_QUALITY) return params;
+    if (params) s = params;
     if (!s && !p->is_rival) s = sdm_fit_judge_next_pose(p, factor, &r->verdict, err);
     const sdm_status kept = p->opts->keep_pose ? sdm_fit_judge_kept_pose(p, r, err) : SDM_OK;
     return kept ? kept : s;
@@ -642,7 +641,7 @@ static sdm_status attempt_again(fit_problem *p, bool exact, sdm_fit_result *out,
     p->state = *fitted;
     p->maps.exact = exact;
     p->maps_params[0] = NAN;
-    sdm_status s = sdm_fit_other_values(p, again, err);
+    sdm_status s = sdm_fit_other_values(p, NULL, again, err);
     const double seconds = sdm_clock() - from;
     out->seconds_search += seconds;
     if (s || !*again) return s;

@@ -64,8 +64,8 @@ static void test_polish_draws_an_end_back(void **state)
     const sdm_status s = sdm_fit(&source, &target, &o, &r, &err);
     if (s && s != SDM_E_QUALITY) fail_msg("%s", err.text);
     if (!(r.polished && fabs(r.params[LENGTH] - TRUTH[LENGTH]) < 0.02))
-        fail_msg("polished %d, length %g +- %g: %s", r.polished, r.params[LENGTH],
-                 r.sd[LENGTH], err.text);
+        fail_msg("polished %d, length %g +- %g: %s", r.polished, r.params[LENGTH], r.sd[LENGTH],
+                 err.text);
     sdm_fit_dispose(&r);
     sdm_mesh_dispose(&m);
     sdm_instance_free(shape);

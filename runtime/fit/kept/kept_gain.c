@@ -10,11 +10,11 @@
 #define ITERATIONS 25
 #define EPS 1e-3
 
-sdm_status sdm_fit_free(fit_problem *p, const sdm_fit_opts *freed, double *gain, sdm_error *err)
+sdm_status sdm_fit_free(fit_problem *p, const sdm_fit_opts *freed, double kept, double *gain,
+                        sdm_error *err)
 {
     const sdm_fit_opts *given = p->opts;
     sdm_fit_opts silent = *freed;
-    const double before = sdm_fit_objective(p);
     const fit_newton_opts newton = {.phase = SDM_FIT_SEARCH,
                                     .keep_params = freed->keep_params,
                                     .keep_pose = freed->keep_pose,
@@ -29,7 +29,7 @@ sdm_status sdm_fit_free(fit_problem *p, const sdm_fit_opts *freed, double *gain,
     p->opts = &silent;
     sdm_status s = sdm_fit_newton(p, &newton, &end, err);
     if (!s) s = sdm_fit_weigh_priors(p, weight, &noise_factor, err);
-    if (!s) *gain = (sdm_fit_objective(p) - before) / noise_factor;
+    if (!s) *gain = (sdm_fit_objective(p) - kept) / noise_factor;
     p->opts = given;
     return s;
 }

@@ -9,6 +9,8 @@
 #define FIT_FREE_MOTION_MAX 0.5
 
 /* Goes on from the state of *p, which must be evaluated, to a rough maximum of the posterior with
-   the options `freed` in place of p->opts, which stay. *gain: gain in log posterior density, as of
-   independent samples. *p keeps the new state. Errors of sdm_fit_newton(). */
-sdm_status sdm_fit_free(fit_problem *p, const sdm_fit_opts *freed, double *gain, sdm_error *err);
+   the options `freed` in place of p->opts, which stay. *gain: gain in log posterior density over
+   that of the kept values, `kept`, as of independent samples. *p keeps the new state. Errors of
+   sdm_fit_newton(). */
+sdm_status sdm_fit_free(fit_problem *p, const sdm_fit_opts *freed, double kept, double *gain,
+                        sdm_error *err);

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "fit/solver/objective.h"
 #include "fit/solver/open_motions.h"
 #include "kept_gain.h"
 
@@ -14,7 +15,7 @@ static sdm_status pose_free(fit_problem *p, double *gain, double *motion, sdm_er
     const fit_state kept = p->state;
     sdm_fit_opts freed = *p->opts;
     freed.keep_pose = false;
-    const sdm_status s = sdm_fit_free(p, &freed, gain, err);
+    const sdm_status s = sdm_fit_free(p, &freed, sdm_fit_objective(p), gain, err);
     if (!s) *motion = sdm_fit_surface_motion(p, &kept);
     return s;
 }

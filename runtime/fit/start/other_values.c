@@ -27,14 +27,14 @@
 // a shape that has this Dice coefficient with that of the fit is the same one, found more exactly
 #define ALIKE 0.95
 
-// *best = the best pose of the shape with the latest map: that of `state`, or shifted along one of
-// the axes (rows, world)
+// *best = the best pose of the shape with the latest map: that of `state`, or, if it is
+// free, shifted along one of the axes (rows, world)
 static void shift_find(const fit_problem *p, const fit_state *state, const double axes[9],
                        double step, fit_start *best)
 {
     *best = (fit_start){.state = *state,
                         .log_likelihood = sdm_fit_likelihood_at(p, state, SAMPLES_RANKED)};
-    for (int a = 0; a < 3; a++)
+    for (int a = 0; a < 3 && !p->opts->keep_pose; a++)
         for (int i = -N_SHIFTS; i <= N_SHIFTS; i++) {
             fit_start one = {.state = *state};
             for (int k = 0; k < 3; k++) one.state.translation[k] += i * step * axes[3 * a + k];
@@ -57,15 +57,15 @@ static sdm_status axes_find(fit_problem *p, double axes[9], sdm_error *err)
     return SDM_OK;
 }
 
-// list[N_KEPT] = the best starts with another value of one parameter, at most one for each; *n: how
-// many
-static sdm_status values_rank(fit_problem *p, const double axes[9], double step, fit_start *list,
-                              size_t *n, sdm_error *err)
+// list[N_KEPT] = the best starts with another value of one parameter of `of`, at most one for each;
+// *n: how many
+static sdm_status values_rank(fit_problem *p, const bool *of, const double axes[9], double step,
+                              fit_start *list, size_t *n, sdm_error *err)
 {
     const fit_state from = p->state;
     *n = 0;
     for (size_t k = 0; k < p->n_params; k++) {
-        if (fit_param_is_kept(p, k)) continue;
+        if (fit_param_is_kept(p, k) || (of && !of[k])) continue;
         fit_start of_param = {.log_likelihood = -INFINITY};
         for (int i = 0; i < N_PARTS; i++) {
             const double part = (p->high[k] - p->low[k]) / N_PARTS,
@@ -105,7 +105,7 @@ static bool is_alike(const fit_problem *p, const bool *inside)
     return 2 * (double)both >= ALIKE * (double)sum;
 }
 
-sdm_status sdm_fit_other_values(fit_problem *p, bool *found, sdm_error *err)
+sdm_status sdm_fit_other_values(fit_problem *p, const bool *of, bool *found, sdm_error *err)
 {
     const fit_state given = p->state;
     fit_state wide = given, best = given;
@@ -130,7 +130,7 @@ sdm_status sdm_fit_other_values(fit_problem *p, bool *found, sdm_error *err)
     if (!s) s = axes_find(p, axes, err);
     p->state = wide;
     if (!s) s = sdm_fit_evaluate(p, err);
-    if (!s) s = values_rank(p, axes, LARGEST_SHIFT / N_SHIFTS * p->extent.reach, list, &n, err);
+    if (!s) s = values_rank(p, of, axes, LARGEST_SHIFT / N_SHIFTS * p->extent.reach, list, &n, err);
     for (size_t i = 0; i < n && !s; i++) {
         p->state = list[i].state;
         s = sdm_fit_start_continue(p, &given, true, err);

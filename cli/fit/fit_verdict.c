@@ -108,6 +108,38 @@ void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX])
         snprintf(text, FIT_WORDS_MAX, "%s", cli_fit_grade_name(v->grade));
 }
 
+/* Are all checks with this grade or a worse one among these? */
+static bool only(const sdm_fit_verdict *v, sdm_fit_grade grade, const sdm_fit_check_kind *kinds,
+                 size_t n)
+{
+    for (size_t i = 0; i < v->n_findings; i++) {
+        size_t k = 0;
+        while (k < n && kinds[k] != v->findings[i].kind) k++;
+        if (v->findings[i].grade >= grade && k == n) return false;
+    }
+    return true;
+}
+
+/* What a verdict that is not `passed` means for the user of the values. */
+static const char *in_short(const sdm_fit_verdict *v)
+{
+    static const sdm_fit_check_kind end[] = {SDM_FIT_CHECK_CONVERGED},
+                                    few[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA},
+                                    maps[] = {SDM_FIT_CHECK_VOXELS, SDM_FIT_CHECK_NETWORK_ERROR,
+                                              SDM_FIT_CHECK_NETWORK};
+    if (v->grade == SDM_FIT_FAILED)
+        return only(v, SDM_FIT_FAILED, end, 1)
+                   ? "do not use the values: the fit has not come to an end"
+                   : "do not use the values: the data contradict them or do not decide";
+    if (only(v, SDM_FIT_DOUBTFUL, few, sizeof few / sizeof *few))
+        return "the data do not determine everything: use no parameter that a line below names, "
+               "the others hold within their +-";
+    if (only(v, SDM_FIT_DOUBTFUL, maps, sizeof maps / sizeof *maps))
+        return "the maps limit the fit: the values are near, but their +- may be too small";
+    return "the data may differ from the shape as the lines below say: look at a picture "
+           "(-o fit.png) before you use the values";
+}
+
 void cli_fit_doubt_changed_shape(cli_fit *f)
 {
     if (!f->shape_changed || !f->result.verdict.n_findings) return;
@@ -128,6 +160,7 @@ void cli_fit_print_verdict(const cli_fit *f)
     const sdm_fit_verdict *v = &f->result.verdict;
     if (!v->n_findings) return;
     printf("verdict: %s\n", cli_fit_grade_name(v->grade));
+    if (v->grade != SDM_FIT_PASSED) printf("  %-12s %s\n", "in short", in_short(v));
     if (f->source.model && !f->shape && !f->judge_shape && !f->shape_changed)
         printf("  %-12s not tested: the exact shape '%s' is not known here, so the error of "
                "the network is not measured, and the standard deviations may be too "

@@ -19,6 +19,7 @@ coarse='--tolerance 0.1 --mirror no'
 kept='^sdmgen: --keep parameters without -p: the parameters keep their default values$'
 expect 0 "$kept" sdmgen fit $model ct.nii $start --keep parameters -o coarse.nrrd
 has '^verdict: doubtful$' # coarse voxels widen the values inside
+has '^  in short +the data may differ from the shape as the lines below say'
 has '^  inside       doubtful'
 if grep -q -- '--rotation gives one start' out; then bad "advice on the start beside a fit that is only doubtful"; fi
 expect 0 "$kept" sdmgen fit $model ct.nii $start $coarse --keep parameters -o fit.nrrd -o fit.ply -o fit.json --json

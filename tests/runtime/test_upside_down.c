@@ -215,6 +215,40 @@ static void test_back_to_front_is_refused(void **state)
     check_block(true, SDM_E_QUALITY);
 }
 
+/* 80 points of the surface of a pin: so few that they form hardly any neighbourhoods. Pins of
+ * other lengths explain them worse all the same. */
+static void test_few_points_tell_the_length(void **state)
+{
+    (void)state;
+    enum { POINTS = 80 };
+    const double truth[PIN_PARAMS] = {18, 4.5};
+    sdm_instance *shape = NULL;
+    sdm_mesh m = {0};
+    sdm_fit_opts o = sdm_fit_defaults();
+    sdm_fit_result r;
+    sdm_error err = {0};
+    double *points = calloc(3 * POINTS, sizeof *points);
+    if (!points || sdm_instance_create(&pin, NULL, 0, NULL, &shape, NULL) ||
+        sdm_instance_mesh(shape, truth, &m, NULL) ||
+        sdm_fit_surface_points(&m, POINTS, 1, points, NULL))
+        abort();
+    for (size_t i = 0; i < 3 * POINTS; i++)
+        points[i] += 0.1 * sin(7.3 * (double)i + 0.9 * (double)(i * i % 97));
+    const sdm_fit_source source = {
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){24, 24, 64}, 0.6, (double[3]){0, 0, 0})};
+    const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = points, .n_points = POINTS};
+    const sdm_status s = sdm_fit(&source, &t, &o, &r, &err);
+    const sdm_fit_finding *f = next_pose(&r);
+    if (s || !f || f->grade != SDM_FIT_PASSED || !(f->figure > 30))
+        fail_msg("%s (%s); next pose %g %s", sdm_status_name(s), err.text, f ? f->figure : NAN,
+                 f ? f->text : "not tested");
+    sdm_fit_dispose(&r);
+    sdm_mesh_dispose(&m);
+    sdm_instance_free(shape);
+    free(points);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -222,6 +256,7 @@ int main(void)
         cmocka_unit_test(test_both_ways_of_a_symmetric_pin_pass),
         cmocka_unit_test(test_third_of_a_turn_is_named),
         cmocka_unit_test(test_back_to_front_is_refused),
+        cmocka_unit_test(test_few_points_tell_the_length),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

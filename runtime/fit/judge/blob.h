@@ -6,7 +6,6 @@
 #include "rival.h"
 
 /* Adds the finding "blob": the gain of the fit over the blob of the same tissues and point spread.
-   None where the shape is nearly a blob itself, or where points lie too far apart to tell. factor:
-   as fit_standing. SDM_E_NOMEM. */
+   None where the shape is nearly a blob itself. factor: as fit_standing. SDM_E_NOMEM. */
 sdm_status sdm_fit_check_blob(const fit_problem *p, double factor, sdm_fit_verdict *v,
                               sdm_error *err);

@@ -336,7 +336,8 @@ static sdm_status compare_alike(fit_problem *p, own_fit *own, const turns *t, ne
     for (size_t i = 0; i < t->n_alike && !s; i++) {
         s = challenge(p, own, &t->alike[i], same, &other, &rival, err);
         if (!s && other &&
-            sdm_fit_chi_square(&fit, &rival) >= BETTER * sdm_fit_chi_square(&rival, &fit) &&
+            (!sdm_fit_has_units(&fit, &rival) ||
+             sdm_fit_chi_square(&fit, &rival) >= BETTER * sdm_fit_chi_square(&rival, &fit)) &&
             sdm_fit_gain(&fit, &rival) < -SDM_FIT_PREFERRED)
             nearest_take(least, p, &fit, &rival, 0);
     }
@@ -417,6 +418,7 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     // of every `stride`-th voxel fewer count as one; where the shape does not explain the image,
     // the likelihood is less certain (Wedderburn 1974)
     own.factor = fmax(factor / pow((double)p->stride, 3), 1) * fmax(v->chi_square, 1);
+    if (p->target->kind == SDM_FIT_POINTS) own.factor = fmax(p->noise_factor, 1);
     if (!s) s = least_gain(p, &own, &least, err);
     sdm_free(own.distance);
     sdm_free(own.field);

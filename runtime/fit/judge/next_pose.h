@@ -11,9 +11,8 @@
 /* Adds the finding "next pose" to a verdict that has not failed. Some iterations lead from each
    rival start to the nearest maximum; fit and rival are compared on voxels of the ball that holds
    both, with the tissues of each. A rival whose surface is nearly that of the fit is none. No
-   finding where the pose is kept, where no rival remains, as for a ball of given size, or where
-   points lie too far apart to tell. factor: how many correlated voxels of an image count as one
-   independent one. *p is left at a rival, with samples from that ball. SDM_E_QUALITY: the finding
-   failed; SDM_E_NOMEM, SDM_E_CANCELLED. */
+   finding where the pose is kept or where no rival remains, as for a ball of given size. factor:
+   how many correlated voxels of an image count as one independent one. *p is left at a rival, with
+   samples from that ball. SDM_E_QUALITY: the finding failed; SDM_E_NOMEM, SDM_E_CANCELLED. */
 sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdict *v,
                                    sdm_error *err);

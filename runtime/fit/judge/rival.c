@@ -11,6 +11,9 @@
 #define CHI_SQUARE_MIN 1e-3
 // of points that only one of two shapes takes for strays
 #define CHI_SQUARE_STRAY 9.0
+// points: with fewer neighbourhoods than this their residuals tell little, and the likelihood of
+// the single points decides
+#define UNITS_MIN 10
 // loss of log-likelihood, below the worse one of the two, that is no valley
 #define VALLEY 0.5
 
@@ -29,6 +32,8 @@ sdm_status sdm_fit_stand(const fit_problem *p, double factor, fit_standing *out,
         *out = (fit_standing){.n_units = misfit.n_units[0] + misfit.n_units[1],
                               .chi_square = misfit.noise_chi_square,
                               .n_points = misfit.n_points};
+    if (!s && p->target->kind == SDM_FIT_POINTS)
+        out->log_likelihood = p->information.log_likelihood, out->factor = factor;
     return s;
 }
 
@@ -44,10 +49,17 @@ double sdm_fit_chi_square(const fit_standing *s, const fit_standing *against)
     return kept * s->chi_square + (1 - kept) * CHI_SQUARE_STRAY;
 }
 
+bool sdm_fit_has_units(const fit_standing *fit, const fit_standing *rival)
+{
+    const size_t n = fit->n_units < rival->n_units ? fit->n_units : rival->n_units;
+    return n >= (fit->factor > 0 ? UNITS_MIN : 1);
+}
+
 double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival)
 {
-    if (fit->factor > 0) return (fit->log_likelihood - rival->log_likelihood) / fit->factor;
-    if (!fit->n_units || !rival->n_units) return NAN;
+    if (fit->factor > 0 && !sdm_fit_has_units(fit, rival))
+        return (fit->log_likelihood - rival->log_likelihood) / fit->factor;
+    if (!sdm_fit_has_units(fit, rival)) return NAN;
     return sdm_fit_units_gain(0.5 * (double)(fit->n_units + rival->n_units),
                               sdm_fit_chi_square(fit, rival), sdm_fit_chi_square(rival, fit));
 }
@@ -56,7 +68,7 @@ bool sdm_fit_same_maximum(const fit_problem *p, const fit_standing *fit, const d
                           const fit_standing *rival)
 {
     const fit_samples *s = &p->samples;
-    if (!p->maps.share || !(fit->factor > 0)) return false;
+    if (!fit_is_image(p) || !p->maps.share || !(fit->factor > 0)) return false;
     if (!(fabs(sdm_fit_gain(fit, rival)) < SDM_FIT_PREFERRED)) return false;
     fit_standing between = {.factor = fit->factor};
     for (size_t i = 0; i < s->n; i++) {

@@ -6,8 +6,8 @@
 
 /* How well a shape explains the samples. */
 typedef struct fit_standing {
-    /* images: log-likelihood, and the number of correlated samples that count as one independent
-     * one; labels and points: 0 */
+    /* images and points: log-likelihood, and the number of correlated samples that count as one
+     * independent one; labels: 0 */
     double log_likelihood, factor;
     /* labels and points: number of neighbourhoods, and their mean (mean residual)^2 / variance of
      * the noise; images: 0 */
@@ -23,8 +23,12 @@ sdm_status sdm_fit_stand(const fit_problem *p, double factor, fit_standing *out,
  * strays count with residuals of 3 deviations. */
 double sdm_fit_chi_square(const fit_standing *s, const fit_standing *against);
 
-/* Gain of the fit over a rival that was measured on the same samples. Of labels and points it is
- * computed from sdm_fit_chi_square() of both. NaN: points lie too far apart to tell. */
+/* Whether both have enough neighbourhoods, of labels or points, for a gain by their residuals. */
+bool sdm_fit_has_units(const fit_standing *fit, const fit_standing *rival);
+
+/* Gain of the fit over a rival that was measured on the same samples: of labels and points from
+ * sdm_fit_chi_square() of both, of images and of points with few neighbourhoods from the
+ * likelihood. NaN: labels have no neighbourhoods. */
 double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival);
 
 /* Log-likelihood ratio of mean residuals of n neighbourhoods whose common variance is estimated. */

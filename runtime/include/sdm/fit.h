@@ -301,9 +301,9 @@ typedef enum sdm_fit_check_kind {
     /* number of parameters at an end of their range */
     SDM_FIT_CHECK_BOUNDS,
     /* Gain over a blob, the ellipsoid of the same volume and moments in the same place. Images:
-       gain in log-likelihood, as of independent voxels; labels and points: as sdm_fit_compare().
-       Left out where the shape is nearly an ellipsoid (Dice coefficient above 0.9), and where
-       points lie too far apart to be tested */
+       gain in log-likelihood, as of independent voxels; labels and points: as sdm_fit_compare();
+       few points: by the likelihood of the single ones. Left out where the shape is nearly an
+       ellipsoid (Dice coefficient above 0.9) */
     SDM_FIT_CHECK_BLOB,
     /* with keep_pose: gain of a free pose in log-likelihood, as of independent samples */
     SDM_FIT_CHECK_KEPT_POSE,
@@ -338,8 +338,8 @@ typedef enum sdm_fit_check_kind {
        joint of an arm, improved in the same way. In units of log-likelihood of independent samples,
        as sdm_fit_compare(). Poses in which the surface is nearly the same (Dice coefficient above
        0.9) do not count. Left out where every such start leads back to the fit, where the pose is
-       kept, where a check failed, and where points lie too far apart to be tested. Points: doubtful
-       above -30 */
+       kept, and where a check failed. Points: doubtful above -30; of few points the likelihood of
+       the single ones decides */
     SDM_FIT_CHECK_NEXT_POSE,
     /* points: share of those that lie on no surface of the shape but form one: neighbours as near
        as those on the shape, or in a thin layer; at most 0.05 or sdm_fit_opts.tolerance, and 0.01

@@ -141,8 +141,8 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         printf("  trained     %.1f s, %s steps, %s exact maps", r->seconds,
                cli_format_count(r->steps, steps), cli_format_count(r->samples, maps));
     else
-        printf("  made        in %.1f s%s: the kind of the network that is kept needs no training",
-               r->seconds, r->compared ? ", with the training of the other kind" : "");
+        printf("  made        in %.1f s from meshes, without training steps%s", r->seconds,
+               r->compared ? "; the other kind was trained to compare" : "");
     if (r->verdict.saved_seconds > 0 && r->steps)
         printf("; train.patience saved %.0f s", r->verdict.saved_seconds);
     const sdm_verdict *v = &r->verdict;

@@ -1,7 +1,9 @@
 # Required packages. If an optional one is missing, the message says how to install it or how to
 # build without it.
 set(SDM_LIBM m)
-find_package(Threads)
+if(NOT CMAKE_SYSTEM_NAME STREQUAL Generic) # WebAssembly has no threads
+  find_package(Threads)
+endif()
 if(SDM_CONFIG AND NOT Threads_FOUND)
   message(FATAL_ERROR "POSIX threads not found: the trainer needs them; configure with "
     "-DSDM_CONFIG=OFF (runtime only)")

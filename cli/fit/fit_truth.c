@@ -217,7 +217,7 @@ void cli_fit_print_truth_pose(const cli_fit *f)
         printf("; the same surface, turned by %.3g degrees", degrees);
     else if (isfinite(degrees))
         printf(" and %.3g degrees%s", degrees,
-               *f->result.open_motions ? " of the open axis, as far as the fit knows it" : "");
+               *f->result.open_motions ? " between the open axis and the true one" : "");
     if (isfinite(sd) && !f->truth_same) printf(", %.2g sd", sd);
     printf("\n");
 }

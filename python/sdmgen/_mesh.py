@@ -190,7 +190,7 @@ def _doubts(report: Report) -> list[str]:
         texts.append(
             "a part of the mesh is inside out, or passes through itself, and meets another one: it is subtracted from "
             f"what it overlaps and is not solid itself (about {report.subtracted:.2g} mm^3); reverse the vertices of "
-            "its triangles (mesh.write(FILE.ply) and sdmgen mesh FILE.ply --audit name the part)"
+            "its triangles (mesh.write(FILE.ply) and sdmgen mesh --mesh FILE.ply --audit name the part)"
         )
     return texts
 

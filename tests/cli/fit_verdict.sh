@@ -23,7 +23,7 @@ torus='sdmgen fit --shape torus -O edge=0.5 --quiet --rotation 0.05,0.05,0 --spa
 expect 0 - $torus turned.nii --truth turned.json
 has '^  rotation .* \+- 0\.0[0-9]* 0\.0[0-9]* [0-9.e-]+ rad$'
 has '^  not determined by the data: rotation about the axis .*; the \+- of the pose leaves it out$'
-has '^  pose         off the truth by 0\.[0-9]+ mm at the centre of the shape and [0-3](\.[0-9]+)? degrees of the open axis, as far as the fit knows it$'
+has '^  pose         off the truth by 0\.[0-9]+ mm at the centre of the shape and [0-3](\.[0-9]+)? degrees between the open axis and the true one$'
 expect 0 - $torus turned.nii --json
 has '"rotation_sd_determined_rad": *\[0\.0'
 

@@ -117,8 +117,10 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
     if (in->cut) {
         advise_budget(in, v);
         return in->ended_early
-                   ? "Half of the budget, which is for the maps, was too short for data.start, "
-                     "though train.patience ended the steps early. The number of maps limits it"
+                   ? "The maps have half of the budget, which was too short for data.start of "
+                     "them, while the steps ended early (train.patience). The number of maps "
+                     "limits "
+                     "the model"
                    : "The time for maps was too short for data.start of them. Their number limits "
                      "the model";
     }

@@ -494,9 +494,9 @@ typedef struct sdm_fit_result {
     /* points: share of outliers, points that lie anywhere; other targets: 0 */
     double outliers;
     /* rigid motions that the target does not determine, such as "rotation about the axis (0, 0, 1)
-       through (1, 2, 3) mm" (LPS) of a shape that is symmetric about this axis; empty: none. The
-       fit leaves the pose where the search has it along these, and the covariance holds an angle
-       that may be any. With a prior of the rotation (translation) the prior decides */
+       through (1, 2, 3) mm" (LPS) of a shape that is symmetric about this axis; empty: none. Of
+       such an angle the pose has an arbitrary value, and its variance in the covariance is that of
+       any angle, pi^2 / 3. With a prior of the rotation (translation) the prior decides */
     char open_motions[512];
     /* keep_pose: what a fit from here with a free pose does: rms motion of the surface along its
        normal, mm, and gain in log posterior density, as of independent samples (about 3 for the

@@ -1,5 +1,6 @@
 /* Measures of a shape: those of the plug-in, then volume, area and extents from the mesh. */
 #include <math.h>
+#include <string.h>
 
 #include "sdm/internal/mesh_measures.h"
 #include "sdm/internal/part_audit.h"
@@ -117,4 +118,11 @@ sdm_status sdm_shape_measure(const sdm_instance *s, const double *p, const doubl
     status = add_those_of_mesh(s, p, out, err);
     if (status) out->n = 0;
     return status;
+}
+
+const sdm_measured *sdm_measures_find(const sdm_measures *m, const char *name)
+{
+    for (size_t i = 0; i < m->n; i++)
+        if (!strcmp(m->at[i].name, name)) return &m->at[i];
+    return NULL;
 }

@@ -142,6 +142,7 @@ sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const d
 typedef struct sdm_measured { const char *name, *unit, *help; double depth; double value; double sd; bool not_determined; } sdm_measured;
 typedef struct sdm_measures { size_t n; sdm_measured at[SDM_MEASURES_MAX]; } sdm_measures;
 sdm_status sdm_shape_measure(const sdm_instance *s, const double *p, const double *depths, size_t n_depths, sdm_measures *out, sdm_error *err);
+const sdm_measured *sdm_measures_find(const sdm_measures *m, const char *name);
 typedef enum sdm_voxel_type { SDM_VOXEL_UINT8 = 0, SDM_VOXEL_INT8 = 1, SDM_VOXEL_UINT16 = 2, SDM_VOXEL_INT16 = 3, SDM_VOXEL_UINT32 = 4, SDM_VOXEL_INT32 = 5, SDM_VOXEL_UINT64 = 6, SDM_VOXEL_INT64 = 7, SDM_VOXEL_FLOAT32 = 8, SDM_VOXEL_FLOAT64 = 9 } sdm_voxel_type;
 size_t sdm_voxel_size(sdm_voxel_type type);
 const char *sdm_voxel_name(sdm_voxel_type type);

@@ -35,7 +35,10 @@ static const sdm_measured *find(const sdm_measures *m, const char *name, double 
 
 static double value_of(const sdm_measures *m, const char *name)
 {
-    return find(m, name, NAN)->value;
+    const sdm_measured *x = sdm_measures_find(m, name);
+    if (!x) fail_msg("no measure '%s'", name);
+    assert_null(sdm_measures_find(m, "weight"));
+    return x->value;
 }
 
 static void near_to(const char *what, double found, double want, double bound)

@@ -138,6 +138,10 @@ typedef struct sdm_measures {
 SDM_API sdm_status sdm_shape_measure(const sdm_instance *s, const double *p, const double *depths,
                                      size_t n_depths, sdm_measures *out, sdm_error *err);
 
+/* The first measure of the list with this name, such as "volume"; NULL: there is none. It belongs
+ * to the list. [any thread] */
+SDM_API const sdm_measured *sdm_measures_find(const sdm_measures *m, const char *name);
+
 #ifdef __cplusplus
 }
 #endif

@@ -6,7 +6,7 @@
  *                         sdm/memory.h          sdm_alloc(), sdm_free()
  *                         sdm/export.h          version of the headers
  *   a shape               sdm/shape.h           the table of a shape, for authors of plug-ins
- *                         sdm/registry.h        shapes by name; the mesh at given parameters
+ *                         sdm/registry.h        shapes by name; mesh and measures at parameters
  *                         sdm/builtin_shapes.h  adds the built-in shapes to a registry
  *   a mesh                sdm/mesh.h            triangles; audit of a mesh
  *                         sdm/meshfile.h        .ply .stl .obj .off .vtk .vtp files

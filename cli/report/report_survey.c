@@ -281,9 +281,11 @@ static void tell_wound(teller *t)
     if (make(t->s, c->worst, &mesh, NULL) &&
         !sdm_part_audit_make(&mesh, !t->s->brief, &audit, NULL)) {
         sdm_text text = {0};
-        for (size_t i = 1; i < audit.n; i++)
-            if (sdm_survey_part_winding(&audit, i) > sdm_survey_part_winding(&audit, most))
-                most = i;
+        double turns = 0;
+        for (size_t i = 0; i < audit.n; i++) {
+            const double winding = sdm_survey_part_winding(&mesh, &audit, i);
+            if (winding > turns) turns = winding, most = i;
+        }
         cli_name_part(&audit, most, &text);
         sdm_text_add(&text,
                      "winds around its inside more than once: it encloses %.3g mm^3, %.3g times "
@@ -294,10 +296,10 @@ static void tell_wound(teller *t)
         add_share(t->s, c, &text);
         sdm_text_add(&text, ")");
         if (!t->s->found.scale.swings) add_degrees(t->s, &text);
-        // the mistake lies in mesh(), not in a parameter
-        if (!t->s->found.scale.degrees && !t->s->found.scale.swings && c->amount > 4)
-            sdm_text_add(&text, "; is an angle in degrees, such as 360 * j / n, given to cos() or "
-                                "sin()? These want rad");
+        // the mistake may lie in mesh(), not in a parameter
+        if (!t->s->found.scale.degrees && !t->s->found.scale.swings)
+            sdm_text_add(&text, "; does a tube go round more than once, or is an angle in degrees, "
+                                "such as 360 * j / n, given to cos() or sin()? These want rad");
         tell(t, sdm_survey_winds_wrongly(&t->s->found) ? SDM_E_QUALITY : SDM_OK, &text);
     }
     sdm_part_audit_dispose(&audit);

@@ -78,8 +78,10 @@ expect 4 'mend' sdmgen shapes check faulty -O fault=jump --plugin "$plugin" --sa
 has '"verdict": "warning".*"jumps": \[\{"kind": "jump", "parameter": "size", "value": [12]\.[0-9]+, "vertex": [0-9]+, "mm": 0\.125'
 
 # A part whose outline goes round three times, and pairs of its triangles that meet.
-faulty wound 4 '^warning +part 1 of 1 \(36 triangles, .*\) winds around its inside more than once: it encloses [0-9.]+ mm\^3, 2\.[0-9]+ times the volume that it fills, and [0-9]+ pairs of its triangles meet \(at size=[0-9.]+ reach=[0-9.]+; parts wind more than once in all 21 shapes\)$'
+faulty wound 4 '^warning +part 1 of 1 \(36 triangles, .*\) winds around its inside more than once: it encloses [0-9.]+ mm\^3, 2\.[0-9]+ times the volume that it fills, and [0-9]+ pairs of its triangles meet \(at size=[0-9.]+ reach=[0-9.]+; parts wind more than once in all 21 shapes\); does a tube go round more than once, or is an angle in degrees, such as 360 \* j / n, given to cos\(\) or sin\(\)\? These want rad$'
 has '^note +overlaps .*: the union counts; [0-9]+ of them within part 1 of 1 \(36 triangles, .* mm\) alone$'
+# In a shape of several parts as well, of which the others fill more than it does.
+faulty around 4 '^warning +part 2 of 2 \(36 triangles, .*\) winds around its inside more than once: it encloses [0-9.]+ mm\^3, 2\.[0-9]+ times the volume that it fills, .*; parts wind more than once in all 21 shapes\)'
 
 # Triangles that begin at a wrong vertex leave out vertices: the first line names the cause of the others.
 unused='belong to no triangle: is an offset of vertex indices wrong, so that triangles have vertices of another part\? If they are left over, remove them'
@@ -247,7 +249,7 @@ knob() {
 knob 0.017453292519943295
 expect 0 - sdmgen mesh --mesh knob.off --audit
 knob 1
-expect 4 'part 1 of 1 .* passes through itself, and [0-9.]+ % of its surface faces the wrong way: what lies behind that is missing; is the radius of a fillet larger than half of the thickness, a wall thicker than the part is wide, or an angle in degrees given to cos\(\) or sin\(\)\?$' \
+expect 4 'part 1 of 1 .* passes through itself, and [0-9.]+ % of its surface faces the wrong way: what lies behind that is missing; are two of its vertices exchanged, is the radius of a fillet larger than half of the thickness, a wall thicker than the part is wide, or an angle in degrees given to cos\(\) or sin\(\)\?$' \
     sdmgen mesh --mesh knob.off --audit
 
 # Several parts: all are named, once. Boxes along x, each overlapping the one before; those of which the digit is 1 are inside out.

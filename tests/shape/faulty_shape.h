@@ -20,7 +20,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
-     "meets|groups|crumb|spare|offset",
+     "meets|groups|crumb|spare|offset|around",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -38,21 +38,24 @@ static inline void faulty_box(sdm_mesh_out *out, size_t box, const double low[3]
     }
 }
 
-/* A prism whose outline, of 9 points, goes round three times: 20 vertices, 36 triangles. */
-static inline void faulty_wound(const double *p, sdm_mesh_out *out)
+/* A prism whose outline, of 9 points, goes round three times: 20 vertices, 36 triangles. They come
+ * after so many boxes. */
+static inline void faulty_wound(const double *p, size_t boxes, sdm_mesh_out *out)
 {
     enum { SIDES = 9 };
+    double *vert = out->vert + 24 * boxes;
     for (int i = 0; i < SIDES; i++)
         for (int end = 0; end < 2; end++) {
-            double *v = out->vert + 3 * (2 * i + end);
+            double *v = vert + 3 * (2 * i + end);
             const double angle = 2.0943951023931953 * i, r = p[0] * (1 + 0.05 * i);
             v[0] = r * cos(angle), v[1] = r * sin(angle), v[2] = end ? p[1] : -p[1];
         }
-    for (int i = 0; i < 6; i++) out->vert[6 * SIDES + i] = i % 3 < 2 ? 0 : i < 3 ? -p[1] : p[1];
+    for (int i = 0; i < 6; i++) vert[6 * SIDES + i] = i % 3 < 2 ? 0 : i < 3 ? -p[1] : p[1];
     for (uint32_t i = 0; i < SIDES; i++) {
         const uint32_t a = 2 * i, b = 2 * ((i + 1) % SIDES), low = 2 * SIDES;
         const uint32_t tri[12] = {a, b, b + 1, a, b + 1, a + 1, low, b, a, low + 1, a + 1, b + 1};
-        memcpy(out->tri + 12 * i, tri, sizeof tri);
+        for (size_t k = 0; k < 12; k++)
+            out->tri[36 * boxes + 12 * i + k] = (uint32_t)(8 * boxes) + tri[k];
     }
 }
 
@@ -106,9 +109,13 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "trained") && !access("trained/model.sdm", F_OK))
         return (host->fail)(host, "a model is there");
     if (is_large) faulty_process(fault);
-    if (!strcmp(fault, "wound")) {
-        const int none = host->reserve(host, out, 20, 36);
-        if (!none) faulty_wound(p, out);
+    if (!strcmp(fault, "wound") || !strcmp(fault, "around")) {
+        // alone, or around a box
+        const size_t box = !strcmp(fault, "around");
+        const int none = host->reserve(host, out, 8 * box + 20, 12 * box + 36);
+        const double corner[2][3] = {{-p[0], -p[0], -p[0]}, {p[0], p[0], p[0]}};
+        if (!none && box) faulty_box(out, 0, corner[0], corner[1], 0);
+        if (!none) faulty_wound(p, box, out);
         return none;
     }
     const int groups = !strcmp(fault, "groups"); // body and mast, handle and knob

@@ -262,6 +262,25 @@ static void a_part_without_volume(void **state)
     sdm_part_audit_dispose(&a);
 }
 
+// A box from which another one is subtracted encloses more than the union, and winds once.
+static void a_box_winds_once(void **state)
+{
+    (void)state;
+    double vert[48];
+    uint32_t tri[72];
+    sdm_mesh_out boxes = {.vert = vert, .tri = tri};
+    faulty_box(&boxes, 0, (const double[3]){-2, -2, -2}, (const double[3]){2, 2, 2}, 0);
+    faulty_box(&boxes, 1, (const double[3]){0, -1, -1}, (const double[3]){2.5, 1, 1}, 1);
+    const sdm_mesh m = {.vert = vert, .tri = tri, .n_vert = 16, .n_tri = 24};
+    sdm_part_audit a;
+    if (sdm_part_audit_make(&m, true, &a, &err)) fail_msg("%s", err.text);
+    assert_int_equal(a.n, 2);
+    assert_true(a.part[0].volume > SDM_SURVEY_WOUND * a.union_volume);
+    for (size_t i = 0; i < 2; i++) assert_true(sdm_survey_part_winding(&m, &a, i) == 0);
+    assert_true(fabs(sdm_part_filled(&m, &a, 0) - 64) < 1e-9);
+    sdm_part_audit_dispose(&a);
+}
+
 static void breaks_along_a_parameter(void **state)
 {
     (void)state;
@@ -641,6 +660,7 @@ int main(void)
         cmocka_unit_test(vertices_in_metres),
         cmocka_unit_test(a_part_in_metres),
         cmocka_unit_test(a_part_without_volume),
+        cmocka_unit_test(a_box_winds_once),
         cmocka_unit_test(breaks_along_a_parameter),
         cmocka_unit_test(a_step_moves_vertices),
         cmocka_unit_test(walls_that_pass_through_each_other),

@@ -13,8 +13,6 @@
 #include "sdm/memory.h"
 #include "union_hull.h"
 
-#define NO_PART UINT32_MAX
-
 /* Thicknesses are measured of at most so many parts: the debris of a segmentation has many. */
 enum { MEASURED = 1000 };
 
@@ -24,7 +22,6 @@ typedef struct job {
     sdm_mesh turned; /* the mesh with the orientation that the engine gives it */
     sdm_arena arena;
     sdm_survey survey; /* of `turned` */
-    uint32_t *part_of; /* [n_tri] index of the part; NO_PART: none */
     uint32_t *group;   /* [number of parts] a forest: parts that meet have the same root */
     sdm_part_audit *out;
 } job;
@@ -38,7 +35,7 @@ static bool same_triangle(const sdm_mesh *a, const sdm_mesh *b, size_t t)
  * which not as many triangles run one way as the other. */
 static void join_open_sides(const sdm_topology *topo, const sdm_edge *e, uint32_t *root)
 {
-    uint32_t open = NO_PART;
+    uint32_t open = SDM_NO_PART;
     for (uint32_t h = e->first; h != SDM_NONE; h = topo->next[h]) {
         const uint32_t part = sdm_forest_root(root, h / 3);
         int balance = 0;
@@ -46,7 +43,7 @@ static void join_open_sides(const sdm_topology *topo, const sdm_edge *e, uint32_
             if (sdm_forest_root(root, g / 3) == part)
                 balance += topo->tri[g] == e->lo ? 1 : -1; // the corner at which g begins
         if (!balance) continue;
-        if (open != NO_PART) sdm_forest_join(root, open, part);
+        if (open != SDM_NO_PART) sdm_forest_join(root, open, part);
         open = part;
     }
 }
@@ -75,7 +72,7 @@ static sdm_status number_parts(job *j, sdm_error *err)
     sdm_part_audit *a = j->out;
     uint32_t *root = NULL;
     sdm_status s = SDM_ALLOC(&root, n_tri, "parts", err);
-    if (!s) s = SDM_ALLOC(&j->part_of, n_tri, "parts", err);
+    if (!s) s = SDM_ALLOC(&a->part_of, n_tri, "parts", err);
     size_t n = 0;
     if (!s) find_shells(&j->survey.topo, root);
     for (size_t t = 0; t < n_tri && !s; t++) n += root[t] == t;
@@ -85,11 +82,11 @@ static sdm_status number_parts(job *j, sdm_error *err)
         for (uint32_t t = 0; t < n_tri; t++) {
             const uint32_t r = sdm_forest_root(root, t);
             if (r != t) {
-                j->part_of[t] = j->part_of[r];
+                j->out->part_of[t] = j->out->part_of[r];
             } else if (sdm_repeats_vertex(&j->survey.topo.tri[3 * (size_t)t])) {
-                j->part_of[t] = NO_PART;
+                j->out->part_of[t] = SDM_NO_PART;
             } else {
-                j->part_of[t] = (uint32_t)a->n;
+                j->out->part_of[t] = (uint32_t)a->n;
                 a->part[a->n++] = (sdm_part){.first_tri = t,
                                              .first_vert = SIZE_MAX,
                                              .min = {INFINITY, INFINITY, INFINITY},
@@ -127,8 +124,8 @@ static void measure_parts(job *j)
 {
     const sdm_mesh *m = j->given;
     for (size_t t = 0; t < m->n_tri; t++) {
-        if (j->part_of[t] == NO_PART) continue;
-        sdm_part *p = &j->out->part[j->part_of[t]];
+        if (j->out->part_of[t] == SDM_NO_PART) continue;
+        sdm_part *p = &j->out->part[j->out->part_of[t]];
         p->n_tri++;
         for (size_t k = 0; k < 3; k++) {
             const size_t v = m->tri[3 * t + k];
@@ -142,8 +139,8 @@ static void measure_parts(job *j)
     }
     // relative to the middle of each part, so that no digits are lost
     for (size_t t = 0; t < m->n_tri; t++) {
-        if (j->part_of[t] == NO_PART) continue;
-        sdm_part *p = &j->out->part[j->part_of[t]];
+        if (j->out->part_of[t] == SDM_NO_PART) continue;
+        sdm_part *p = &j->out->part[j->out->part_of[t]];
         double middle[3];
         for (size_t d = 0; d < 3; d++) middle[d] = 0.5 * (p->min[d] + p->max[d]);
         sdm_triangle_add(m, t, middle, &p->area, &p->volume);
@@ -179,9 +176,9 @@ static void count_meeting(job *j, uint32_t a, uint32_t b)
 /* Counts the triangles of edge e that lie beside those of another part. */
 static void count_shared_edge(job *j, const sdm_edge *e)
 {
-    const uint32_t *next = j->survey.topo.next, part = j->part_of[e->first / 3];
+    const uint32_t *next = j->survey.topo.next, part = j->out->part_of[e->first / 3];
     for (uint32_t h = next[e->first]; h != SDM_NONE; h = next[h]) {
-        const uint32_t other = j->part_of[h / 3];
+        const uint32_t other = j->out->part_of[h / 3];
         if (other == part) continue;
         count_meeting(j, part, other);
         count_meeting(j, other, part);
@@ -238,16 +235,16 @@ static void count_edges_and_contacts(job *j)
         const sdm_edge *e = &topo->edges[i];
         if (e->n_up + e->n_down > 2) count_shared_edge(j, e);
         if (e->n_up == e->n_down) continue;
-        sdm_part *p = &j->out->part[j->part_of[e->first / 3]];
+        sdm_part *p = &j->out->part[j->out->part_of[e->first / 3]];
         const double *lo = j->given->vert + 3 * (size_t)e->lo,
                      *hi = j->given->vert + 3 * (size_t)e->hi;
         for (int d = 0; d < 3 && !p->open_edges; d++) p->open_at[d] = 0.5 * (lo[d] + hi[d]);
         p->open_edges++;
     }
     for (size_t i = 0; i < contacts->n; i++) {
-        const uint32_t a = j->part_of[contacts->list[i].tri],
-                       b = j->part_of[contacts->list[i].other];
-        if (a == NO_PART || b == NO_PART) continue;
+        const uint32_t a = j->out->part_of[contacts->list[i].tri],
+                       b = j->out->part_of[contacts->list[i].other];
+        if (a == SDM_NO_PART || b == SDM_NO_PART) continue;
         if (a != b)
             count_meeting(j, a, b);
         else if (contacts->list[i].tri < contacts->list[i].other) // the list has each pair twice
@@ -337,16 +334,16 @@ static sdm_status measure_thickness(job *j, sdm_error *err)
     sdm_part_audit *a = j->out;
     const size_t n = a->n < MEASURED ? a->n : MEASURED;
     if (!a->mesh.closed) return SDM_OK;
-    const sdm_status s = sdm_part_folds(&j->turned, &j->survey.tree, j->part_of, a->part, n, err);
+    const sdm_status s =
+        sdm_part_folds(&j->turned, &j->survey.tree, j->out->part_of, a->part, n, err);
     if (s) return s;
-    return sdm_part_thickness(&j->turned, &j->survey.tree, j->part_of, a->part, n, err);
+    return sdm_part_thickness(&j->turned, &j->survey.tree, j->out->part_of, a->part, n, err);
 }
 
 static void job_dispose(job *j)
 {
     sdm_arena_dispose(&j->arena);
     sdm_mesh_dispose(&j->turned);
-    sdm_free(j->part_of);
     sdm_free(j->group);
 }
 
@@ -369,7 +366,27 @@ sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audi
 void sdm_part_audit_dispose(sdm_part_audit *a)
 {
     sdm_free(a->part);
+    sdm_free(a->part_of);
     *a = (sdm_part_audit){0};
+}
+
+double sdm_part_filled(const sdm_mesh *m, const sdm_part_audit *a, size_t index)
+{
+    if (a->n == 1) return a->union_volume;
+    sdm_mesh alone = {.vert = m->vert, .n_vert = m->n_vert};
+    sdm_part_audit audit = {.union_volume = NAN};
+    job j = {.given = &alone, .out = &audit};
+    sdm_status s = SDM_ALLOC(&alone.tri, 3 * a->part[index].n_tri, "triangles of a part", NULL);
+    for (size_t t = 0; t < m->n_tri && !s; t++)
+        if (a->part_of[t] == index)
+            memcpy(alone.tri + 3 * alone.n_tri++, m->tri + 3 * t, 3 * sizeof *m->tri);
+    if (!s) s = find_parts(&j, NULL);
+    if (!s) s = measure_union(&j, NULL);
+    const double volume = s ? NAN : audit.union_volume;
+    job_dispose(&j);
+    sdm_part_audit_dispose(&audit);
+    sdm_free(alone.tri);
+    return volume;
 }
 
 size_t sdm_part_audit_thinnest(const sdm_part_audit *a)
@@ -397,8 +414,8 @@ sdm_status sdm_mesh_turn_parts(sdm_mesh *m, size_t *n, sdm_error *err)
     *n = 0;
     const sdm_status s = find_parts(&j, err);
     for (size_t t = 0; t < m->n_tri && !s; t++) {
-        if (j.part_of[t] == NO_PART) continue;
-        sdm_part *p = &audit.part[j.part_of[t]];
+        if (audit.part_of[t] == SDM_NO_PART) continue;
+        sdm_part *p = &audit.part[audit.part_of[t]];
         // an inside-out part that the engine turns with the whole mesh is right as it is given
         if (p->turned == (p->state == SDM_PART_INSIDE_OUT)) continue;
         sdm_triangle_turn(m, t);

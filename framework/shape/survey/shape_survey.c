@@ -103,13 +103,14 @@ double sdm_survey_part_lengths(const sdm_part_audit *a, size_t *shortest, size_t
     return most > least ? most / least : 0;
 }
 
-double sdm_survey_part_winding(const sdm_part_audit *a, size_t i)
+double sdm_survey_part_winding(const sdm_mesh *m, const sdm_part_audit *a, size_t i)
 {
     const sdm_part *p = &a->part[i];
-    double most = a->union_volume;
+    double most = (p->max[0] - p->min[0]) * (p->max[1] - p->min[1]) * (p->max[2] - p->min[2]);
+    if (p->state != SDM_PART_SOLID || !p->crossed) return 0;
     // fmin() ignores NaN
-    most = fmin(most, (p->max[0] - p->min[0]) * (p->max[1] - p->min[1]) * (p->max[2] - p->min[2]));
-    return p->state == SDM_PART_SOLID && most > 0 ? fabs(p->volume) / most : 0;
+    if (isfinite(a->union_volume)) most = fmin(most, sdm_part_filled(m, a, i));
+    return most > 0 ? fabs(p->volume) / most : 0;
 }
 
 bool sdm_survey_winds_wrongly(const sdm_shape_survey *s)
@@ -134,7 +135,7 @@ static sdm_status examine(const sdm_instance *shape, const sdm_survey_opts *opts
         out->turned += audit.part[i].turned && audit.part[i].volume < 0;
         out->crossed += audit.part[i].crossed;
         out->flat += sdm_survey_part_is_flat(&audit, i);
-        out->winding = fmax(out->winding, sdm_survey_part_winding(&audit, i));
+        out->winding = fmax(out->winding, sdm_survey_part_winding(m, &audit, i));
         out->turned_over = fmax(out->turned_over, audit.part[i].folded);
     }
     size_t shortest, longest;

@@ -66,12 +66,16 @@ typedef struct sdm_part {
 /* A larger share is a mistake; tubes that bend sharply have a smaller one. */
 #define SDM_PART_FOLDED_MIN 0.03
 
+/* In place of the index of a part: the triangle repeats a vertex. */
+#define SDM_NO_PART UINT32_MAX
+
 /* Zero-initialise; sdm_part_audit_dispose() frees. */
 typedef struct sdm_part_audit {
     sdm_audit mesh; /* of the whole mesh as given */
     bool turned;    /* the mesh as a whole is inside out, so the engine turns all of it */
     sdm_part *part; /* [n], by their lowest triangle; triangles that repeat a vertex have no part */
     size_t n;
+    uint32_t *part_of; /* [mesh.n_tri] index of the part of a triangle, or SDM_NO_PART */
     /* vertices of no triangle, and the indices of the first run of them: with a wrong offset of
      * vertex indices the triangles of a part use vertices of another one and leave out its own */
     size_t unused, unused_first, unused_last;
@@ -98,6 +102,11 @@ void sdm_triangle_add(const sdm_mesh *m, size_t t, const double apex[3], double 
 /* *volume (mm^3) and *area (mm^2) = the sums over all triangles of the mesh; overlaps count twice.
  */
 void sdm_mesh_sums(const sdm_mesh *m, double *volume, double *area);
+
+/* Volume, mm^3, of the union of part `index` alone: what it winds around more than once counts
+ * once. NaN: the part is open, memory is short, or it is the only one and the audit is without the
+ * union. [any thread] */
+double sdm_part_filled(const sdm_mesh *m, const sdm_part_audit *a, size_t index);
 
 /* The smallest distance, mm, between the surfaces of the group of part `index` and those of all
  * other parts; negative: the group lies inside one of them. NaN: there is no other group, numbers

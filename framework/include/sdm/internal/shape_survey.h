@@ -219,12 +219,12 @@ bool sdm_survey_part_is_flat(const sdm_part_audit *a, size_t i);
  * parts. */
 double sdm_survey_part_lengths(const sdm_part_audit *a, size_t *shortest, size_t *longest);
 
-/* How often part i of an audited mesh winds around its inside, at least and on average: its volume
- * by the divergence theorem, divided by that of its box or, where it is known and smaller, by that
- * of the union. 0: the part is not solid. It counts above SDM_SURVEY_WOUND; the turns of a spiral
- * may overlap, but above SDM_SURVEY_WOUND_MAX, or if a parameter is sdm_survey_is_degree(), it is a
- * mistake. */
-double sdm_survey_part_winding(const sdm_part_audit *a, size_t i);
+/* How often part i of the mesh m, which was audited, winds around its inside, at least and on
+ * average: its volume by the divergence theorem, divided by that of its box or, if the audit has
+ * the union, by the volume that the part fills. 0: the part is not solid, or its triangles do not
+ * meet. It counts above SDM_SURVEY_WOUND; the turns of a spiral may overlap, but above
+ * SDM_SURVEY_WOUND_MAX, or if a parameter is sdm_survey_is_degree(), it is a mistake. */
+double sdm_survey_part_winding(const sdm_mesh *m, const sdm_part_audit *a, size_t i);
 #define SDM_SURVEY_WOUND 1.1
 #define SDM_SURVEY_WOUND_MAX 2.0
 

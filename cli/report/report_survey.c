@@ -675,8 +675,8 @@ static void tell_callbacks(teller *t)
     }
 }
 
-/* Appends "; 12 of them within part 1 of 2 (...) alone" about the part of shape `c->worst` that
- * meets itself most. */
+/* Appends "; 12 of them within part 1 of 2 (...) alone; ..." about the part of shape `c->worst`
+ * that meets itself most. */
 static void add_crossed(const teller *t, const sdm_survey_count *c, sdm_text *text)
 {
     sdm_part_audit audit;
@@ -689,7 +689,10 @@ static void add_crossed(const teller *t, const sdm_survey_count *c, sdm_text *te
             sdm_text_add(text, "; %.0f of them within ",
                          fmin((double)audit.part[most].crossed, c->amount));
             cli_name_part(&audit, most, text);
-            sdm_text_add(text, "alone");
+            sdm_text_add(text,
+                         "alone: exact --shape %s --certify -o x.nrrd, at these parameters, finds "
+                         "what faces the wrong way there",
+                         sdm_instance_shape(t->s->shape)->name);
         }
     }
     sdm_part_audit_dispose(&audit);

@@ -387,6 +387,25 @@ static void test_poles_exchanged(void **state)
     }
 }
 
+// The same where the cones are a small part of the disc, about the axis: 1.9 % of its surface.
+static void test_poles_exchanged_near_the_axis(void **state)
+{
+    (void)state;
+    for (int exchanged = 0; exchanged < 2; exchanged++) {
+        const double z = exchanged ? 2.5 : -2.5,
+                     outline[6][2] = {{0, z}, {6, -2.5}, {22, -2.5}, {22, 2.5}, {6, 2.5}, {0, -z}};
+        const sdm_mesh m = revolve(outline, 6);
+        sdm_part_audit a = audit_of(&m);
+        assert_int_equal(a.part[0].state, SDM_PART_SOLID);
+        const double folded = a.part[0].folded;
+        if (exchanged)
+            assert_true(folded > SDM_PART_FOLDED_MIN && folded < 0.03);
+        else
+            assert_true(folded == 0);
+        sdm_part_audit_dispose(&a);
+    }
+}
+
 // The same rim, of which one side lies in a box: the loop is a hole in the box. In two boxes at the
 // same place it harms nothing there.
 static void test_loop_in_another_part(void **state)
@@ -531,6 +550,7 @@ int main(void)
         cmocka_unit_test(test_walls_in_one_place),
         cmocka_unit_test(test_thickness_of_necks),
         cmocka_unit_test(test_outline_that_crosses_itself),
+        cmocka_unit_test(test_poles_exchanged_near_the_axis),
         cmocka_unit_test(test_loop_in_another_part),
         cmocka_unit_test(test_refusals),
     };

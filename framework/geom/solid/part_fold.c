@@ -14,7 +14,7 @@
 #include "sdm/memory.h"
 
 // Places on the surface of a part that are looked at.
-enum { PLACES = 1000 };
+enum { PLACES = 2000 };
 // Distance of the point in front of a place from it, over the longest edge of the box of the mesh.
 #define IN_FRONT 1e-6
 

@@ -63,8 +63,9 @@ typedef struct sdm_part {
     double folded;
 } sdm_part;
 
-/* A larger share is a mistake; tubes that bend sharply have a smaller one. */
-#define SDM_PART_FOLDED_MIN 0.03
+/* A larger share is a mistake; tubes that bend sharply have a smaller one: of the ducts whose
+ * section is free up to 0.0125. */
+#define SDM_PART_FOLDED_MIN 0.015
 
 /* In place of the index of a part: the triangle repeats a vertex. */
 #define SDM_NO_PART UINT32_MAX

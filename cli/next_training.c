@@ -167,14 +167,15 @@ void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_ti
 {
     // the verdict, with the changes of the other kind: none but the minutes
     const sdm_verdict pod = {.minutes = minutes};
-    const bool far = is_far(&r->verdict) && print_far(r), slow = print_slow(r, times);
+    const bool far = is_far(&r->verdict) && !r->unfinished && print_far(r),
+               slow = print_slow(r, times);
     if (!far && !slow) return;
     if (r->compared && r->other_path[0]) {
         printf("              pod is %s (%s)\n", r->other_path, sdm_grade_name(r->other_grade));
         return;
     }
     // the line `next` has the command
-    if (args->files.n && !sdm_verdict_needs_pod(&r->verdict))
+    if (args->files.n && !r->unfinished && !sdm_verdict_needs_pod(&r->verdict))
         print_command("              ", args, r, &pod, "pod");
 }
 
@@ -195,19 +196,45 @@ static void print_next_pod(const cli_args *args, const sdm_train_report *r, doub
     if (args->files.n) print_command("  next        ", args, r, &pod, "pod");
 }
 
+/* The line `next` or `better`, after `begin`, of a run of auto whose budget did not reach for the
+ * other kind: trains this one, on the grid that the verdict asks for. */
+static void print_finish(const char *begin, const cli_args *args, const sdm_train_report *r,
+                         double minutes)
+{
+    const sdm_verdict *v = &r->verdict;
+    const char *other = r->kind == SDM_NETWORK_POD ? "template" : "pod";
+    sdm_verdict changes = {.minutes = fmax(minutes, v->minutes), .cut = v->cut, .to = v->to};
+    if (!strncmp(v->key, "grid.", 5)) memcpy(changes.key, v->key, sizeof changes.key);
+    if (!args->files.n || !print_command(begin, args, r, &changes, other)) return;
+    printf("              (auto had no time left for %s", other);
+    if (r->tried)
+        printf(": its trial left %.2g mm within a voxel of the surface, %.2g mm everywhere, which "
+               "training improves",
+               r->other_voxel_mm, r->other.rmse_mm);
+    // trials and first training used one half
+    if (minutes > 0)
+        printf("; train.minutes=%.6g with auto compares both",
+               ceil(20 * fmax(minutes, r->seconds / 60)) / 10);
+    printf(")\n");
+}
+
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
                     double ms_map, double minutes)
 {
     const sdm_verdict *v = &r->verdict;
+    const char *begin = v->grade == SDM_GRADE_GOOD ? "  better      " : "  next        ";
+    // the maps of another grid are not in --dataset
+    const bool other_maps = args->dataset && (v->cut > 0 || !strncmp(v->key, "grid.", 5));
+    if (r->unfinished && !(v->inside_out > 0) && !other_maps) {
+        print_finish(begin, args, r, minutes);
+        return;
+    }
     if (sdm_verdict_needs_pod(v)) {
         print_next_pod(args, r, minutes);
         return;
     }
-    // the maps of another grid are not in --dataset
-    const bool other_maps = args->dataset && (v->cut > 0 || !strncmp(v->key, "grid.", 5));
     if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || other_maps) return;
-    const bool printed = print_command(
-        v->grade == SDM_GRADE_GOOD ? "  better      " : "  next        ", args, r, v, kind);
+    const bool printed = print_command(begin, args, r, v, kind);
     if (printed && kind && isfinite(ms_map))
         printf(
             "              (%s again, %.3g ms a map on this grid; network.kind=auto would choose "

@@ -231,7 +231,7 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
     if (!s) {
         const char *reason = decide(&e[0], &e[1], out);
         const entrant *other = out->kind[0] == e[0].kind ? &e[1] : &e[0];
-        out->tried_other = out->n == 1 && other->finished;
+        out->tried_other = other->finished;
         if (out->tried_other) out->other = other->errors;
         trainer_message(t, "auto: network.kind is %s: %s", trainer_turn_name(out->kind[0]), reason);
         for (size_t i = 0; i < 2; i++)

@@ -12,6 +12,7 @@
 #include "sdm/memory.h"
 #include "state/checkpoint.h"
 #include "state/export_model.h"
+#include "state/judge.h"
 #include "state/progress.h"
 #include "train_folder.h"
 #include "training.h"
@@ -83,9 +84,20 @@ static sdm_status train_turn(run *r, const trainer *common, bool *unfit, sdm_tra
     return s;
 }
 
+/* Adds the figures of the trial of the kind that was not trained. */
+static void report_trial(const training_turns *r, sdm_train_report *report)
+{
+    if (!r->tried_other) return;
+    report->tried = true;
+    report->other = (sdm_accuracy){.rmse_mm = r->other.rmse_mm};
+    report->other_voxel_mm = r->other.rmse_voxel_mm;
+    report->other_ms = r->other.map_ms;
+    report->other_kind = r->other.kind;
+}
+
 /* Tells and records that the second kind is trained now: it is its turn then. It is not if hardly
- * any of the budget is left. */
-static sdm_status begin_second(run *r, const trainer *t, sdm_error *err)
+ * any of the budget is left, which *report tells. */
+static sdm_status begin_second(run *r, const trainer *t, sdm_train_report *report, sdm_error *err)
 {
     const double left = trainer_turns_left(&r->turns, r->asked);
     const char *first = trainer_turn_name(r->turns.kind[0]),
@@ -93,6 +105,9 @@ static sdm_status begin_second(run *r, const trainer *t, sdm_error *err)
     if (left < ENOUGH_LEFT) {
         trainer_message(t, "auto: %s is kept: hardly any of the budget is left for %s", first,
                         second);
+        report->unfinished = true;
+        report_trial(&r->turns, report);
+        trainer_verdict_unfinished(first, second, &report->verdict);
         return SDM_OK;
     }
     const turn_figures figures = trainer_turn_figures(r->turns.kind[0], &r->turns.first);
@@ -157,6 +172,7 @@ static sdm_status train_second(run *r, trainer *t, sdm_train_report *report, sdm
     trainer_warn(t, "auto: %s is kept, because %s failed: %s", trainer_turn_name(r->turns.kind[0]),
                  trainer_turn_name(r->turns.kind[1]), reason.text);
     *report = r->turns.first;
+    report_trial(&r->turns, report);
     return trainer_checkpoint_remove(t, err);
 }
 
@@ -167,16 +183,10 @@ static sdm_status train_all(run *r, trainer *t, sdm_train_report *report, sdm_er
     sdm_status s = settle(r, t, err);
     if (!s && r->turns.at == 0) {
         s = train_turn(r, t, &unfit, report, err);
-        if (!s && r->turns.tried_other) {
-            report->tried = true;
-            report->other = (sdm_accuracy){.rmse_mm = r->turns.other.rmse_mm};
-            report->other_voxel_mm = r->turns.other.rmse_voxel_mm;
-            report->other_ms = r->turns.other.map_ms;
-            report->other_kind = r->turns.other.kind;
-        }
+        if (!s && r->turns.n == 1) report_trial(&r->turns, report);
         if (s || r->turns.n == 1) return s;
         r->turns.first = *report;
-        s = begin_second(r, t, err);
+        s = begin_second(r, t, report, err);
     }
     return s || r->turns.at == 0 ? s : train_second(r, t, report, err);
 }

@@ -200,7 +200,7 @@ static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *s
         char advice[96] = "";
         if (trained || !map->thin)
             snprintf(advice, sizeof advice, "; about %.0f %% for this shape with %s%.2g",
-                     100 * SDM_VOLUME_BAD, trained ? "a training with grid.spacing " : "--spacing ",
+                     100 * SDM_VOLUME_AIM, trained ? "a training with grid.spacing " : "--spacing ",
                      sdm_spacing_for_volume(cuts, fabs(more)));
         cli_warn(
             "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "

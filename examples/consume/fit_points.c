@@ -1,7 +1,9 @@
 /* Example of a fit in C: reads points on a surface, fits the shape of a model to them, and prints
- * the parameters with their standard deviations, the pose and the verdict. The fit begins at the
- * middle of the points with the shape's default parameters and tries 60 rotations.
+ * the parameters and the pose with their standard deviations, what the points do not determine, and
+ * the verdict. The fit begins at the middle of the points with the shape's default parameters and
+ * tries 60 rotations.
  * Usage: fit_points MODEL POINTS.csv [PLUGIN.so]
+ * PLUGIN.so: the plug-in of the shape, which a model of a shape that is not built in needs here.
  * POINTS.csv: a header, then x,y,z in each line (mm). Exit code 4: the fit is not to be trusted. */
 #include <stdio.h>
 
@@ -32,11 +34,16 @@ static void print_fit(const sdm_model_info *info, const sdm_fit_result *r)
 {
     static const char *const GRADES[] = {"passed", "doubtful", "FAILED"};
     for (size_t i = 0; i < info->n_params; i++)
-        printf("%s = %.5g +- %.2g %s\n", info->params[i].name, r->params[i], r->sd[i],
-               info->params[i].unit);
-    printf("rotation %.5g %.5g %.5g rad, translation %.5g %.5g %.5g mm\n", r->pose.rotation[0],
-           r->pose.rotation[1], r->pose.rotation[2], r->pose.translation[0], r->pose.translation[1],
-           r->pose.translation[2]);
+        printf("%s = %.5g +- %.2g %s%s%s\n", info->params[i].name, r->params[i], r->sd[i],
+               info->params[i].unit, r->by_prior[i] ? ", not determined" : "",
+               r->at_bound[i] ? ", at an end of its range: +- does not hold" : "");
+    // with deviations that leave out the motions which the points do not determine
+    const double *turn = r->pose.rotation, *move = r->pose.translation, *sd = r->pose_sd_determined;
+    printf("rotation %.5g %.5g %.5g +- %.2g %.2g %.2g rad\n", turn[0], turn[1], turn[2], sd[0],
+           sd[1], sd[2]);
+    printf("translation %.5g %.5g %.5g +- %.2g %.2g %.2g mm\n", move[0], move[1], move[2], sd[3],
+           sd[4], sd[5]);
+    if (r->open_motions[0]) printf("not determined: %s\n", r->open_motions);
     printf("verdict: %s\n", GRADES[r->verdict.grade]);
     for (size_t i = 0; i < r->verdict.n_findings; i++) {
         const sdm_fit_finding *f = &r->verdict.findings[i];
@@ -61,9 +68,15 @@ static sdm_status fit_points(const sdm_model *model, const sdm_instance *shape, 
     target.points = points;
     for (size_t i = 0; i < target.n_points && !s; i++)
         for (size_t a = 0; a < 3; a++) middle[a] += points[3 * i + a] / (double)target.n_points;
+    // Points of a part of the shape need a better start: set `middle` to the place of the shape's
+    // middle, and a rotation that is known so (axis times angle in rad, here 90 degrees about z):
+    //     opts.turns = SDM_FIT_TURNS_NONE;
+    //     opts.start_pose.rotation[2] = 1.5708;
     if (!s) s = sdm_fit_centre(&source, NULL, opts.pivot, err); // the middle of the shape ...
+    double at[3];
+    sdm_pose_apply(&opts.start_pose, opts.pivot, at);
     for (int a = 0; a < 3; a++) // ... starts at the middle of the points
-        opts.start_pose.translation[a] = middle[a] - opts.pivot[a];
+        opts.start_pose.translation[a] = middle[a] - at[a];
     if (!s) s = sdm_fit(&source, &target, &opts, &result, err);
     if (result.params) print_fit(info, &result); // also of a fit that is refused
     sdm_fit_dispose(&result);

@@ -26,6 +26,12 @@ status=$?
 { [ $status = 0 ] || [ $status = 4 ]; } || bad "fit_points ends with $status: $(cat err)"
 near "$(sed -n 's/^a = \([^ ]*\) +- .* mm$/\1/p' fitted)" 4.2 0.3
 grep -qE '^verdict: (passed|doubtful|FAILED)$' fitted || bad "no verdict: $(cat fitted)"
+grep -qE '^rotation( [-0-9.e]+){3} \+-( [-0-9.e]+|nan){3} rad$' fitted || bad "no deviations of the pose: $(cat fitted)"
+grep -qE '^translation( [-0-9.e]+){3} \+-( [-0-9.e]+|nan){3} mm$' fitted || bad "no deviations of the pose: $(cat fitted)"
+# points of a part: what they do not determine is told
+(head -n 1 points.csv; tail -n +2 points.csv | sort -t, -g -k3 | head -n 30) >part.csv
+by-cmake/fit_points $model part.csv >fitted 2>err
+grep -qE '^[a-z]+ = .*, (not determined|at an end of its range: \+- does not hold)' fitted || bad "a part determines all: $(cat fitted)"
 expect 1 '^fit_points: missing\.csv: no such file' by-cmake/fit_points $model missing.csv
 
 pc=$(dirname "$(find prefix -name sdmgen.pc)")

@@ -163,6 +163,11 @@ has '"other": \{"kind": "(pod|template)", .*"ms_network": [0-9.e-]+, "grade": "[
 sdmgen train link.yaml data.start=300 data.memory_gb=6 train.steps=0 train.minutes=0.0001 --out both --force >out 2>err || bad "hurried: $(cat err)"
 grep -Eq '^sdmgen: the run will take longer than train.minutes \(0.0001\): a trial of network.kind: auto makes at least [0-9]+ maps, which takes about ' err ||
     bad "no word about the trials ahead: $(cat err)"
+# hardly any of the budget is left for the other kind: the verdict says so, and the command trains that kind
+has '^  verdict     network\.kind: auto has compared template with a trial of pod alone, for whose training no time was left: pod may be better, near the surface, too\. '
+[ "$(grep -c 'nothing to change\|has not measured it' out)" -eq 0 ] || bad "an unfinished comparison: $(cat out)"
+has '^  (next|better) +sdmgen train link\.yaml .*train\.minutes=0\.0001 network\.kind=pod --out both-2$'
+has '^              \(auto had no time left for pod: its trial left [0-9.]+ mm within a voxel of the surface, [0-9.]+ mm everywhere, which training improves; train\.minutes=[0-9.]+ with auto compares both\)$'
 rm -r both
 expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 --out both --quiet --json
 # A model that --force replaces is compared if its shape, ranges and grid are the same. With the kind given, the command names none.

@@ -411,10 +411,10 @@ static void uses_and_spacing(void **state)
     assert_string_equal(
         sdm_grade_text(&v, text),
         "for level sets, surfaces and fits to images with voxels of 0.8 mm or more");
-    assert_true(fabs(sdm_verdict_spacing(&v) - 0.59) < 1e-9);
+    assert_true(fabs(sdm_verdict_spacing(&v) - 0.46) < 1e-9);
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "volumes of surfaces (.stl): off by 2.9 %, voxels of 0.8 mm cut "
-                               "edges and thin parts; about 2 % with grid.spacing 0.59 (root mean "
+                               "edges and thin parts; about 1 % with grid.spacing 0.46 (root mean "
                                "square of the shapes)\n");
     // one rule for the shapes of a training and for a single shape
     assert_true(sdm_spacing_for_volume(0.8, 0.029) == sdm_verdict_spacing(&v));

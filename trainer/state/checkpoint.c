@@ -333,10 +333,10 @@ static bool report_is_sound(const sdm_train_report *r)
     return r->steps >= 0 && r->seconds >= 0 && ends(r->model_path, sizeof r->model_path) &&
            ends(r->other_path, sizeof r->other_path) &&
            (unsigned)r->other_grade <= SDM_GRADE_POOR && is_bool(&r->compared) &&
-           is_bool(&r->tried) && is_bool(&r->chosen) && is_bool(&v->limited) &&
-           (unsigned)v->grade <= SDM_GRADE_POOR && (unsigned)v->limit < SDM_CAUSES &&
-           ends(v->key, sizeof v->key) && ends(v->triangles_by, sizeof v->triangles_by) &&
-           ends(v->sentence, sizeof v->sentence);
+           is_bool(&r->tried) && is_bool(&r->unfinished) && is_bool(&r->chosen) &&
+           is_bool(&v->limited) && (unsigned)v->grade <= SDM_GRADE_POOR &&
+           (unsigned)v->limit < SDM_CAUSES && ends(v->key, sizeof v->key) &&
+           ends(v->triangles_by, sizeof v->triangles_by) && ends(v->sentence, sizeof v->sentence);
 }
 
 /* Reads the turns of a run with two kinds. */

@@ -364,6 +364,24 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
     tell_few(v);
 }
 
+void trainer_verdict_unfinished(const char *own, const char *other, sdm_verdict *v)
+{
+    char rest[sizeof v->sentence];
+    if (v->inside_out > 0) return;
+    if (v->limited && v->limit == SDM_CAUSE_FAR) {
+        snprintf(v->sentence, sizeof v->sentence,
+                 "Far from the surface the %s only estimates distances%s.", own,
+                 sdm_verdict_errs_near(v) ? ", and near the surface it errs, too" : "");
+        if (v->cut > 0) tell_cut(v);
+        tell_few(v);
+    }
+    memcpy(rest, v->sentence, sizeof rest);
+    snprintf(v->sentence, sizeof v->sentence,
+             "network.kind: auto has compared %s with a trial of %s alone, for whose training no "
+             "time was left: %s may be better, near the surface, too. %.340s",
+             own, other, other, rest);
+}
+
 /* Distributes the error of the model over its causes. What a template leaves besides its correction
  * is divided as the whole error is between the voxels near the surface and the others. */
 static void set_parts(const error_measures *m, const model_errors *errors, double mse,

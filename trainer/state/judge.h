@@ -41,3 +41,7 @@ typedef struct verdict_input {
 
 /* Sets grade, limit, key, values and sentence from the figures in *v. */
 void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v);
+
+/* The sentence becomes that of a run that had no time to train `other`, too, after `own`: what
+   limits its model says nothing about whether the other kind is better. */
+void trainer_verdict_unfinished(const char *own, const char *other, sdm_verdict *v);

@@ -20,7 +20,7 @@ typedef struct training_turns {
     double share;             /* part of the budget left by the trials that the first of two may
                                  use, 0 .. 1 */
     sdm_train_report first;   /* result of the first, while the second trains */
-    bool tried_other;         /* one kind is trained, but the other had a trial: */
+    bool tried_other;         /* the kind that is not trained, or trained later, had a trial: */
     turn_figures other;       /* its errors in the trial */
 } training_turns;
 

@@ -124,7 +124,7 @@ static double rounded_down(double spacing)
 double sdm_spacing_for_volume(double spacing, double off)
 {
     // the volume that edges and thin walls lose is about quadratic in the spacing
-    return rounded_down(0.9 * sqrt(SDM_VOLUME_BAD / off) * spacing);
+    return rounded_down(sqrt(SDM_VOLUME_AIM / off) * spacing);
 }
 
 double sdm_verdict_fit_spacing(const sdm_verdict *v)

@@ -59,7 +59,7 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
         add(l,
             "volumes of surfaces (.stl): off by %s %%, voxels of %.3g mm cut edges and thin parts; "
             "about %.0f %% with grid.spacing %.2g (root mean square of the shapes)",
-            percent(v->surface_volume_error, text), v->coarse_mm, 100 * SDM_VOLUME_BAD, spacing);
+            percent(v->surface_volume_error, text), v->coarse_mm, 100 * SDM_VOLUME_AIM, spacing);
     else if (sdm_verdict_surfaces_off(v))
         add(l, "volumes of surfaces (.stl): off by %s %%", percent(v->surface_volume_error, text));
     const double finer = sdm_verdict_fit_spacing(v);

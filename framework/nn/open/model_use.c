@@ -15,25 +15,31 @@ static int digits_over(double error, double bad)
     return n;
 }
 
-/* A parameter and the error of its derivatives in per cent, as the training printed them. */
+/* What is known of the parameter with the largest error. */
 typedef struct worst_param {
-    char name[64], percent[16];
+    char name[64];     /* "the worst parameter" where it is not known */
+    const char *lines; /* else the first line of `unfit` about these derivatives; NULL: none */
 } worst_param;
 
-/* *out = the first parameter of the line of `unfit` that begins with `begin`. Returns whether there
- * is one. */
-static bool find_worst(const char *unfit, const char *begin, worst_param *out)
+/* The parameter whose derivatives have this error: the first of the line of `unfit` that begins
+ * with `begin`, if its error there is the same; an error of the derivative's own size is not. */
+static worst_param find_worst(const char *unfit, const char *begin, double error)
 {
-    static const char off[] = ": off by ";
-    const char *name = strstr(unfit, begin), *error = name ? strstr(name, off) : NULL,
-               *end = error ? strstr(error, " %") : NULL;
-    if (!end) return false;
-    name += strlen(begin);
-    error += strlen(off);
-    if (end < error || error < name) return false;
-    snprintf(out->name, sizeof out->name, "%.*s", (int)(error - name - (long)strlen(off)), name);
-    snprintf(out->percent, sizeof out->percent, "%.*s", (int)(end - error), error);
-    return true;
+    worst_param worst = {.name = "the worst parameter", .lines = strstr(unfit, begin)};
+    const char *name = worst.lines ? worst.lines + strlen(begin) : NULL,
+               *end = name ? strstr(name, ": off by ") : NULL;
+    char same[48];
+    if (!end) return worst;
+    if (error > 10)
+        snprintf(same, sizeof same, ": off by over 1000 %%");
+    else
+        snprintf(same, sizeof same, ": off by %.0f %%", 100 * error);
+    const size_t n = strlen(same);
+    if (strncmp(end, same, n) || !strncmp(end + n, " of their own", strlen(" of their own")))
+        return worst;
+    snprintf(worst.name, sizeof worst.name, "%.*s", (int)(end - name), name);
+    worst.lines = NULL;
+    return worst;
 }
 
 static sdm_status check_grade(const sdm_model_quality *q, sdm_error *err)
@@ -96,13 +102,14 @@ sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error 
         return sdm_fail(err, SDM_E_UNSUPPORTED, "the training did not measure the errors of %s",
                         f->name);
     if (f->error <= f->bad) return SDM_OK;
-    worst_param worst = {.name = "the worst parameter"};
-    const bool named = f->lines && find_worst(q->unfit, f->lines, &worst);
-    // a figure that rounding has made equal to the bound does not exceed it
-    if (!named || strtod(worst.percent, NULL) == 100 * f->bad)
-        snprintf(worst.percent, sizeof worst.percent, "%.*f", digits_over(f->error, f->bad),
-                 100 * f->error);
-    return sdm_fail(err, SDM_E_QUALITY, "%s are off by %s %%%s%s, more than %g %%%s", f->name,
-                    worst.percent, f->lines ? " for " : "", f->lines ? worst.name : "",
-                    100 * f->bad, f->remedy);
+    char percent[32] = "over 1000";
+    if (!f->lines || f->error <= 10)
+        snprintf(percent, sizeof percent, "%.*f", digits_over(f->error, f->bad), 100 * f->error);
+    worst_param worst = {.name = ""};
+    if (f->lines) worst = find_worst(q->unfit, f->lines, f->error);
+    return sdm_fail(err, SDM_E_QUALITY, "%s are off by %s %%%s%s, more than %g %%%s%s%.*s", f->name,
+                    percent, f->lines ? " for " : "", worst.name, 100 * f->bad, f->remedy,
+                    worst.lines ? "; the training found " : "",
+                    worst.lines ? (int)strcspn(worst.lines, "\n") : 0,
+                    worst.lines ? worst.lines : "");
 }

@@ -88,6 +88,8 @@ typedef struct sdm_train_report {
     /* It has only tried another kind, in a short trial: other_kind, other.rmse_mm, other_voxel_mm
        and other_ms are of this. */
     bool tried;
+    /* The other kind was to be trained, too, but hardly any of the budget was left. */
+    bool unfinished;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled

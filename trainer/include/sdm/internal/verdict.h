@@ -176,9 +176,12 @@ double sdm_verdict_fit_spacing(const sdm_verdict *v);
    thread] */
 double sdm_verdict_spacing(const sdm_verdict *v);
 
-/* The spacing, mm, with which surfaces enclose volumes that are off by a little less than
-   SDM_VOLUME_BAD, where with `spacing` they are off by `off` > 0 of the volume, because voxels cut
-   edges and thin walls. Rounded down to two digits. [any thread] */
+/* The error of volumes that advice aims at: well below SDM_VOLUME_BAD. */
+#define SDM_VOLUME_AIM 0.01
+
+/* The spacing, mm, with which surfaces enclose volumes that are off by about SDM_VOLUME_AIM, where
+   with `spacing` they are off by `off` > 0 of the volume, because voxels cut edges and thin walls.
+   Rounded down to two digits. [any thread] */
 double sdm_spacing_for_volume(double spacing, double off);
 
 /* true: farther than near_mm from the surface, where the grade says nothing, the largest error

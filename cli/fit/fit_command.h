@@ -250,6 +250,12 @@ void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX]);
  * known values that are kept. */
 void cli_fit_print_next(const cli_fit *f);
 
+/* Does a check have this grade or a worse one, and at least this figure? */
+bool cli_fit_found(const cli_fit *f, sdm_fit_check_kind kind, sdm_fit_grade grade, double figure);
+
+/* Did the fit stop at the largest number of iterations, with nothing else against it? */
+bool cli_fit_is_unfinished(const cli_fit *f);
+
 /* Did the fit only fail to converge, because the data hardly determine some of its parameters?
  * Neither another start nor more iterations help it. */
 bool cli_fit_lacks_data(const cli_fit *f);

@@ -27,27 +27,6 @@ static bool is_left_out(const char *name, bool same_maps)
     return false;
 }
 
-/* Did the fit stop at the largest number of iterations, with nothing else against it? */
-static bool is_unfinished(const cli_fit *f)
-{
-    const sdm_fit_verdict *v = &f->result.verdict;
-    size_t failed = 0;
-    for (size_t i = 0; i < v->n_findings; i++)
-        failed += v->findings[i].grade == SDM_FIT_FAILED &&
-                  v->findings[i].kind != SDM_FIT_CHECK_CONVERGED;
-    return v->n_findings && !failed && !f->result.converged &&
-           f->result.n_iterations >= f->opts.max_iterations;
-}
-
-bool cli_fit_lacks_data(const cli_fit *f)
-{
-    const sdm_fit_verdict *v = &f->result.verdict;
-    for (size_t i = 0; i < v->n_findings; i++)
-        if (v->findings[i].kind == SDM_FIT_CHECK_CONVERGED)
-            return is_unfinished(f) && strstr(v->findings[i].text, "the data hardly determine");
-    return false;
-}
-
 /* The finding of this kind where it did not pass, else NULL. */
 static const sdm_fit_finding *unpassed(const cli_fit *f, sdm_fit_check_kind kind)
 {
@@ -78,7 +57,8 @@ void cli_fit_print_next(const cli_fit *f)
     const sdm_fit_result *r = &f->result;
     const sdm_fit_finding *voxels = unpassed(f, SDM_FIT_CHECK_VOXELS);
     // --exact and --polish need the exact shape
-    const bool more = is_unfinished(f), refused = f->doubt.status && !cli_fit_voxels_refuse(f),
+    const bool more = cli_fit_is_unfinished(f),
+               refused = f->doubt.status && !cli_fit_voxels_refuse(f),
                exact = !f->source.model || f->shape || f->judge_shape;
     if ((!exact && !more) || (refused && !more) || f->other_side || f->n_candidates ||
         a->cohort.cases || (!voxels && !more && !unpassed(f, SDM_FIT_CHECK_NETWORK_ERROR)))

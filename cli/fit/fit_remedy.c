@@ -13,16 +13,6 @@
  * parameter is held back by the prior. */
 #define FAR_FROM_PRIOR 2.0
 
-/* Does a check have one of these grades or a worse one, and at least this figure? */
-static bool found(const cli_fit *f, sdm_fit_check_kind kind, sdm_fit_grade grade, double figure)
-{
-    for (size_t i = 0; i < f->result.verdict.n_findings; i++) {
-        const sdm_fit_finding *x = &f->result.verdict.findings[i];
-        if (x->kind == kind && x->grade >= grade && !(x->figure < figure)) return true;
-    }
-    return false;
-}
-
 /* Did the fit start at the middle of the points? It does unless an option gives another place:
  * --translation, --start-centre or --start-points. */
 static bool began_at_points(const cli_fit *f)
@@ -62,28 +52,8 @@ static bool name_prior(const cli_fit *f, char *text, size_t size)
 /* Does the fit of points lie on them? */
 static bool lies_on_points(const cli_fit *f)
 {
-    return !found(f, SDM_FIT_CHECK_MISSING, SDM_FIT_FAILED, -INFINITY) &&
-           !found(f, SDM_FIT_CHECK_RESIDUALS, SDM_FIT_FAILED, -INFINITY);
-}
-
-bool cli_fit_voxels_refuse(const cli_fit *f)
-{
-    const sdm_fit_verdict *v = &f->result.verdict;
-    if (v->grade != SDM_FIT_FAILED || !found(f, SDM_FIT_CHECK_VOXELS, SDM_FIT_DOUBTFUL, -INFINITY))
-        return false;
-    for (size_t i = 0; i < v->n_findings; i++) {
-        const sdm_fit_finding *x = &v->findings[i];
-        if (x->grade == SDM_FIT_FAILED && x->kind != SDM_FIT_CHECK_VOXELS &&
-            x->kind != SDM_FIT_CHECK_RESIDUALS)
-            return false;
-    }
-    return true;
-}
-
-bool cli_fit_start_is_suspect(const cli_fit *f)
-{
-    return f->result.verdict.grade == SDM_FIT_FAILED && !f->exchanged &&
-           !cli_fit_voxels_refuse(f) && !cli_fit_lacks_data(f);
+    return !cli_fit_found(f, SDM_FIT_CHECK_MISSING, SDM_FIT_FAILED, -INFINITY) &&
+           !cli_fit_found(f, SDM_FIT_CHECK_RESIDUALS, SDM_FIT_FAILED, -INFINITY);
 }
 
 /* Writes into `text` that a wrong start may be the cause of the failure, and the options that
@@ -127,7 +97,7 @@ const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
     else if (f->found && !r->converged && network)
         snprintf(text, size, "; if the network is the limit, --exact fits with exact maps");
     else if (f->found && began_at_points(f) &&
-             found(f, SDM_FIT_CHECK_COVERED, SDM_FIT_DOUBTFUL, UNCOVERED)) {
+             cli_fit_found(f, SDM_FIT_CHECK_COVERED, SDM_FIT_DOUBTFUL, UNCOVERED)) {
         const size_t used = (size_t)snprintf(
             text, size,
             "%s the points show only a part of the shape, their middle, where the fit began, is "
@@ -136,7 +106,7 @@ const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
         if (!lies_on_points(f) && used < size) name_start(f, text + used, size - used);
     }
     // tissues that are the wrong way round are no matter of the start
-    else if (!(f->found && found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY)) &&
+    else if (!(f->found && cli_fit_found(f, SDM_FIT_CHECK_CONTRAST, SDM_FIT_FAILED, -INFINITY)) &&
              !cli_fit_voxels_refuse(f))
         name_start(f, text, size);
     return text;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: a phantom is recovered, every kind of target and output, fits that must fail, mistakes.
-# Tests: fit_truth.c shell_word.c cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_mismatch.c fit_next.c fit_options.c fit_picture.c fit_remedy.c fit_repeat.c fit_report.c fit_result.c
+# Tests: fit_truth.c shell_word.c cmd_fit.c crop.c fit_compare.c fit_files.c fit_json.c fit_labels.c fit_mismatch.c fit_next.c fit_options.c fit_picture.c fit_refusal.c fit_remedy.c fit_repeat.c fit_report.c fit_result.c
 # fit_start.c fit_target.c progress_bar.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive

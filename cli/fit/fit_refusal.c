@@ -1,0 +1,56 @@
+/* Why a fit is refused: its maps, its start, or data that do not suffice. */
+#include <math.h>
+#include <string.h>
+
+#include "fit_command.h"
+
+bool cli_fit_found(const cli_fit *f, sdm_fit_check_kind kind, sdm_fit_grade grade, double figure)
+{
+    for (size_t i = 0; i < f->result.verdict.n_findings; i++) {
+        const sdm_fit_finding *x = &f->result.verdict.findings[i];
+        if (x->kind == kind && x->grade >= grade && !(x->figure < figure)) return true;
+    }
+    return false;
+}
+
+bool cli_fit_is_unfinished(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    size_t failed = 0;
+    for (size_t i = 0; i < v->n_findings; i++)
+        failed += v->findings[i].grade == SDM_FIT_FAILED &&
+                  v->findings[i].kind != SDM_FIT_CHECK_CONVERGED;
+    return v->n_findings && !failed && !f->result.converged &&
+           f->result.n_iterations >= f->opts.max_iterations;
+}
+
+bool cli_fit_lacks_data(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    for (size_t i = 0; i < v->n_findings; i++)
+        if (v->findings[i].kind == SDM_FIT_CHECK_CONVERGED)
+            return cli_fit_is_unfinished(f) &&
+                   strstr(v->findings[i].text, "the data hardly determine");
+    return false;
+}
+
+bool cli_fit_voxels_refuse(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    if (v->grade != SDM_FIT_FAILED ||
+        !cli_fit_found(f, SDM_FIT_CHECK_VOXELS, SDM_FIT_DOUBTFUL, -INFINITY))
+        return false;
+    for (size_t i = 0; i < v->n_findings; i++) {
+        const sdm_fit_finding *x = &v->findings[i];
+        if (x->grade == SDM_FIT_FAILED && x->kind != SDM_FIT_CHECK_VOXELS &&
+            x->kind != SDM_FIT_CHECK_RESIDUALS)
+            return false;
+    }
+    return true;
+}
+
+bool cli_fit_start_is_suspect(const cli_fit *f)
+{
+    return f->result.verdict.grade == SDM_FIT_FAILED && !f->exchanged &&
+           !cli_fit_voxels_refuse(f) && !cli_fit_lacks_data(f);
+}

@@ -251,6 +251,33 @@ static void test_few_points_in_a_neighbourhood_raise_no_doubt(void **state)
     sdm_instance_free(shape);
 }
 
+/* Where most points are alone in their neighbourhood, right fits are not doubted for it: their
+ * residuals are about 1, or there are too few to test the fit, and the text says so. */
+static void test_sparse_points_raise_no_doubt(void **state)
+{
+    (void)state;
+    static const size_t n[] = {100, 300, 500, 700};
+    const double truth[3] = {4.9, 3.8, 0.95}, noise = 0.05;
+    sdm_instance *shape = NULL;
+    assert_int_equal(sdm_instance_create(&brick, NULL, 0, NULL, &shape, NULL), SDM_OK);
+    for (size_t c = 0; c < sizeof n / sizeof *n; c++) {
+        double *x = points_of(shape, truth, 0, n[c]);
+        for (size_t i = 0; i < n[c]; i++)
+            for (size_t k = 0; k < 3; k++) x[3 * i + k] += noise * sdm_rng_normal(31, k, i);
+        sdm_fit_result r = fit_points(shape, x, n[c]);
+        for (size_t i = 0; i < r.verdict.n_findings; i++) {
+            const sdm_fit_finding *f = &r.verdict.findings[i];
+            if (f->kind != SDM_FIT_CHECK_RESIDUALS || strstr(f->text, "nothing tests")) continue;
+            if (f->grade != SDM_FIT_PASSED || !(f->figure > 0.3) || n[c] < 200)
+                fail_msg("%zu points: residuals %g, limit %g: %s", n[c], f->figure, f->limit,
+                         f->text);
+        }
+        sdm_fit_dispose(&r);
+        free(x);
+    }
+    sdm_instance_free(shape);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -261,6 +288,7 @@ int main(void)
         cmocka_unit_test(test_deviations_count_independent_points),
         cmocka_unit_test(test_sharp_edges_are_met),
         cmocka_unit_test(test_few_points_in_a_neighbourhood_raise_no_doubt),
+        cmocka_unit_test(test_sparse_points_raise_no_doubt),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

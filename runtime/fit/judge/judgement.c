@@ -175,7 +175,7 @@ static void check_residuals(const fit_problem *p, const fit_misfit *own, const f
                                : beyond > (serious ? FAR_BEYOND : VERY_FAR_BEYOND);
     const sdm_fit_grade inside =
         refused && !(p->opts->tolerance > 0) ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL;
-    if (points && !m->n_units[1]) {
+    if (points && m->few && !refused) {
         sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL, 0, NAN,
                           "the points lie too far apart to tell their scatter from errors of the "
                           "shape: nothing tests this fit");
@@ -200,9 +200,10 @@ static void check_residuals(const fit_problem *p, const fit_misfit *own, const f
                                               .coarse = &coarse,
                                               .bounds = bounds},
                               why);
+    const bool passed = m->chi_square[1] <= m->limit[1], white = points && passed;
     sdm_fit_judge_add(
-        v, SDM_FIT_CHECK_RESIDUALS, m->chi_square[1] <= m->limit[1], inside, m->chi_square[1],
-        m->limit[1],
+        v, SDM_FIT_CHECK_RESIDUALS, passed, inside,
+        white ? feet->scatter_chi_square : m->chi_square[1], white ? feet->limit[1] : m->limit[1],
         "the residuals inside the shape are not noise, they deviate by %.2g times what noise "
         "explains%s",
         sqrt(m->chi_square[1]), why);

@@ -11,8 +11,12 @@
 
 // members of a unit between which correlations are computed; of more, every second, third ... one
 #define MEMBERS_MAX 64
-// points in units of two or more that measure the scatter
-#define SCATTER_MIN 200
+// points: members with companions that measure the scatter to the NOISE_UNCERTAINTY of its variance
+#define SCATTER_MIN 100
+// points: fewer units than this tell little
+#define UNITS_MIN 10
+// points: largest edge of a cube, in halves of the largest radius
+#define POINTS_EDGE_MAX 2
 // a unit contradicts the shape if its mean exceeds this number of standard deviations
 #define BEYOND 3.0
 // smallest sd of a unit's mean, as a share: errors of the maps and of the scale of the shares
@@ -127,27 +131,36 @@ static double contradicted(const unit_mean *u)
 
 /* Points: the sd of every distance is the robust scatter about the means of the units, which a
  * displacement of a whole unit does not change. Of n points the scatter about their own mean is
- * smaller by sqrt((n - 1) / n). */
+ * smaller by sqrt((n - 1) / n). Where too few points have companions, it is the robust scatter
+ * about the surface. */
 static sdm_status points_scatter(fit_residuals *r, const member *m, size_t n, sdm_error *err)
 {
     double *list = NULL;
-    size_t count = 0, alone = 0;
+    size_t count = 0;
     const sdm_status s = SDM_ALLOC(&list, n, "residuals of the fit", err);
     for (size_t from = 0, to; from < n && !s; from = to) {
         double sum = 0;
         for (to = from; to < n && m[to].unit == m[from].unit; to++)
             sum += r->residual[m[to].sample];
         const double size = (double)(to - from);
-        alone += size < 2;
         for (size_t k = from; k < to && size > 1; k++)
             list[count++] = (r->residual[m[k].sample] - sum / size) * sqrt(size / (size - 1));
     }
-    // too few to measure the scatter: points that are alone count as without any, which doubts more
-    while (count < SCATTER_MIN && alone-- > 0) list[count++] = 0;
+    if (count < SCATTER_MIN && !s)
+        for (count = 0; count < n; count++) list[count] = r->residual[m[count].sample];
     const double sd = count ? sdm_fit_robust_sd(list, count, 0) : 0;
     for (size_t i = 0; i < r->n; i++) r->sd[i] = sd;
     sdm_free(list);
     return s;
+}
+
+// number of members that share their unit with others
+static size_t companions(const member *m, size_t n)
+{
+    size_t count = 0;
+    for (size_t k = 0; k < n; k++)
+        count += (k && m[k - 1].unit == m[k].unit) || (k + 1 < n && m[k + 1].unit == m[k].unit);
+    return count;
 }
 
 /* The nearest other member of a unit. */
@@ -214,14 +227,25 @@ static double chi_square_limit(const fit_residuals *r, double n_units)
     return (1 + NOISE_UNCERTAINTY) * (1 + ONCE_IN_THOUSAND * sd);
 }
 
-static sdm_status members_create(const fit_residuals *r, member **out, size_t *n, sdm_error *err)
+// m[] = the samples that are used, by their units; returns their number
+static size_t members_sort(const fit_residuals *r, member *m)
 {
-    const sdm_status s = SDM_ALLOC(out, r->n, "residuals of the fit", err);
-    *n = 0;
-    for (size_t i = 0; i < r->n && !s; i++)
-        if (r->used[i]) (*out)[(*n)++] = (member){unit_of(r, i), (uint32_t)i};
-    if (!s) qsort(*out, *n, sizeof **out, by_unit);
-    return s;
+    size_t n = 0;
+    for (size_t i = 0; i < r->n; i++)
+        if (r->used[i]) m[n++] = (member){unit_of(r, i), (uint32_t)i};
+    qsort(m, n, sizeof *m, by_unit);
+    return n;
+}
+
+/* Points: the same with the smallest cubes, at most POINTS_EDGE_MAX, in which enough of them have
+ * companions; where no cubes do, with the largest. */
+static size_t points_sort(fit_residuals *r, member *m)
+{
+    for (int32_t edge = 1;; edge++) {
+        for (int a = 0; a < 3; a++) r->edge[a] = edge;
+        const size_t n = members_sort(r, m);
+        if (edge >= POINTS_EDGE_MAX || companions(m, n) >= SCATTER_MIN) return n;
+    }
 }
 
 // number of voxels inside by the labels that lie too far from the shape to be samples, in samples
@@ -253,9 +277,10 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
 {
     const bool points = p->target->kind == SDM_FIT_POINTS;
     member *m = NULL;
-    size_t n;
+    size_t n = 0;
     *out = (fit_misfit){0};
-    sdm_status s = members_create(r, &m, &n, err);
+    sdm_status s = SDM_ALLOC(&m, r->n, "residuals of the fit", err);
+    if (!s) n = points ? points_sort(r, m) : members_sort(r, m);
     if (!s && points) s = points_scatter(r, m, n, err);
     if (points) out->n_points = n;
     double volume = 0;
@@ -290,6 +315,7 @@ sdm_status sdm_fit_misfit(const fit_problem *p, fit_residuals *r, fit_misfit *ou
             factor * contradicted(&u) * (double)(to - from) / volume;
     }
     const double all_units = fmax((double)(out->n_units[0] + out->n_units[1]), 1);
+    out->few = points && (out->n_units[1] < UNITS_MIN || companions(m, n) < SCATTER_MIN);
     out->noise_chi_square /= all_units, out->scatter_chi_square /= all_units;
     for (int side = 0; side < 2; side++) {
         const double units = fmax((double)out->n_units[side], 1);

@@ -23,6 +23,9 @@ typedef struct fit_misfit {
     /* outside of the surface [0] and inside [1]; points count as inside */
     /* number of units; of points that are no strays (points alone) */
     size_t n_units[2], n_points;
+    /* points: too few of them have companions in their unit, or too few units, to tell their
+       scatter from errors of the shape */
+    bool few;
     /* mean over the units of (mean residual)^2 / variance, where errors of the maps add to the
        variance. 1: the residuals are noise and these errors */
     double chi_square[2];

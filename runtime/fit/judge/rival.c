@@ -11,9 +11,6 @@
 #define CHI_SQUARE_MIN 1e-3
 // of points that only one of two shapes takes for strays
 #define CHI_SQUARE_STRAY 9.0
-// points: with fewer neighbourhoods than this their residuals tell little, and the likelihood of
-// the single points decides
-#define UNITS_MIN 10
 // loss of log-likelihood, below the worse one of the two, that is no valley
 #define VALLEY 0.5
 
@@ -29,7 +26,7 @@ sdm_status sdm_fit_stand(const fit_problem *p, double factor, fit_standing *out,
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     sdm_fit_residuals_dispose(&residuals);
     if (!s)
-        *out = (fit_standing){.n_units = misfit.n_units[0] + misfit.n_units[1],
+        *out = (fit_standing){.n_units = misfit.few ? 0 : misfit.n_units[0] + misfit.n_units[1],
                               .chi_square = misfit.noise_chi_square,
                               .n_points = misfit.n_points};
     if (!s && p->target->kind == SDM_FIT_POINTS)
@@ -51,8 +48,7 @@ double sdm_fit_chi_square(const fit_standing *s, const fit_standing *against)
 
 bool sdm_fit_has_units(const fit_standing *fit, const fit_standing *rival)
 {
-    const size_t n = fit->n_units < rival->n_units ? fit->n_units : rival->n_units;
-    return n >= (fit->factor > 0 ? UNITS_MIN : 1);
+    return fit->n_units && rival->n_units;
 }
 
 double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival)

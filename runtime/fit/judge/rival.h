@@ -9,8 +9,9 @@ typedef struct fit_standing {
     /* images and points: log-likelihood, and the number of correlated samples that count as one
      * independent one; labels: 0 */
     double log_likelihood, factor;
-    /* labels and points: number of neighbourhoods, and their mean (mean residual)^2 / variance of
-     * the noise; images: 0 */
+    /* labels and points: number of neighbourhoods (0: too few points to tell, fit_misfit.few, so
+     * that their likelihood decides), and their mean (mean residual)^2 / variance of the noise;
+     * images: 0 */
     size_t n_units;
     double chi_square;
     size_t n_points; /* points: number of them that are no strays; else 0 */

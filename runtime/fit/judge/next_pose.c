@@ -11,6 +11,7 @@
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
 #include "fit/solver/open_motions.h"
+#include "fit/solver/prior.h"
 #include "fit/start/principal_axes.h"
 #include "fit/start/start_list.h"
 #include "fit/start/start_search.h"
@@ -310,11 +311,26 @@ static sdm_status values_rank(fit_problem *p, const own_fit *own, fit_start *lis
     return s;
 }
 
-static void nearest_take(nearest *least, const fit_problem *p, const fit_standing *fit,
-                         const fit_standing *rival, size_t param)
+// the parameter in which the state of *p differs most from the fit, beside its prior
+static size_t most_changed(const fit_problem *p, const own_fit *own)
+{
+    double most = -1;
+    size_t param = 0;
+    for (size_t k = 0; k < p->n_params; k++) {
+        const double change =
+            fabs(p->state.params[k] - own->state.params[k]) / sdm_fit_prior_sd(p, k);
+        if (!fit_param_is_kept(p, k) && change > most) most = change, param = k;
+    }
+    return param;
+}
+
+// value: the rival began with another value of a parameter
+static void nearest_take(nearest *least, const fit_problem *p, const own_fit *own,
+                         const fit_standing *fit, const fit_standing *rival, bool value)
 {
     const double gain = sdm_fit_gain(fit, rival);
     if (least->gain <= gain || isnan(gain)) return;
+    const size_t param = value ? most_changed(p, own) + 1 : 0;
     least->gain = gain;
     least->param = param;
     if (param) least->value = p->state.params[param - 1];
@@ -339,7 +355,7 @@ static sdm_status compare_alike(fit_problem *p, own_fit *own, const turns *t, ne
             (!sdm_fit_has_units(&fit, &rival) ||
              sdm_fit_chi_square(&fit, &rival) >= BETTER * sdm_fit_chi_square(&rival, &fit)) &&
             sdm_fit_gain(&fit, &rival) < -SDM_FIT_PREFERRED)
-            nearest_take(least, p, &fit, &rival, 0);
+            nearest_take(least, p, own, &fit, &rival, false);
     }
     return s;
 }
@@ -381,16 +397,16 @@ static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_e
     if (!s && p->has_runner_up) {
         const fit_start from = {.state = p->runner_up};
         s = challenge(p, own, &from, alike, &other, &rival, err);
-        if (!s && other) nearest_take(least, p, fit, &rival, 0);
+        if (!s && other) nearest_take(least, p, own, fit, &rival, false);
     }
     other = false;
     for (size_t i = 0; !s && i < t->n_other && i < TRIES_MAX && !other; i++) {
         s = challenge(p, own, &t->other[i], alike, &other, &rival, err);
-        if (!s && other) nearest_take(least, p, fit, &rival, 0);
+        if (!s && other) nearest_take(least, p, own, fit, &rival, false);
     }
     for (size_t i = 0; i < n_values && !s; i++) {
         s = challenge(p, own, &value[i], alike, &other, &rival, err);
-        if (!s && other) nearest_take(least, p, fit, &rival, value[i].param);
+        if (!s && other) nearest_take(least, p, own, fit, &rival, true);
     }
     if (!s) s = compare_alike(p, own, t, least, err);
     sdm_free(t);

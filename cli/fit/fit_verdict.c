@@ -132,8 +132,8 @@ static const char *in_short(const sdm_fit_verdict *v)
                    ? "do not use the values: the fit has not come to an end"
                    : "do not use the values: the data contradict them or do not decide";
     if (only(v, SDM_FIT_DOUBTFUL, few, sizeof few / sizeof *few))
-        return "the data do not determine everything: use no parameter that a line below names, "
-               "the others hold within their +-";
+        return "the data show a part of the shape: do not use what the lines below name, nor what "
+               "is `not determined`";
     if (only(v, SDM_FIT_DOUBTFUL, maps, sizeof maps / sizeof *maps))
         return "the maps limit the fit: the values are near, but their +- may be too small";
     return "the data may differ from the shape as the lines below say: look at a picture "

@@ -277,7 +277,7 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
         const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
         judge_patches(p, &found, on.n + strays.n, stray, bare, v);
-        char names[200], unseen_text[480] = "", astray[80] = "", beside[90] = "";
+        char names[200], unseen_text[320] = "", astray[80] = "", beside[90] = "";
         const double voxel = fit_longest_edge(&p->maps.grid);
         char place[FIT_PLACE_NAME] = "";
         const double *middle = grown || other ? NULL : middle_of_bare(&surface, bare_at);
@@ -294,12 +294,8 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
             snprintf(unseen_text, sizeof unseen_text,
                      "the data hardly determine %s: no points lie near the part of the fitted "
                      "surface that %s; start from other values (sdm_fit_opts.start_params), take "
-                     "points from there, or keep a known value (sdm_fit_opts.kept)%s",
-                     names, strchr(names, ',') ? "they move" : "it moves",
-                     grown || other
-                         ? ""
-                         : "; if no other check doubts the fit, the other parameters are right to "
-                           "their +-");
+                     "points from there, or keep a known value (sdm_fit_opts.kept)",
+                     names, strchr(names, ',') ? "they move" : "it moves");
         const bool covered = bare <= UNCOVERED_MAX;
         if (covered && unseen > 0)
             sdm_fit_judge_add(v, SDM_FIT_CHECK_COVERED, false, SDM_FIT_DOUBTFUL, unseen, UNSEEN_MIN,
@@ -314,10 +310,8 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
                           "strays out (sdm_fit_opts.tolerance allows more)"
                 : other ? "most of it, and half of the parameters or more end at their bounds: the "
                           "data show another shape, or their lengths are in another unit"
-                : unseen > 0
-                    ? ""
-                    : "the data lack a part of the shape, or the shape is too large; if no other "
-                      "check doubts the fit, all parameters are right to their +-",
+                : unseen > 0 ? ""
+                             : "the data lack a part of the shape, or the shape is too large",
                 (grown || other) && unseen > 0 ? "; " : "", unseen_text, beside);
     }
     sdm_free(bare_at);

@@ -168,11 +168,11 @@ static void patience_left_time(void **state)
                                  "number limits the model (100 % of the mean square error): raise "
                                  "train.minutes from 2 to 4"),
                          early);
-        assert_int_equal(strstr(v.sentence,
-                                "Half of the budget, which is for the maps, was too "
-                                "short for data.start, though train.patience ended "
-                                "the steps early. The number of maps limits it (100 % "
-                                "of the mean square error): raise train.minutes") != NULL,
+        assert_int_equal(strstr(v.sentence, "Half of the budget is for maps and ended before "
+                                            "data.start of them were made; the steps did not need "
+                                            "all of theirs (train.patience). The number of maps "
+                                            "limits the model (100 % of the mean square error): "
+                                            "raise train.minutes") != NULL,
                          early);
         // few steps, but patience ended them
         v = figures();

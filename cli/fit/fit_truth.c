@@ -9,6 +9,7 @@
 #include "sdm/internal/file.h"
 #include "sdm/internal/json_read.h"
 #include "sdm/internal/mat3.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
@@ -174,7 +175,7 @@ static double pose_in_sd(const cli_fit *f)
 sdm_status cli_fit_compare_truth(cli_fit *f, sdm_error *err)
 {
     const size_t n = sdm_grid_count(&f->map_grid);
-    const double *h = f->map_grid.spacing, edge = fmax(fmax(h[0], h[1]), h[2]);
+    const double edge = sdm_grid_coarsest(&f->map_grid);
     double degrees, here[3], there[3], both = 0, all = 0, apart = 0;
     float *turned = NULL;
     if (!f->has_truth_pose) return SDM_OK;

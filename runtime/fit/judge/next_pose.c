@@ -129,7 +129,8 @@ typedef struct likeness {
     double apart; // largest difference of the distances in the fit and at its surface, voxels
 } likeness;
 
-// the fit, and the shape with the map distance[n_voxels] and this volume in the state `other`
+// compares the fit with the shape that has the map distance[n_voxels] and this volume, in the state
+// `other`
 static likeness compare(const own_fit *own, const double *distance, double volume,
                         const fit_state *other)
 {

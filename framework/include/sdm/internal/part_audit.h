@@ -67,7 +67,7 @@ typedef struct sdm_part {
  * section is free up to 0.0125. */
 #define SDM_PART_FOLDED_MIN 0.015
 
-/* In place of the index of a part: the triangle repeats a vertex. */
+/* Stands for the part of a triangle that belongs to none, because it repeats a vertex. */
 #define SDM_NO_PART UINT32_MAX
 
 /* Zero-initialise; sdm_part_audit_dispose() frees. */

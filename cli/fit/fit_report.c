@@ -5,6 +5,12 @@
 
 #include "fit_command.h"
 
+// A component of the pose is that of an open motion, of which the data say nothing, if its standard
+// deviation without the open motions is so small beside the largest one of the vector ...
+#define OPEN_WITHOUT 0.05
+// ... and that with them so large.
+#define OPEN_WITH 10.0
+
 static void print_params(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
@@ -32,11 +38,19 @@ static void print_params(const cli_fit *f)
     }
 }
 
-static void print_vector(const char *name, const double v[3], const double sd[3], const char *unit)
+/* sd: without, all_sd: with the motions that the data leave open. */
+static void print_vector(const char *name, const double v[3], const double sd[3],
+                         const double all_sd[3], const char *unit)
 {
+    const double most = fmax(sd[0], fmax(sd[1], sd[2]));
     printf("  %-12s %10.5g %10.5g %10.5g", name, v[0], v[1], v[2]);
     if (isnan(sd[0])) printf(" +- unknown");
-    if (sd[0] > 0 || sd[1] > 0 || sd[2] > 0) printf(" +- %.2g %.2g %.2g", sd[0], sd[1], sd[2]);
+    if (most > 0) printf(" +-");
+    for (int a = 0; a < 3 && most > 0; a++)
+        if (sd[a] < OPEN_WITHOUT * most && all_sd[a] > OPEN_WITH * most)
+            printf(" open");
+        else
+            printf(" %.2g", sd[a]);
     printf(" %s\n", unit);
 }
 
@@ -129,12 +143,13 @@ static void print_maps(const cli_fit *f)
 void cli_fit_print(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
+    const double *pose_sd = r->sd + f->n_params;
     printf("%s fitted to %s%s\n", f->shape_name, f->path,
            f->doubt.status ? ": NOT TO BE TRUSTED" : "");
     print_params(f);
     cli_fit_print_correlated(f);
-    print_vector("rotation", r->pose.rotation, r->pose_sd_determined, "rad");
-    print_vector("translation", r->pose.translation, r->pose_sd_determined + 3, "mm");
+    print_vector("rotation", r->pose.rotation, r->pose_sd_determined, pose_sd, "rad");
+    print_vector("translation", r->pose.translation, r->pose_sd_determined + 3, pose_sd + 3, "mm");
     if (*r->open_motions)
         printf("  not determined by the data: %s; the +- of the pose leaves it out\n",
                r->open_motions);

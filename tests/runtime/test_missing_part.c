@@ -1,8 +1,8 @@
 /* A flask whose points lack the neck: the length of the neck is not determined, whatever the start,
- * and the verdict names it; with the points of the neck it is determined. A cup whose wall is
- * thinner than the voxels has points all over, or none on its base. A rod without points at its
- * end, and one whose length is kept at a value that is far off. Tests: flat_params.c coverage.c
- * kept_params.c surface_places.c */
+ * and the verdict names it; with the points of the neck it is determined. A mushroom with points
+ * under its cap. A cup whose wall is thinner than the voxels has points all over, or none on its
+ * base. A rod without points at its end, and one whose length is kept at a value that is far off.
+ * Tests: flat_params.c coverage.c kept_params.c surface_places.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -222,6 +222,55 @@ static void test_rod_kept_too_long(void **state)
     }
 }
 
+enum { CAP, STEM, MUSHROOM_PARAMS };
+static const sdm_param mushroom_params[MUSHROOM_PARAMS] = {
+    {"cap", "mm", 2.5, 5, 3.5, "radius of the cap"}, {"stem", "mm", 1, 2, 1.5, "radius"}};
+static const double UNDER = 5; // height of the cap's lower side
+
+/* A stem from z = 0 up, and on it a cap. */
+static void mushroom_ring(const double *p, int i, double *r, double *z)
+{
+    *r = p[i < 2 ? STEM : CAP];
+    *z = i == 0 ? 0 : i < 3 ? UNDER : UNDER + 2;
+}
+
+static int mushroom_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                         const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    return revolved_mesh(host, out, 4, AROUND, mushroom_ring, p, 0, UNDER + 2);
+}
+
+static const sdm_shape mushroom = {.abi = SDM_SHAPE_ABI,
+                                   .size = sizeof(sdm_shape),
+                                   .name = "mushroom",
+                                   .summary = "a stem with a cap",
+                                   .params = mushroom_params,
+                                   .n_params = MUSHROOM_PARAMS,
+                                   .mesh = mushroom_mesh};
+
+// The points end at the lower side of the cap: they say that it reaches at least that far. It may
+// be wider, as no point shows where it ends.
+static void test_points_at_an_edge_alone(void **state)
+{
+    (void)state;
+    const points_fit f = {
+        .shape = &mushroom,
+        .truth = (const double[MUSHROOM_PARAMS]){3.6, 1.4},
+        .start = (const double[MUSHROOM_PARAMS]){3.4, 1.5},
+        .grid = sdm_grid_centred((int64_t[3]){52, 52, 40}, 0.22, (double[3]){0, 0, 3.5}),
+        .n = 3000,
+        .axis = 2,
+        .noise = 0.05,
+        .most = UNDER + 1e-6};
+    sdm_fit_result r = fit_points_of(&f);
+    const char *text = text_of_covered(&r);
+    if (!(fabs(r.params[CAP] - 3.6) < 3 * r.sd[CAP] && r.sd[CAP] > 0.3 && r.sd[STEM] < 0.01 &&
+          strstr(text, "hardly determine cap: no points")))
+        fail_msg("cap %g +- %g, stem +- %g: %s", r.params[CAP], r.sd[CAP], r.sd[STEM], text);
+    sdm_fit_dispose(&r);
+}
+
 enum { RIM, DEPTH, CUP_PARAMS };
 static const sdm_param cup_params[CUP_PARAMS] = {{"rim", "mm", 1.5, 3, 2.2, "radius of the rim"},
                                                  {"depth", "mm", 2, 6, 3.5, "outside"}};
@@ -292,9 +341,11 @@ static void test_thin_wall(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_neck_without_points), cmocka_unit_test(test_neck_with_points),
-        cmocka_unit_test(test_end_of_a_rod_without_points),
-        cmocka_unit_test(test_rod_kept_too_long), cmocka_unit_test(test_thin_wall)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_neck_without_points),
+                                       cmocka_unit_test(test_neck_with_points),
+                                       cmocka_unit_test(test_end_of_a_rod_without_points),
+                                       cmocka_unit_test(test_points_at_an_edge_alone),
+                                       cmocka_unit_test(test_rod_kept_too_long),
+                                       cmocka_unit_test(test_thin_wall)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -357,12 +357,16 @@ static void check_maps(const fit_problem *p, sdm_fit_verdict *v)
     if (!p->source->model || p->maps.exact) return;
     const sdm_model_quality *q = &sdm_model_get_info(p->source->model)->quality;
     if (!*q->grade) return;
-    const bool poor = !strcmp(q->grade, "poor");
-    sdm_fit_judge_add(
-        v, SDM_FIT_CHECK_NETWORK, !poor && !(q->cut > CUT_MAX), SDM_FIT_DOUBTFUL, q->cut, CUT_MAX,
-        "the training graded this network %s, and its grid cuts %.0f %% of the shapes of its "
-        "family: train it again (docs/symptoms.md)",
-        q->grade, 100 * q->cut);
+    // the share of cut shapes is no figure of a network that is poor for other reasons
+    const bool poor = !strcmp(q->grade, "poor"), cut = q->cut > CUT_MAX, no_figure = poor && !cut;
+    char cuts[80] = "";
+    if (cut)
+        snprintf(cuts, sizeof cuts, ", and its grid cuts %.0f %% of the shapes of its family",
+                 100 * q->cut);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_NETWORK, !poor && !cut, SDM_FIT_DOUBTFUL,
+                      no_figure ? NAN : q->cut, no_figure ? NAN : CUT_MAX,
+                      "the training graded this network %s%s: train it again (docs/symptoms.md)",
+                      q->grade, cuts);
 }
 
 // whether the error of the network moves a parameter by more than the data determine it

@@ -16,6 +16,9 @@
 static const double ANGLES[N_ANGLES] = {0.2, 0.45, 0.7};
 // a motion is open, too, if its sd is larger than about this angle
 #define ANGLE_MAX 0.5
+// cosine of the largest angle between the axis of an open rotation and an axis of the shape's frame
+// for which the latter is tried, too
+#define ALIKE 0.996
 // the precision that stops a motion, over that which the data have for the pose
 #define STOP 1e4
 
@@ -104,6 +107,26 @@ static bool is_open(const fit_problem *p, const double m[6])
     return true;
 }
 
+/* Shapes are mostly symmetric about an axis of their own frame, while samples show the axis of an
+   open rotation to some degrees alone: m turns about the axis of the frame, if this is open, too.
+ */
+static void snap_to_frame(const fit_problem *p, double m[6])
+{
+    const double turn = v3_norm(m), *r = p->state.rotation;
+    if (!(turn >= v3_norm(m + 3) / p->extent.reach)) return;
+    for (int a = 0; a < 3; a++) {
+        const double cosine = (m[0] * r[a] + m[1] * r[3 + a] + m[2] * r[6 + a]) / turn;
+        if (!(fabs(cosine) > ALIKE)) continue;
+        // the arm from the axis to the origin of the shape stays as it is
+        double arm[3], snapped[6];
+        v3_cross(m + 3, m, arm);
+        for (int k = 0; k < 3; k++) arm[k] /= turn * turn;
+        for (int k = 0; k < 3; k++) snapped[k] = copysign(turn, cosine) * r[3 * k + a];
+        v3_cross(snapped, arm, snapped + 3);
+        if (is_open(p, snapped)) memcpy(m, snapped, sizeof snapped);
+    }
+}
+
 void sdm_fit_open_motions_find(fit_problem *p)
 {
     const size_t n = p->information.n_unknowns, at = fit_at_rotation(p->n_params);
@@ -119,9 +142,10 @@ void sdm_fit_open_motions_find(fit_problem *p)
         double m[6];
         for (size_t i = 0; i < 6; i++) m[i] = vector[6 * k + i] * unit(p, i);
         const bool weak = value[k] * ANGLE_MAX * ANGLE_MAX < p->noise_factor;
-        if (!weak && !is_open(p, m)) return; // the next ones are determined even better
+        if (!weak && !is_open(p, m)) break; // the next ones are determined even better
         memcpy(p->motion[p->n_motions++], m, sizeof m);
     }
+    if (p->n_motions == 1) snap_to_frame(p, p->motion[0]);
 }
 
 // the part of a motion for which there is no prior: a motion that mostly turns follows the prior of

@@ -21,6 +21,7 @@ static const char *const NAMES[][2] = {{"sdm_fit_source.grid", "--exact --spacin
                                        {"sdm_registry_load()", "--plugin FILE"},
                                        {"sdm_fit_opts.start_params", "-p NAME=VALUE"},
                                        {"sdm_fit_opts.kept", "--keep NAME"},
+                                       {"sdm_fit_opts.keep_appearance", "--keep appearance"},
                                        {"sdm_fit_opts.max_polish_iterations", "--polish"}};
 
 /* The pair of names that begins at `at`; NULL: none. */

@@ -440,6 +440,39 @@ static void test_few_points_are_refused(void **state)
     free(x);
 }
 
+// Points that have no neighbours test the fit by a standard deviation that is known: the true one
+// agrees, a third of it does not.
+static void test_sparse_points_with_a_known_deviation(void **state)
+{
+    (void)state;
+    size_t n;
+    double *x = points_with_strays(SIZE_MAX, &n), sparse[3 * 36];
+    for (size_t i = 0; i < 3 * 36; i++)
+        sparse[i] = x[3 * (i / 3 * n / 36 + 1) + i % 3] + 0.06 * sdm_rng_normal(9, i, 0);
+    free(x);
+    sdm_instance *round = shape_of("ellipsoid");
+    const sdm_fit_source source = source_of(round);
+    const sdm_fit_target t = {.kind = SDM_FIT_POINTS, .points = sparse, .n_points = 36};
+    const double given[3] = {0, 0.06, 0.02}; // 0: none
+    for (int k = 0; k < 3; k++) {
+        sdm_fit_opts o = sdm_fit_defaults();
+        sdm_fit_result r;
+        sdm_error err = {0};
+        o.start_pose = POSE;
+        o.keep_appearance = given[k] > 0;
+        if (given[k] > 0) o.point_sd = given[k];
+        if (sdm_fit(&source, &t, &o, &r, &err)) fail_msg("%d: %s", k, err.text);
+        const sdm_fit_finding *f = finding(&r, SDM_FIT_CHECK_RESIDUALS);
+        if ((f->grade == SDM_FIT_PASSED) != (k == 1) ||
+            !strstr(f->text, k == 0   ? "keep it (sdm_fit_opts.keep_app"
+                             : k == 1 ? ""
+                                      : "as given"))
+            fail_msg("%d: %.3g, at most %.3g: %s", k, f->figure, f->limit, f->text);
+        sdm_fit_dispose(&r);
+    }
+    sdm_instance_free(round);
+}
+
 // The image of two crossed capsules: one of them fits as well as the other, if as much of its
 // material may lie beside it.
 static void test_a_second_pose_is_refused(void **state)
@@ -750,6 +783,7 @@ int main(void)
         cmocka_unit_test(test_strays_are_refused_if_many),
         cmocka_unit_test(test_surfaces_without_each_other_are_told),
         cmocka_unit_test(test_few_points_are_refused),
+        cmocka_unit_test(test_sparse_points_with_a_known_deviation),
         cmocka_unit_test(test_points_in_metres_are_refused),
         cmocka_unit_test(test_a_second_pose_is_refused),
         cmocka_unit_test(test_a_joint_in_the_wrong_place_is_refused),

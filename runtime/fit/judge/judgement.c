@@ -176,9 +176,7 @@ static void check_residuals(const fit_problem *p, const fit_misfit *own, const f
     const sdm_fit_grade inside =
         refused && !(p->opts->tolerance > 0) ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL;
     if (points && m->few && !refused) {
-        sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL, 0, NAN,
-                          "the points lie too far apart to tell their scatter from errors of the "
-                          "shape: nothing tests this fit");
+        sdm_fit_check_sparse_points(p, v);
         return;
     }
     // errors as large as a neighbourhood are judged by the places to which the points belong

@@ -44,6 +44,10 @@
 // points for each unknown that also test the fit: with fewer, most shapes pass close by all points
 #define POINTS_PER_UNKNOWN 3
 
+// points whose standard deviation is known: excess of the mean square of their distances that
+// chance explains, in standard deviations of it; once in a thousand fits
+#define BY_CHANCE 3.1
+
 // largest number of rigid motions that leave a surface in place: the rotations of a ball
 #define SYMMETRIES_MAX 3
 
@@ -124,6 +128,28 @@ sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, do
                       "%.3g mm from its own: they show too little of it, or their unit is not mm",
                       wide, e.reach);
     return SDM_OK;
+}
+
+void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v)
+{
+    if (!p->opts->keep_appearance) {
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL, 0, NAN,
+                          "the points lie too far apart to tell their scatter from errors of the "
+                          "shape: nothing tests this fit; if you know the standard deviation of "
+                          "the points (sdm_fit_opts.point_sd), keep it "
+                          "(sdm_fit_opts.keep_appearance)");
+        return;
+    }
+    // the sum of the squares of n - unknowns normal errors
+    double sum = 0;
+    for (size_t i = 0; i < p->samples.n; i++) sum += p->samples.field[i] * p->samples.field[i];
+    const double free = fmax((double)p->samples.n - (double)free_unknowns(p), 1),
+                 over = sum / free / (p->state.point_sd * p->state.point_sd),
+                 limit = 1 + BY_CHANCE * sqrt(2 / free);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, over <= limit, SDM_FIT_DOUBTFUL, over, limit,
+                      "the points lie %.2g mm off the surface, %.2g times their standard deviation "
+                      "as given: another shape, or it is larger",
+                      sqrt(sum / free), sqrt(over));
 }
 
 /* Share of the surface beside details that the voxels of the maps do not show: there the gradient

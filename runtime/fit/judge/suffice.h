@@ -9,6 +9,11 @@
 sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, double noise_factor,
                                 sdm_fit_verdict *v, sdm_error *err);
 
+/* Adds the finding "residuals" of a fit to points that lie too far apart to tell their scatter from
+ * errors of the shape: passed where their distances from the surface agree with a standard
+ * deviation that the options keep, else doubtful. */
+void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v);
+
 /* What the voxels of the maps show. */
 typedef struct fit_coarseness {
     /* longest edge (mm) of voxels that show the shape and the data; INFINITY: any do */

@@ -100,7 +100,7 @@ void cli_fit_print_next(const cli_fit *f)
     add_three(&t, "rotation", r->pose.rotation);
     add_three(&t, "translation", r->pose.translation);
     if (!t.failed)
-        printf("%s from here, without a search%s:\n  %s\n",
+        printf("%s from here%s:\n  %s\n",
                lacks    ? "known values in place of VALUE, for what the data hardly determine,"
                : more   ? "more iterations"
                : voxels ? "finer maps"

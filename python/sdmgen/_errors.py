@@ -117,6 +117,7 @@ def with_arguments(text: str) -> str:
     text = text.replace("sdm_fit_opts.max_polish_iterations", "polish=True")
     text = text.replace("sdm_fit_opts.kept", "keep")
     text = text.replace("(sdm_registry_load())", "(plugin=FILE of sdmgen.Model)")
+    text = re.sub(r"( = )?\bSDM_RANGE_(\w+)", lambda m: f'{"=" if m[1] else ""}"{m[2].lower()}"', text)
     return re.sub(r"\bsdm_\w+_opts\.(\w+)", r"\1", text)
 
 

@@ -72,10 +72,11 @@ static sdm_status refuse_param(const sdm_model_param *p, double value, sdm_error
     // for all policies; and who gave another unit needs no policy
     if (!isfinite(value) || *sdm_unit_question(value, p->min, p->max, p->unit))
         return sdm_fail(err, SDM_E_RANGE, "%s", range.text);
-    return sdm_fail(err, SDM_E_RANGE,
-                    "%s, the trained range; sdm_generate_opts.policy clamp moves it into the "
-                    "range, exact computes exact maps where the shape allows them",
-                    range.text);
+    return sdm_fail(
+        err, SDM_E_RANGE,
+        "%s, the trained range; sdm_generate_opts.policy = SDM_RANGE_CLAMP moves it into the "
+        "range, SDM_RANGE_EXACT computes exact maps where the shape allows them",
+        range.text);
 }
 
 sdm_status sdm_generate_check_params(const sdm_model *m, const double *params,

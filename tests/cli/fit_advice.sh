@@ -53,7 +53,7 @@ expect 4 'error: thin-label.nii: the voxels of the maps are coarse beside ' \
     sdmgen fit --shape torus thin-label.nii --label 1 --rotation 0,0,0 --spacing 1 --quiet
 grep -q -- '--rotation gives one start' out && bad 'advice on the start beside coarse maps'
 grep -q 'a wrong start' err && bad 'a wrong start is named beside coarse maps'
-has '^finer maps from here, without a search; [0-9.]+ times as many voxels:$'
+has '^finer maps from here; [0-9.]+ times as many voxels:$'
 eval "$(sed -n 's/^  sdmgen fit/expect 0 - sdmgen fit/p' out)"
 has '^verdict: (passed|doubtful)$'
 

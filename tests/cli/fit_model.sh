@@ -85,7 +85,7 @@ has '^  covered      doubtful .*: the data hardly determine q1.*: no points lie 
 arm_without_its_end 4
 expect 4 'not converged after [0-9]* iterations \(.*\): the data hardly determine q1: keep it at a known value \(--keep NAME\), or give data that determine it$' \
     sdmgen fit link/model.sdm upper-arm.csv --rotation 0,0,0 --quiet
-has '^known values in place of VALUE, for what the data hardly determine, from here, without a search:$'
+has '^known values in place of VALUE, for what the data hardly determine, from here:$'
 grep -q -- '--rotation gives one start\|max-iterations' out && bad "advice that does not help: $(cat out)"
 next=$(sed -n 's/^  \(sdmgen fit link.*\) -p q1=VALUE /\1 -p q1=-1.03 /p' out)
 expect 0 - $next --quiet

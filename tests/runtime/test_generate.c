@@ -315,7 +315,8 @@ static void test_batch_has_same_bits_for_threads(void **state)
     assert_int_equal(sdm_generate_batch(s->model, p, BATCH, NULL, again, results, &err),
                      SDM_E_RANGE);
     assert_non_null(strstr(err.text, "map 5 of 53: parameter 'radius' = "));
-    assert_non_null(strstr(err.text, ", the trained range; sdm_generate_opts.policy clamp"));
+    assert_non_null(strstr(err.text, "; sdm_generate_opts.policy = SDM_RANGE_CLAMP moves it "));
+    assert_non_null(strstr(err.text, ", SDM_RANGE_EXACT computes exact maps "));
     p[2 * 5] = p[2 * 16] = p[2 * 52] = 1.2;
     assert_int_equal(sdm_generate_batch(s->model, p, BATCH, NULL, again, results, &err),
                      SDM_E_RANGE);

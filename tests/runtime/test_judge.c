@@ -433,6 +433,9 @@ static void test_few_points_are_refused(void **state)
     assert_true(f->grade == SDM_FIT_DOUBTFUL && f->figure <= 15);
     assert_true(f->limit > 15 && f->limit <= 27);
     assert_non_null(strstr(f->text, "hardly determine"));
+    f = finding(&r, SDM_FIT_CHECK_RESIDUALS);
+    assert_true(f->grade == SDM_FIT_DOUBTFUL && isnan(f->figure) && isnan(f->limit));
+    assert_non_null(strstr(f->text, "nothing tests this fit"));
     sdm_fit_dispose(&r);
     (void)fit_to(x, n, &r, &err);
     assert_int_equal(finding(&r, SDM_FIT_CHECK_DATA)->grade, SDM_FIT_PASSED);

@@ -133,7 +133,7 @@ sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, do
 void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v)
 {
     if (!p->opts->keep_appearance) {
-        sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL, 0, NAN,
+        sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL, NAN, NAN,
                           "the points lie too far apart to tell their scatter from errors of the "
                           "shape: nothing tests this fit; if you know the standard deviation of "
                           "the points (sdm_fit_opts.point_sd), keep it "

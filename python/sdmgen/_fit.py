@@ -62,14 +62,16 @@ class Tissue:
 
 @dataclass(frozen=True)
 class Finding:
-    """One check of a fit. `check`: its name ("residuals"), as in docs/fitting-reference.md; `grade`:
-    "passed", "doubtful" or "failed"; `figure` and the `limit` that separates passed from the rest (NaN:
-    none); `text`: why it did not pass or has no figure, else empty."""
+    """One check of a fit, as in docs/fitting-reference.md."""
 
+    #: its name ("residuals")
     check: str
+    #: "passed", "doubtful" or "failed"
     grade: str
+    #: the figure, and the limit that separates passed from the rest; NaN: none
     figure: float
     limit: float
+    #: why it did not pass or has no figure; else empty
     text: str
 
 
@@ -84,14 +86,15 @@ class FitResult:
     params: Float64
     #: the estimated pose: world = R x + translation
     pose: Pose
-    #: standard deviations of the unknowns
+    #: standard deviations of the unknowns; those of the pose contain rotations that the target leaves open
     sd: Float64
     #: covariance of the unknowns
     cov: Float64
     #: correlation of the unknowns
     correlation: Float64
-    #: parameters at an end of their range; parameters that the target does not determine
+    #: names of the parameters at an end of their range
     at_bound: tuple[str, ...]
+    #: names of the parameters that the target does not determine
     not_determined: tuple[str, ...]
     #: standard deviations of the parameters before the fit: of the priors or the ranges
     prior_sd: Float64
@@ -112,21 +115,23 @@ class FitResult:
     #: log-posterior density after each iteration, up to a constant
     objective: Float64
     log_likelihood: float
-    #: evidence of the shape in an image: at most 0, the image shows no such shape; else NaN
+    #: evidence of the shape in an image; at most 0: the image shows no such shape; other targets: NaN
     evidence: float
     #: share of the volume of the shape that lies in the image
     inside_share: float
-    #: voxels or points used; voxels that are NaN or in wide spaces
+    #: number of voxels or points used
     used: int
+    #: number of voxels near the shape that were skipped: NaN, or in a space wider than `cavity=`
     nan: int
+    #: number of voxels of the whole image in such spaces
     cavity: int
     #: sum of the correlations of a residual with all residuals (1: independent)
     noise_factor: float
     #: error of the maps near the surface, mm; the covariance includes it
     model_error_mm: float
-    #: standard deviation of the point spread, mm; 0: not of this fit
+    #: images and labels: standard deviation of the point spread, mm; else 0
     blur: float
-    #: standard deviation of points from the surface, mm; 0: not of this fit
+    #: points: standard deviation of their distances from the surface, mm; else 0
     point_sd: float
     inside: tuple[Tissue, ...]
     outside: tuple[Tissue, ...]
@@ -501,19 +506,20 @@ def fit(
     """Fits a shape to a target: estimates parameters and pose with their uncertainty, with the network
     of a model or, for a Shape or with exact=True, with the exact engine.
 
-    target: an Image (or the path of one), with `label` (a value, the name of a segment, or several) a
-    label map; points [n, 3] in LPS mm, or a .csv file of lines x,y,z; a Mesh. params: where the parameters start (default: those of
-    the shape). The other arguments are the options of `sdmgen fit`, with its defaults; places and
-    directions are LPS, mm. start_points: pairs of points (in the frame of the shape [n, 3], in the
-    image [n, 3]). region: two corners of a box. reference: labels to compare with (FitResult.dice).
+    target: an Image or the path of one (with `label`, a value, the name of a segment, or several, it is
+    a label map); points [n, 3], LPS mm, or a .csv or .npy file of them; a Mesh or the path of one.
+    params: start values of the parameters (default: those of the shape).
+    start_points: pairs of points, in the frame of the shape [n, 3] and in the image [n, 3].
+    region: two corners of a box. reference: labels to compare with (FitResult.dice).
+    tolerance: share of its volume by which the organ may differ from the shape (default 0: residuals
+    must be noise; labels and points 0.05). beside: volume of the inside's material beside the shape
+    that an image may hold, over the volume of the shape (default 0.3).
+    The other arguments are the options of `sdmgen fit`, with its defaults, but for spacing: exact maps
+    have 64 voxels along the longest edge. Places and directions are LPS, mm.
 
-    A fit is judged: FitResult.verdict and FitResult.findings. tolerance: share of its volume by which
-    the organ may differ from the shape (default 0: residuals must be noise; labels and points 0.05).
-    beside: volume of the inside's material beside the shape that an image may hold, over the volume of
-    the shape.
-
-    QualityError: the fit failed or is not to be trusted (verdict "failed"); its `result` is the FitResult. An exception
-    in `progress`, or Ctrl-C, stops the fit."""
+    A fit is judged (FitResult.verdict, FitResult.findings). If it failed or is not to be trusted,
+    QualityError is raised; its `result` is the FitResult, or None. An exception in `progress`, or
+    Ctrl-C, stops the fit."""
     from_where, start_params, clamped = _open_source(source, params, exact, polish, policy, spacing)
     start = _Start(rotation, translation, start_centre, start_axis, start_points, turns, turns_sphere)
     start.check()

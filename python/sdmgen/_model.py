@@ -47,24 +47,28 @@ def accuracy_of(c: Any) -> Accuracy:
 
 @dataclass(frozen=True)
 class Quality:
-    """What the training found: `grade` is "good", "usable" or "poor" ("": trained by an earlier
-    version), `cut` the share of the shapes that the grid cuts, `between_mm` how far exact maps miss
-    the surface between the voxels, `thickness_mm` the thickness of the thinnest part. Root mean
-    square over the right value, NaN if not known: `volume_error` of the volume of maps,
-    `derivative_error` and `volume_derivative_error` of the derivatives, by the worst parameter, of
-    maps near the surface and of the volume, `surface_volume_error` of the volume inside surfaces of
-    maps. `far_error_mm`: the largest error of distances farther than `Accuracy.near_mm` from the
-    surface. `unfit`: the uses that the model is not for, with their figures, in words."""
+    """What the training found; numbers are NaN if not known. The errors of volumes and derivatives are
+    relative: root mean square of the error over that of the right values (0.1: 10 %)."""
 
+    #: "good", "usable" or "poor"; "": trained by an earlier version
     grade: str
+    #: share of the shapes that the grid cuts
     cut: float
+    #: how far exact maps, interpolated between the voxels, miss the surface
     between_mm: float
+    #: thickness of the thinnest part
     thickness_mm: float
+    #: of the volume of maps
     volume_error: float
+    #: of the derivatives of maps near the surface, by the worst parameter
     derivative_error: float
+    #: of the derivatives of the volume, by the worst parameter
     volume_derivative_error: float
+    #: of the volume inside surfaces of maps
     surface_volume_error: float
+    #: largest error of distances farther than `Accuracy.near_mm` from the surface
     far_error_mm: float
+    #: the uses that the model is not for, with their figures, in words
     unfit: tuple[str, ...]
 
 
@@ -182,7 +186,8 @@ class Model:
 
     @property
     def params(self) -> list[Param]:
-        """The parameters in their order: name, unit, range of the training, default, distribution."""
+        """The parameters in their order: name, unit, range of the training, default, distribution. Their
+        `help` is empty, since a model file holds none: `Model.shape.params` has it."""
         return self._params
 
     @property
@@ -408,7 +413,7 @@ class Model:
         return slopes
 
     def check(self, params: Params = None, *, threads: int = 0, **named: float) -> Check:
-        """The error of the network's map near the surface, mm, against exact distances."""
+        """The error of the network's map near the surface, mm, against exact distances. It needs the shape."""
         info = self(self.values(params, **named), check=True, threads=threads).info
         assert info.check is not None
         return info.check

@@ -25,8 +25,9 @@ MeshFunction = Callable[..., Any]
 
 @dataclass(frozen=True)
 class Param:
-    """A parameter: its range, its default (None: the middle of the range) and its unit, "mm", "rad",
-    "sd" or "". `mean` and `deviation`: it is normally distributed within the range; else uniform."""
+    """A parameter: its range, its default (None: the middle of the range), its unit ("mm", "rad", "sd"
+    or "") and a text of help, empty for parameters of a Model. With `mean` and `deviation` it is
+    normally distributed within the range, else uniformly."""
 
     name: str
     min: float

@@ -42,28 +42,31 @@ typedef struct sdm_model_quality {
     /* fraction of the held-out shapes that do not fit into the grid: their surfaces end open at its
        border */
     double cut;
-    /* Between the voxels: how far exact maps, interpolated linearly, miss the surface of held-out
-       shapes, root mean square, mm. sdm_accuracy holds errors at the voxels only. */
+    /* Error of interpolation: how far exact maps, interpolated linearly, miss the surface of
+       held-out shapes, root mean square, mm. sdm_accuracy holds errors at the voxels alone */
     double between_mm;
-    /* thickness of the thinnest part of a few held-out shapes, mm; NaN: not known. Surfaces on
-       voxels larger than about 0.7 of it lack such a part, or show it broken. */
+    /* thickness of the thinnest part of a few held-out shapes, mm; NaN: not known. On voxels longer
+       than about 0.7 of it, surfaces lack this part or show it broken */
     double thickness_mm;
-    /* of the mesh at the default parameters, the sum over its triangles; NaN: not known. A shape
-       with others is not the one of the training (sdm_runtime_instance()). */
+    /* of the mesh at the default parameters, sums over its triangles; NaN: not known. A shape with
+       another volume or area is not the shape of the training (sdm_runtime_instance()) */
     double mesh_volume_mm3, mesh_area_mm2;
-    /* the same for the place of its parts: an integral over its surface, which no other place of a
-       part has; NaN: not known, as in models of earlier versions */
+    /* an integral over this mesh that changes where a part is moved; NaN: not known, as in models
+       of earlier versions */
     double mesh_moment_mm3;
-    /* Root mean square over that of the right values; NaN: not known. On up to 20 held-out shapes:
-       of the volume of a map (sdm_map_volume()). On up to 32 (of more than twelve parameters, or in
-       a short training, fewer), and for the parameter for which they are largest: of the
-       derivatives of the map within half a voxel of the surface, and of the derivative of the
-       volume, where a parameter that changes the volume by less than 5 % over its range counts as
-       if it changed it by 5 %: `unfit` names those whose derivative is wrong beside its own size.
-     */
+    /* Relative errors on held-out shapes: root mean square of the error over that of the right
+       values; NaN: not known.
+       volume_error: of the volume of a map (sdm_map_volume()); up to 20 shapes.
+       derivative_error: of the derivatives of the map by a parameter, at voxels within half a voxel
+       of the surface; the largest of all parameters; up to 32 shapes, fewer with more than twelve
+       parameters or in a short training.
+       volume_derivative_error: the same of the derivative of the volume. A parameter that changes
+       the volume by less than 5 % over its range has a small derivative, over which every error is
+       large: it counts as if it changed it by 5 %. `unfit` names such a parameter, with the error
+       over its own derivative, if this is above 20 % */
     double volume_error, derivative_error, volume_derivative_error;
-    /* as volume_error, of the volume inside the surface of a map (sdm_isosurface()): edges and thin
-       walls between the voxels are cut */
+    /* as volume_error, of the volume inside the surface of a map (sdm_isosurface()), which cuts
+       edges and thin walls between the voxels */
     double surface_volume_error;
     /* largest error of a distance farther than sdm_accuracy.near_mm from the surface, mm; NaN: not
        known */
@@ -72,24 +75,24 @@ typedef struct sdm_model_quality {
        not known */
     double probe_volume_mm3[SDM_MODEL_PROBES], probe_area_mm2[SDM_MODEL_PROBES];
     double probe_moment_mm3[SDM_MODEL_PROBES];
-    /* what the training found the model not good for, in words, with the parameters: lines that end
-       with '\n'; "": nothing, or not known */
+    /* the uses for which the training found the model not good enough, in words: lines that end
+       with '\n'; "": none, or not known */
     char unfit[SDM_MODEL_UNFIT];
 } sdm_model_quality;
 
-/* Relative errors from which on a model is not for volumes, and not for derivatives. */
+/* Relative errors above which a model is not for volumes, and not for derivatives. */
 #define SDM_VOLUME_BAD 0.02
 #define SDM_DERIVATIVE_BAD 0.2
 
-/* Uses of a model, for sdm_model_check_use(), each with the figure of sdm_model_quality that
-   decides. */
+/* Uses of a model, for sdm_model_check_use(). Behind each: when the model is not good enough for
+   it, by a figure of sdm_model_quality. */
 typedef enum sdm_model_use {
     SDM_USE_SURFACE = 0,           /* surfaces and level sets: the grade is "poor" */
     SDM_USE_VOLUME = 1,            /* of maps: volume_error > SDM_VOLUME_BAD */
     SDM_USE_DERIVATIVE = 2,        /* of maps by the parameters, as of sdm_generate_jacobian() and
                                       --jacobian: derivative_error > SDM_DERIVATIVE_BAD */
-    SDM_USE_VOLUME_DERIVATIVE = 3, /* volume_derivative_error > SDM_DERIVATIVE_BAD: a parameter that
-                                      hardly changes the volume passes, see `unfit` */
+    SDM_USE_VOLUME_DERIVATIVE = 3, /* volume_derivative_error > SDM_DERIVATIVE_BAD; for parameters
+                                      that hardly change the volume see `unfit` */
     SDM_USE_DISTANCE = 4,          /* far from the surface: far_error_mm > a voxel */
     SDM_USE_SURFACE_VOLUME = 5     /* inside surfaces: surface_volume_error > SDM_VOLUME_BAD */
 } sdm_model_use;
@@ -102,9 +105,9 @@ typedef struct sdm_model_info {
     char version[16]; /* version of the program that trained the network */
     size_t n_params;
     const sdm_model_param *params; /* [n_params] */
-    /* Options of the shape as text; the exact distance needs them. The value of an option NAME that
-       is a file is the name of a copy in the folder of the model, followed by NAME.crc64: the
-       CRC-64 of the file's content at the time of training. */
+    /* Options of the shape as text; exact distances need them. If the value of an option NAME is a
+       file, it is the name of a copy in the folder of the model; the option NAME.crc64 that follows
+       is the CRC-64 of the content of the file at the time of training. */
     size_t n_options;
     const char *const *option_names, *const *option_values; /* [n_options] */
     sdm_grid grid;                                          /* grid of every map of the model */
@@ -142,11 +145,11 @@ SDM_API void sdm_model_free(sdm_model *m);
 /* The description, owned by the model. [any thread] */
 SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
 
-/* Tells whether the training found the model good enough for a use; the functions that compute
-   maps, volumes and derivatives do not ask. SDM_OK: it did. SDM_E_QUALITY: it did not; *err holds
-   the figure, as in "derivatives of volumes of its maps are off by 165 % for alpha, more than 20
-   %", with a parameter and its figure as in `unfit`. SDM_E_UNSUPPORTED: not measured (slow kinds of
-   network, earlier versions). SDM_E_ARG: m is NULL, or there is no such use. [any thread] */
+/* SDM_OK: the training found the model good enough for this use. SDM_E_QUALITY: it did not; *err
+   holds the figure, as in "derivatives of volumes of its maps are off by 165 % for alpha, more than
+   20 %". SDM_E_UNSUPPORTED: not measured (slow kinds of network, earlier versions). SDM_E_ARG: m is
+   NULL, or there is no such use. The functions that compute maps, volumes and derivatives do not
+   ask. [any thread] */
 SDM_API sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error *err);
 
 /* Index of a parameter in the parameter vectors of the model; -1 if there is none of this name.
@@ -154,10 +157,11 @@ SDM_API sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sd
 SDM_API int sdm_model_param_index(const sdm_model *m, const char *name);
 
 /* The functions below evaluate the network in the calling thread, without allocation. `scratch` is
-   memory of the caller, 64-byte aligned; its minimum size is the result of the function's
-   ..._scratch_bytes(). Concurrent calls need separate scratch memory. Parameters are in the order
-   and the units of sdm_model_info.params; it is not checked that they are finite and within their
-   ranges. Maps are signed distances in mm, negative inside, values[nz][ny][nx] with x fastest. */
+   memory of the caller, 64-byte aligned, of at least the size that the function's
+   ..._scratch_bytes() returns. Concurrent calls need separate scratch memory. Parameters are in the
+   order and the units of sdm_model_info.params; it is not checked that they are finite and within
+   their ranges. Maps are signed distances in mm, negative inside, values[nz][ny][nx] with x
+   fastest. */
 
 /* Bytes of scratch memory of sdm_model_forward() for n maps. [any thread] */
 SDM_API size_t sdm_model_scratch_bytes(const sdm_model *m, size_t n);

@@ -1,10 +1,11 @@
-/* Fits a shape to an image: estimates shape parameters and rigid pose, with their uncertainty.
+/* Fits a shape to an image, labels or points: estimates shape parameters and rigid pose, with their
+   uncertainty.
 
    Unknowns are the n parameters theta of the shape and the 6 numbers of its pose (sdm/pose.h). In
    each iteration the network or the exact engine generates the map of the shape, its signed
    distance on a grid in the shape's frame. The map is interpolated at the voxel centres of the
-   image. A tissue is a class of material inside or outside the shape, with a distribution of values
-   that is estimated along with the shape. Two models explain the value of a voxel:
+   image. A tissue is a material inside or outside the shape; the distribution of its values is
+   estimated along with the shape. Two models explain the value of a voxel:
    - partial volume (Santago and Gage 1993), the default: the shape fills the share a of the voxel,
      0 .. 1, seen through a Gaussian point spread, and the mean of the value is
      a m_in + (1 - a) m_out, with the means m of the tissues. Unbiased where the image is blurred;
@@ -42,28 +43,28 @@ extern "C" {
 typedef struct sdm_fit_source {
     /* the network that makes the maps; NULL: the exact engine makes them */
     const sdm_model *model;
-    /* the shape for the exact engine. May be NULL with a model: then there is no polish,
-       SDM_RANGE_EXACT is not allowed, and the error of the network is not measured
-       (sdm_fit_result.network_error_sd). With a model, the parameters of the shape must be those of
-       the model, see sdm_runtime_instance() */
+    /* the shape for the exact engine; beside a model one with the same parameters, as by
+       sdm_runtime_instance(). With a model it may be NULL: then there is no polish, SDM_RANGE_EXACT
+       is not allowed, and the error of the network is not measured
+       (sdm_fit_result.network_error_sd) */
     const sdm_instance *shape;
     /* without a model: grid of the exact maps in the shape's frame; it must hold the shape with a
-       margin. With voxels larger than 1.5 times the point spread of the image, the standard
-       deviations of weakly determined unknowns come out too small */
+       margin. If its voxels are larger than 1.5 times the point spread of the image, the standard
+       deviations of weakly determined unknowns are too small */
     sdm_grid grid;
-    /* with a model: how parameters outside the network's range are treated. Refuse: the fit stays
-       in the network's range, and a start outside it gives SDM_E_RANGE. Clamp: the fit stays in the
-       network's range, too, but a start outside it is moved into it, and start_clamped is set.
-       Exact: the fit stays in the shape's own range, and the exact engine makes the maps outside
-       the network's range */
+    /* with a model: what happens to parameters outside of the range of its training.
+       SDM_RANGE_REFUSE: the fit stays in this range, and a start outside of it gives SDM_E_RANGE.
+       SDM_RANGE_CLAMP: the same, but such a start is moved into the range, and start_clamped is
+       set. SDM_RANGE_EXACT: the fit stays in the range of the shape itself, and the exact engine
+       makes the maps outside of the range of the training */
     sdm_range_policy policy;
 } sdm_fit_source;
 
 typedef enum sdm_fit_kind {
     /* values[nz][ny][nx] are an image in any unit */
     SDM_FIT_IMAGE = 0,
-    /* values[nz][ny][nx] are probabilities of inside, 0 .. 1 (a label map: 0 and 1). The image
-       model takes them as shares of voxels (partial volume), or as labels with the logistic prior
+    /* values[nz][ny][nx] are probabilities of inside, 0 .. 1 (a label map: 0 and 1): with
+       SDM_FIT_PARTIAL_VOLUME shares of voxels, with SDM_FIT_LABELS labels with the logistic prior
      */
     SDM_FIT_LABEL = 1,
     /* points[n_points][3] lie on the surface, in the world, mm; outliers are tolerated. With the
@@ -87,8 +88,8 @@ typedef struct sdm_fit_target {
 /* largest number of tissues inside, and of tissues outside */
 #define SDM_FIT_LAWS 4
 
-/* Distribution of the values of one tissue: a Gaussian, or Student's t with `dof` > 0 degrees of
- * freedom (then sd is its scale). `weight` is the relative frequency of the tissue on its side. */
+/* Distribution of the values of one tissue. dof = 0: a Gaussian; dof > 0: Student's t with so many
+ * degrees of freedom, and sd is its scale. weight: relative frequency of the tissue on its side. */
 typedef struct sdm_fit_law {
     double weight, mean, sd, dof;
 } sdm_fit_law;
@@ -150,8 +151,8 @@ typedef struct sdm_fit_opts {
     /* true: the blur is not estimated */
     bool keep_blur;
     /* start values of the tissues. Images with partial volume: the mean of each tissue inside also
-       has a normal prior about its start value, with the sd of the tissue. It counts where blur is
-       as wide as the shape is thick, so that no voxel shows the mean */
+       has a normal prior about its start value, with the sd of the tissue. It counts only where
+       blur is as wide as the shape is thick: there no voxel shows the mean */
     sdm_fit_appearance appearance;
     /* true: the appearance is not estimated */
     bool keep_appearance;
@@ -164,8 +165,8 @@ typedef struct sdm_fit_opts {
        estimated unless keep_appearance is set */
     double point_sd;
     /* points: degrees of freedom of Student's t for the distances, > 0; small values tolerate
-       outliers. Besides, a share of the points, estimated unless keep_appearance is set, may lie
-       anywhere: their distances are spread evenly over the size of the shape */
+       outliers. Besides, a share of the points may lie anywhere, their distances spread evenly over
+       the size of the shape. The share is estimated; with keep_appearance it is 0 */
     double point_dof;
 
     /* [n_params] start values of the parameters; NULL: the defaults of the shape */
@@ -183,13 +184,12 @@ typedef struct sdm_fit_opts {
     /* true: the pose is not estimated */
     bool keep_pose;
 
-    /* sd of the prior of each parameter; 0: no prior. A parameter with a normal distribution (of
-       the model or, without a model, of the shape) has its prior about the mean of the
-       distribution, in units of its deviation: with 1 the prior is the distribution. Another one
-       has its prior about the middle of its range, in units of half of the range: with 0.5 the
-       range is the mean +- two sd. The likelihood counts correlated voxels as independent and is
-       therefore too sharp beside a prior: each log prior is multiplied by the ratio of the variance
-       with correlation to the variance without correlation */
+    /* sd of the prior of each parameter, in units that depend on its distribution (of the model or,
+       without a model, of the shape); 0: no prior.
+       Normal: in deviations of the distribution, about its mean; with 1 it is the prior.
+       Uniform: in halves of the range, about its middle; with 0.5 the range is the mean +- two sd.
+       The likelihood counts correlated voxels as independent and is too sharp beside a prior: so
+       each log prior is multiplied by the variance with correlation over the variance without */
     double prior_sd;
     /* sd of the prior of the rotation, rad; 0: no prior. The prior is centred at the start pose,
        with turns at the start pose rotated by the chosen turn */
@@ -221,15 +221,13 @@ typedef struct sdm_fit_opts {
        change of a parameter over its range, of the rotation in rad, and of the translation over the
        size of the shape. Unless the parameters are kept, the steps also end when they promise no
        gain: with a network several in a row, with exact maps the first one. Steps with averaged
-       gradients follow such an end, and with exact maps every converged
-       fit, too */
+       gradients follow such an end, and every converged fit with exact maps */
     double eps;
-    /* > 0: replaces eps for steps with exact maps that use the averaged gradient, in the main phase
-       and in the polish. If the parameters are kept, it replaces eps for all steps with exact
-       maps */
+    /* > 0: replaces eps in steps with exact maps and the averaged gradient, of the main phase and
+       of the polish; if the parameters are kept, in all steps with exact maps */
     double polish_eps;
-    /* >= 0: the steps also end when an undamped one would move no unknown by more than this share
-       of its standard deviation, with any eps and polish_eps; 0: they do not */
+    /* > 0: with any eps and polish_eps the steps also end when an undamped step would move no
+       unknown by more than this share of its standard deviation; 0: they do not */
     double eps_sd;
     /* number of threads, >= 0; 0: the OpenMP default. The result has the same bits for every
        value */
@@ -242,19 +240,18 @@ typedef struct sdm_fit_opts {
     /* passed to progress() and cancelled() */
     void *user;
 
-    /* 0 .. 1: share of the volume of the shape that need not be of the inside's material, see
-       SDM_FIT_CHECK_EMPTY; 0: the shape is exact, and residuals inside it must be noise. Labels and
-       points never show a surface exactly: for them at least 0.05, and the same outside. Real
-       organs differ from the model of a shape; this states by how much they may */
+    /* 0 .. 1: by how much a real organ may differ from the model of its shape: the share of the
+       volume of the shape that need not be of the inside's material, see SDM_FIT_CHECK_EMPTY. 0:
+       the shape is exact, and residuals inside it must be noise. Labels and points never show a
+       surface exactly: for them it is at least 0.05, and holds outside, too */
     double tolerance;
     /* images, >= 0: volume of the inside's material that may lie beside the shape, over the volume
        of the shape, see SDM_FIT_CHECK_MISSING: other spaces of the same material */
     double beside;
 
-    /* number of times that a fit which its checks refuse goes on from another value of one
-       parameter, if such a fit explains the data better: a long shape may have stopped with one end
-       on the data and the other one beyond them. 0: never; nothing is tried where parameters or
-       pose are kept */
+    /* how often a fit that its checks refuse may go on from another value of one parameter, if that
+       explains the data better: a long shape may have stopped with one end on the data and the
+       other one beyond them. 0: never; nor where parameters or pose are kept */
     size_t max_restarts;
     /* [n_params] true: this parameter is not estimated and keeps its start value; NULL: all or none
        are estimated, see keep_params */
@@ -265,8 +262,8 @@ typedef struct sdm_fit_opts {
 typedef enum sdm_fit_check_kind {
     /* image: evidence of the shape against the same voxels without a shape */
     SDM_FIT_CHECK_NO_SHAPE = 0,
-    /* image: the inside is darker or brighter than the outside as at the start; figure: inside mean
-       less outside mean */
+    /* image: the side that is brighter is that of the start; figure: inside mean less outside mean
+     */
     SDM_FIT_CHECK_CONTRAST,
     /* radius of the largest ball in the shape, mm, below sdm_fit_opts.cavity */
     SDM_FIT_CHECK_CAVITY,
@@ -277,9 +274,11 @@ typedef enum sdm_fit_check_kind {
     /* Residuals of whole neighbourhoods inside the surface, half as large as the shape is thick,
        against the noise: mean of (mean residual)^2 / variance. 1 where the residuals are noise.
        Size and correlation of the noise are robust statistics far from the surface (Hampel 1974;
-       Genton 1998); the limit is one that noise exceeds once in a thousand fits. Labels and points
-       are no more exact than their voxels and scatter: three times the limit refuses the fit, and
-       points too far apart to tell scatter from errors leave doubt */
+       Genton 1998); noise exceeds the limit once in a thousand fits. Images: failed above the limit
+       if the data contradict more than 2 % of the volume. Labels and points, which are no more
+       exact than their voxels and scatter: failed above three times the limit with the same 2 %,
+       and above six times the limit. Points too far apart to tell scatter from errors: doubtful,
+       without a figure */
     SDM_FIT_CHECK_RESIDUALS,
     /* the same outside of the surface, where other spaces of the same material may lie */
     SDM_FIT_CHECK_BESIDE,
@@ -316,13 +315,14 @@ typedef enum sdm_fit_check_kind {
     /* network: fraction of the held-out shapes of its training that the grid cut; not passed also
        where the training graded the network poor, see sdm_model_quality */
     SDM_FIT_CHECK_NETWORK,
-    /* points: number of those on the surface, at least that of the unknowns: the pose, and the
-       parameters without a normal distribution; doubtful below three times as many, and where as
-       many independent ones (the number over sdm_fit_result.noise_factor, the figure then) are
-       fewer than the unknowns.
-       Labels: the longest edge of their voxels, mm, at most the thickness of the thinnest part of
-       the shape; doubtful above. All data: failed where they determine none of the parameters
-       (sdm_fit_result.by_prior) */
+    /* Points: number of those on the surface. Unknowns are the pose and the parameters without a
+       normal distribution: failed below their number, doubtful below three times as many. Doubtful,
+       too, if the points count as fewer independent ones than unknowns; the figure is then the
+       number over sdm_fit_result.noise_factor.
+       Labels: the longest edge of their voxels, mm; doubtful above the thickness of the thinnest
+       part of the shape.
+       All data: failed if they determine none of the parameters (sdm_fit_result.by_prior), doubtful
+       if not more than half of those without a normal distribution */
     SDM_FIT_CHECK_DATA,
     /* points: median distance from their coordinate-wise median, mm; limit: a tenth of the reach of
        the shape. Points within less show too little of it, or are not in mm */
@@ -332,24 +332,23 @@ typedef enum sdm_fit_check_kind {
        distance bends within a voxel on at most a tenth of the surface), the voxels of the labels or
        the point spread of the image */
     SDM_FIT_CHECK_VOXELS,
-    /* Gain over the shape in its next best pose: the better one of the runner-up of the search for
-       the start and the best of 96 rotations of the fitted shape, each improved to the nearest
-       maximum; or, if it is less, over the shape with another value of one parameter, such as a
-       joint of an arm, improved in the same way. In units of log-likelihood of independent samples,
-       as sdm_fit_compare(). Poses in which the surface is nearly the same (Dice coefficient above
-       0.9) do not count. Left out where every such start leads back to the fit, where the pose is
-       kept, and where a check failed. Points: doubtful above -30; of few points the likelihood of
-       the single ones decides */
+    /* Gain over the nearest rival in log-likelihood, as of independent samples (sdm_fit_compare()).
+       Rivals: the runner-up of the search for the start; the best of 96 rotations of the fitted
+       shape; the shape with another value of one parameter, such as a joint of an arm; each
+       improved to the nearest maximum. Poses with nearly the same surface (Dice coefficient above
+       0.9) do not count. Without a figure if every such start leads back to the fit; left out where
+       the pose is kept or a check failed. Points: doubtful above -30; of few points the likelihood
+       of the single ones decides */
     SDM_FIT_CHECK_NEXT_POSE,
     /* points: share of those that lie on no surface of the shape but form one: neighbours as near
-       as those on the shape, or in a thin layer; at most 0.05 or sdm_fit_opts.tolerance, and 0.01
-       where SDM_FIT_CHECK_COVERED does not pass; doubtful above 0.003 and above a twentieth of the
-       points that lie on no surface */
+       as those on the shape, or in a thin layer. Doubtful above 0.003 and above a twentieth of the
+       points that lie on no surface; failed above 0.05 or sdm_fit_opts.tolerance, and above 0.01 if
+       SDM_FIT_CHECK_COVERED does not pass */
     SDM_FIT_CHECK_PATCH,
-    /* points: share of the fitted surface without points near it, at most 0.02. Doubtful, because
-       the data may show a part of the shape only; failed beside more strays than 0.1 or
-       sdm_fit_opts.tolerance, and where more than 0.5 are without points and half of the
-       parameters end at their bounds */
+    /* points: share of the fitted surface without points near it. Doubtful above 0.02, because the
+       data may show a part of the shape only, and for a parameter whose moved surface has no
+       points. Failed if then more than 0.1 or sdm_fit_opts.tolerance of the points are strays, or
+       if the share is above 0.5 and half of the parameters end at their bounds */
     SDM_FIT_CHECK_COVERED,
     /* network: sdm_fit_result.network_error_sd, at most 1; doubtful above */
     SDM_FIT_CHECK_NETWORK_ERROR,
@@ -369,7 +368,7 @@ SDM_API const char *sdm_fit_check_name(sdm_fit_check_kind kind);
 
 typedef enum sdm_fit_grade {
     SDM_FIT_PASSED = 0,
-    /* noticed, but no reason to distrust the fit */
+    /* nothing refutes the fit, but its sd may be too small, or the data may show another shape */
     SDM_FIT_DOUBTFUL = 1,
     SDM_FIT_FAILED = 2
 } sdm_fit_grade;
@@ -426,8 +425,8 @@ typedef struct sdm_fit_result {
     double *correlation;
     /* [n_params] true: the estimate is at an end of its range, and its sd is not reliable */
     bool *at_bound;
-    /* [n_params] true: the sd is about that of the prior, or of a uniform distribution over the
-       range, so the target does not determine the parameter */
+    /* [n_params] true: the target does not determine the parameter: its sd is above 0.9 of
+       prior_sd */
     bool *by_prior;
     /* true: the start was moved into the network's range */
     bool start_clamped;
@@ -440,9 +439,9 @@ typedef struct sdm_fit_result {
     char reason[256];
     /* number of iterations of the main phase and the polish */
     size_t n_iterations;
-    /* [n_iterations] log-posterior density after each iteration, up to a constant. Two values are
-       comparable only if the voxels (the region follows the shape), the weights of the priors, the
-       sd of the tissues and the tissue weights in space are the same */
+    /* [n_iterations] log-posterior density after each iteration, up to a constant. Compare two
+       values only if they have the same voxels (the region follows the shape), weights of the
+       priors, sd of the tissues and tissue weights in space */
     double *objective;
     /* log-likelihood of the target at the estimate */
     double log_likelihood;
@@ -450,13 +449,13 @@ typedef struct sdm_fit_result {
        which the outside tissues keep the relative weights in space of the fit; other targets:
        NaN */
     double log_likelihood_without;
-    /* image: evidence of the shape: its gain in log-likelihood, as of independent voxels, less the
-       cost of its unknowns: log(N) / 2 for each unknown of the pose, N being the number of
-       independent voxels (Schwarz 1978); for a parameter as much or less, by Laplace's method with
-       its prior, so that one which the data do not determine costs nothing (Kass and Raftery
-       1995). How many voxels count as one independent one follows from the robust correlations of
-       SDM_FIT_CHECK_RESIDUALS or, where these cannot be measured, is noise_factor. At most 0: the
-       image shows no such shape. Other targets: NaN */
+    /* image: evidence of the shape; at most 0: the image shows no such shape; other targets: NaN.
+       It is the gain in log-likelihood, as of independent voxels, less the cost of the unknowns:
+       log(N) / 2 for each of the pose, N being the number of independent voxels (Schwarz 1978); for
+       a parameter as much or less, by Laplace's method with its prior (Kass and Raftery 1995): one
+       that the data do not determine costs nothing. How many voxels count as one follows from the
+       robust correlations of SDM_FIT_CHECK_RESIDUALS or, if these cannot be measured, is
+       noise_factor */
     double evidence;
     /* share of the volume of the shape that lies in the image; 1 for points; NaN if the fit failed
        before computing it; the same holds for the figures marked "NaN as inside_share" */
@@ -470,17 +469,17 @@ typedef struct sdm_fit_result {
     /* sum of the correlations of a residual with all residuals, itself included (1: independent);
      * NaN as inside_share */
     double noise_factor;
-    /* error near the surface of the maps of the last phase, mm: that of the network on held-out
-       data, 0 for exact maps; with a label map and partial volume, also that of the voxels of the
-       labels (0.12 of one) and of the maps (0.03 of one); with points and a network that of the
-       maps (0.01 of one). The covariance includes it. NaN as inside_share */
+    /* error near the surface of the maps of the last phase, mm, which the covariance includes: of a
+       network that on held-out data, of exact maps 0. Added to it: with a label map and partial
+       volume 0.12 voxels of the labels and 0.03 of the maps; with points and a network 0.01 voxels
+       of the maps. NaN as inside_share */
     double model_error_mm;
     /* partial volume: sd of the point spread, mm; other fits: 0 */
     double blur;
     /* tissues at the end of the fit */
     sdm_fit_appearance appearance;
-    /* points: standard deviation of the distances of the points from the surface, without the
-       outliers, mm; other targets: 0 */
+    /* points: sd of their distances from the surface, without the outliers, mm; also with
+       keep_appearance as measured; other targets: 0 */
     double point_sd;
     /* number of the rotation that was chosen, from 0 */
     size_t turn;
@@ -494,9 +493,9 @@ typedef struct sdm_fit_result {
     /* points: share of outliers, points that lie anywhere; other targets: 0 */
     double outliers;
     /* rigid motions that the target does not determine, such as "rotation about the axis (0, 0, 1)
-       through (1, 2, 3) mm" (LPS) of a shape that is symmetric about this axis; empty: none. Of
-       such an angle the pose has an arbitrary value, and its variance in the covariance is that of
-       any angle, pi^2 / 3. With a prior of the rotation (translation) the prior decides */
+       through (1, 2, 3) mm" (LPS) of a shape that is symmetric about this axis; empty: none. The
+       pose then has any such angle, with the variance of any angle, pi^2 / 3, in the covariance; a
+       prior of the rotation (translation) decides where there is one */
     char open_motions[512];
     /* keep_pose: what a fit from here with a free pose does: rms motion of the surface along its
        normal, mm, and gain in log posterior density, as of independent samples (about 3 for the
@@ -521,11 +520,10 @@ typedef struct sdm_fit_result {
     /* standard deviations of the pose as in sd[n_params ...], without those along open_motions:
        rad, mm; the same as in sd where there are none. NaN as sd */
     double pose_sd_determined[6];
-    /* network, with the shape in the source: the largest change of a parameter, over its standard
-       deviation without it, if exact maps on the same grid took the place of the network's, to
-       first order; and the index of this parameter. Of the parameters that the data determine: the
-       others lack data, whatever the maps. The squared changes are part of the covariance. NaN: not
-       measured */
+    /* network, with the shape in the source: the largest change of a parameter if exact maps on the
+       same grid replaced those of the network, to first order, over its sd without this change; and
+       the index of this parameter. Only parameters that the data determine count. The squared
+       changes are part of the covariance. NaN: not measured */
     double network_error_sd;
     size_t network_error_param;
     /* the change itself, in the unit of this parameter */
@@ -557,32 +555,34 @@ SDM_API sdm_status sdm_fit_measure(const sdm_instance *shape, const sdm_fit_resu
                                    const double *depths, size_t n_depths, sdm_measures *out,
                                    sdm_error *err);
 
-/* points[n][3] = points on the surface of a mesh (mm), for a fit to the mesh: its vertices are
-   dense where it bends and absent from flat faces, and would weigh these places accordingly. The
-   points lie evenly on the boundary of the union of the mesh's volumes (sdm_exact_surface()):
-   surface of one part inside another has none. Each triangle has its share of the area to within
-   one point. The same bits for any number of threads. Errors of sdm_exact_create(); SDM_E_MESH: no
-   area. [any thread] */
+/* points[n][3] = points (mm) spread evenly over the surface of a mesh, for a fit to the mesh. (Its
+   vertices are dense where it bends and absent from flat faces, and would weigh these places
+   accordingly.) The surface is the boundary of the union of the mesh's volumes
+   (sdm_exact_surface()): that of a part inside another has no points. Each triangle has its share
+   of the area to within one point. The points come in the order of the triangles: a part of the
+   array shows a part of the shape, and every k-th point of repeating sectors may show the same
+   place of each. Take random points for a smaller set. The same bits for any number of threads.
+   Errors of sdm_exact_create(); SDM_E_MESH: no area. [any thread] */
 SDM_API sdm_status sdm_fit_surface_points(const sdm_mesh *mesh, size_t n, int n_threads,
                                           double *points, sdm_error *err);
 
 /* Fits the mirror image of the shape: the shape of source to the target reflected in the world's x,
-   from the start pose reflected in the shape's y about the centroid of the shape. Parameters,
-   evidence and verdict are those of the mirrored shape; the pose belongs to the reflected world. A
-   rival for shapes with a left and a right form, see sdm_fit_compare(): it is fitted only as far as
-   that comparison needs, with a polish_eps of at least 1e-3 and without SDM_FIT_CHECK_NEXT_POSE.
+   from the start pose reflected in the shape's y about the centroid of the shape. It is a rival for
+   shapes with a left and a right form, fitted only as far as sdm_fit_compare() needs: with a
+   polish_eps of at least 1e-3 and without SDM_FIT_CHECK_NEXT_POSE. Parameters, evidence and verdict
+   are those of the mirrored shape; the pose belongs to the reflected world.
    Errors as sdm_fit(). [any thread] */
 SDM_API sdm_status sdm_fit_mirrored(const sdm_fit_source *source, const sdm_fit_target *target,
                                     const sdm_fit_opts *opts, sdm_fit_result *out, sdm_error *err);
 
 /* Compares a fit with a rival fit of the same target, for example of the mirror image of the shape.
-   Returns by how much the fit is better, in units of log-likelihood of independent samples; below
-   0: the rival is better; infinite: only one of the two holds an estimate; NaN: neither does.
-   Images: the difference of the evidences over max(1, the smaller chi-square of the two): where
+   Returns by how much the fit is better, in log-likelihood, as of independent samples; below 0: the
+   rival is better; infinite: only one of the two holds an estimate; NaN: neither does.
+   Images: the difference of the evidences over max(1, the smaller chi-square of the two): if
    neither shape explains the image, the difference is less certain by this factor (Wedderburn
-   1974). Other targets: the log-likelihood ratio of the mean
-   residuals of neighbourhoods, n / 2 log(chi-square of the rival / chi-square of the fit), whose
-   common variance is estimated. [any thread] */
+   1974). Other targets: n / 2 log(chi-square of the rival / chi-square of the fit), the
+   log-likelihood ratio of the mean residuals of n neighbourhoods, whose common variance is
+   estimated. [any thread] */
 SDM_API double sdm_fit_compare(const sdm_fit_result *fit, const sdm_fit_result *rival);
 
 /* Least difference of two fits by which one is preferred, 3: "strong evidence" (Kass and Raftery

@@ -22,7 +22,7 @@ typedef enum sdm_range_policy {
     SDM_RANGE_EXACT
 } sdm_range_policy;
 
-/* Points outside of the box of the voxel centres of the model's grid (sdm/field.h). */
+/* Treatment of points outside of the box of the voxel centres of the model's grid (sdm/field.h). */
 typedef enum sdm_outside {
     /* The call fails with SDM_E_RANGE. */
     SDM_OUTSIDE_REFUSE = 0,
@@ -91,16 +91,15 @@ SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, 
 /* Map and derivatives: jacobian[n_params][nz][ny][nx] = derivative of the map by each parameter, mm
    per unit of the parameter; from the network, or from sdm_exact_shape_jacobian() if the exact
    engine computes the map. For clamped parameters it is the network's derivative at the end of the
-   range. For a `pod` network it takes less time than n_params + 1 calls of sdm_generate(). The map
-   depends smoothly on the parameters. If weights are stored as bytes, the map differs from that of
-   sdm_generate() by rounding: for cochleas by 2e-4 mm root mean square, 2e-3 mm at most; and the
-   error of the derivatives is, relative to the largest derivative by the same parameter, 2e-4 root
-   mean square, 1.5e-3 at most. These are roundings: derivatives are those of the network's map,
-   whose error against exact distances changes with the parameters. Training measures them for the
-   worst parameter, and sdm_model_check_use(SDM_USE_DERIVATIVE) tells whether they are right within
-   20 %; where walls are thin beside the voxels they
-   may be wrong several times: sdm_exact_shape_jacobian() is exact. Errors as for sdm_generate() and
-   sdm_exact_shape_jacobian(). [any thread] */
+   range. For a `pod` network it takes less time than n_params + 1 calls of sdm_generate().
+   Accuracy: these are the derivatives of the network's map, whose error against exact distances
+   changes with the parameters. Training measures them for the worst parameter;
+   sdm_model_check_use(SDM_USE_DERIVATIVE) tells whether they are right within 20 %. Where walls are
+   thin beside the voxels they may be wrong several times over: sdm_exact_shape_jacobian() is exact.
+   Rounding: the map depends smoothly on the parameters. If weights are stored as bytes, it differs
+   from that of sdm_generate(), for cochleas by 2e-4 mm root mean square, 2e-3 mm at most, and the
+   derivatives are off by 2e-4 root mean square, 1.5e-3 at most, of the largest one by the same
+   parameter. Errors as for sdm_generate() and sdm_exact_shape_jacobian(). [any thread] */
 SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params,
                                          const sdm_generate_opts *opts, float *values,
                                          float *jacobian, sdm_result *result, sdm_error *err);
@@ -126,12 +125,12 @@ SDM_API sdm_status sdm_generate_vjp(const sdm_model *m, const double *params, co
 /* *out = new instance of the shape that the model was trained on, with the same options, from a
    registry that contains the shape; free with sdm_instance_free(). Only for the exact engine:
    networks do not need it. SDM_E_PLUGIN: the registry does not contain the shape, or its parameters
-   differ from the model's, or its mesh at the default parameters has another volume or area than at
-   the training (by more than 1e-6): the shape was changed since. The data files of the shape are
-   looked for in the model's folder alone (sdm_model_info.folder), under the last part of the name
-   that the model holds. SDM_E_IO: one is not there, or the model was opened from memory;
-   SDM_E_UNSUPPORTED: it is a symbolic link; SDM_E_FORMAT: its content differs from that in
-   training. For files elsewhere make the instance with sdm_instance_create(). */
+   differ from the model's, or the shape was changed since the training: its mesh, at the default
+   parameters or three others, has another volume, area or moment (by more than 1e-6). The data
+   files of the shape are looked for in the model's folder alone (sdm_model_info.folder), under the
+   last part of the name that the model holds. SDM_E_IO: one is not there, or the model was opened
+   from memory; SDM_E_UNSUPPORTED: it is a symbolic link; SDM_E_FORMAT: its content differs from
+   that in training. For files elsewhere make the instance with sdm_instance_create(). */
 SDM_API sdm_status sdm_runtime_instance(const sdm_model *m, const sdm_registry *r,
                                         sdm_instance **out, sdm_error *err);
 

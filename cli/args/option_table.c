@@ -408,8 +408,8 @@ const cli_option cli_options[] = {
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(force),
      "start again in a folder that holds a model"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(force),
-     "write the files also of a fit that is not to be trusted (the exit code stays 4), and fit "
-     "targets whose size the shape cannot have, and images whose tissues look exchanged at the "
+     "write the files of a fit that is not to be trusted, too (the exit code stays 4); fit also to "
+     "targets whose size the shape cannot have, and to images whose tissues look exchanged at the "
      "start"},
     {"dry-run", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_EXPERIMENT), AT(dry_run),
      "print the planned rows and the duration of the trainings, then stop"},
@@ -529,8 +529,8 @@ const cli_option cli_options[] = {
     {"turns-sphere", 0, CLI_INT, "N", NULL, 1, 4096, ON(CLI_FIT), AT(fit.turns_sphere),
      "number of rotations tried about all axes (default 60 without a start rotation)"},
     {"find", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(fit.find),
-     "no start: search the whole image for the shape, fit and judge the best places, tell all of "
-     "them, and take the best fit that is accepted"},
+     "search the whole image for the shape, without a start: fit and judge the best places, print "
+     "all of them, and take the accepted one with the most evidence"},
     {"candidates", 0, CLI_INT, "N", NULL, 1, 100, ON(CLI_FIT), AT(fit.candidates),
      "number of places that --find fits and judges (default 4)"},
     {"region", 0, CLI_REAL6, "X,Y,Z,X,Y,Z", NULL, -1e12, 1e12, ON(CLI_FIT), AT(fit.region),
@@ -560,8 +560,8 @@ const cli_option cli_options[] = {
     {"l-ref", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.l_ref),
      "scale of the logistic prior of labels (default 0.2, but 0.25 to 2 voxels)"},
     {"point-sd", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.point_sd),
-     "standard deviation of the distance of points from the surface at the start (default 0.1, but "
-     "0.125 to 1 voxel)"},
+     "standard deviation of points about the surface at the start; the fit estimates it, unless "
+     "--keep appearance (default 0.1, but 0.125 to 1 voxel)"},
     {"keep", 0, CLI_LIST, "WHAT", NULL, 0, 0, ON(CLI_FIT), AT(fit.keep),
      "keep at the start value: all parameters, pose, blur or appearance, or the parameter of this "
      "name (its value: -p); may be repeated"},
@@ -573,8 +573,8 @@ const cli_option cli_options[] = {
     {"prior-translation", 0, CLI_REAL, "MM", NULL, 0, 1e9, ON(CLI_FIT), AT(fit.prior_translation),
      "standard deviation of the prior of the translation from the start (default 0: no prior)"},
     {"eps", 0, CLI_REAL, "F", NULL, 1e-12, 1, ON(CLI_FIT), AT(fit.eps),
-     "the fit ends when no unknown changes by more than this fraction of its range (default 1e-4; "
-     "exact maps 3e-6; or a hundredth of its standard deviation, if that is reached before)"},
+     "the fit ends when a step changes no unknown by more than this fraction of its range (default "
+     "1e-4, exact maps 3e-6, or before that a hundredth of its standard deviation)"},
     {"max-iterations", 0, CLI_INT, "N", NULL, 1, 100000, ON(CLI_FIT), AT(fit.max_iterations),
      "largest number of iterations of a phase (default 60). A fit with exact maps has a second "
      "phase, which averages derivatives; a fit to points is made twice"},
@@ -589,8 +589,8 @@ const cli_option cli_options[] = {
      "volume of the inside's material that may lie beside the shape, over that of the shape "
      "(default 0.3)"},
     {"mirror", 0, CLI_CHOICE, NULL, "auto|no", 0, 0, ON(CLI_FIT), AT(fit.mirror),
-     "auto: also fit the mirror image of a shape that has one and tell which fits better; a shape "
-     "whose side is not given with -O takes the better one (default auto)"},
+     "auto (default): fit the mirror image of a shape that has one, too, and tell which fits "
+     "better; a side that is not given with -O is that of the better one"},
 
     /* fits of many cases */
     {"cases", 0, CLI_TEXT, "FILE.csv", NULL, 0, 0, ON(CLI_FIT), AT(cohort.cases),

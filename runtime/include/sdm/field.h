@@ -19,10 +19,10 @@
    1 mm per mm if d does.
 
    Values have the same bits for any number of threads and on every instruction set. A point has the
-   same bits as a voxel of a grid with its centre there, if the axes of the grid are those of the
-   model's grid, in the same order, and their directions hold only 0, 1 and -1, or if an axis of
-   the grid is parallel to none of the model's and sdm_grid_world() gives the centre. On other
-   grids, values differ by rounding. */
+   same bits as a voxel of a grid with its centre there in two cases: the axes of the grid are those
+   of the model's grid, in the same order, and their directions hold only 0, 1 and -1; or no axis of
+   the grid is parallel to one of the model's, and sdm_grid_world() gives the centre. On other grids
+   values differ by rounding. */
 #ifndef SDM_FIELD_H
 #define SDM_FIELD_H
 
@@ -38,7 +38,7 @@ typedef struct sdm_field sdm_field;
 
 /* *out = a field of the model, which must outlive it; free it with sdm_field_free(). derivatives:
    the derivatives by the parameters are wanted too. opts (may be NULL): policy, exact_shape,
-   n_threads and outside are used; SDM_E_ARG for the others. [any thread] */
+   n_threads and outside; SDM_E_ARG if `check` or `max_error_mm` is set. [any thread] */
 SDM_API sdm_status sdm_field_create(const sdm_model *m, const sdm_generate_opts *opts,
                                     bool derivatives, sdm_field **out, sdm_error *err);
 

@@ -278,7 +278,9 @@ typedef enum sdm_fit_check_kind {
        if the data contradict more than 2 % of the volume. Labels and points, which are no more
        exact than their voxels and scatter: failed above three times the limit with the same 2 %,
        and above six times the limit. Points too far apart to tell scatter from errors: doubtful,
-       without a figure */
+       without a figure; where keep_appearance is set, the mean square of their distances over that
+       of point_sd, which n points and k unknowns exceed by chance once in a thousand fits,
+       1 + 3.1 sqrt(2 / (n - k)); doubtful above it */
     SDM_FIT_CHECK_RESIDUALS,
     /* the same outside of the surface, where other spaces of the same material may lie */
     SDM_FIT_CHECK_BESIDE,

@@ -88,6 +88,10 @@ class FitResult:
     pose: Pose
     #: standard deviations of the unknowns; those of the pose contain rotations that the target leaves open
     sd: Float64
+    #: the same of the pose without these rotations, [6]; the command line prints these
+    pose_sd_determined: Float64
+    #: the motions of the pose that the target leaves open, in words; "": none
+    open_motions: str
     #: covariance of the unknowns
     cov: Float64
     #: correlation of the unknowns
@@ -133,6 +137,8 @@ class FitResult:
     blur: float
     #: points: standard deviation of their distances from the surface, mm; else 0
     point_sd: float
+    #: points: estimated share of strays; else 0
+    outliers: float
     inside: tuple[Tissue, ...]
     outside: tuple[Tissue, ...]
     #: number of the rotation that was chosen
@@ -674,6 +680,8 @@ def _result_of(
         params=params,
         pose=pose,
         sd=copied(c.sd, (total,), np.float64),
+        pose_sd_determined=np.array(c.pose_sd_determined[: len(_POSE)], np.float64),
+        open_motions=c.open_motions.decode(),
         cov=copied(c.covariance, (total, total), np.float64),
         correlation=copied(c.correlation, (total, total), np.float64),
         at_bound=tuple(name for name, flag in zip(names, at_bound) if flag),
@@ -698,6 +706,7 @@ def _result_of(
         model_error_mm=c.model_error_mm,
         blur=c.blur,
         point_sd=c.point_sd,
+        outliers=c.outliers,
         inside=tuple(Tissue(law.weight, law.mean, law.sd) for law in look.inside[: look.n_inside]),
         outside=tuple(Tissue(law.weight, law.mean, law.sd) for law in look.outside[: look.n_outside]),
         turn=c.turn,

@@ -31,6 +31,10 @@ def compare(result, text):
     assert told["unknowns"] == list(result.unknowns)
     assert told["iterations"] == result.iterations and told["used"] == result.used
     assert told["log_likelihood"] == result.log_likelihood
+    assert told["not_determined_motions"] == result.open_motions and told.get("outliers", 0) == result.outliers
+    if result.open_motions:
+        assert told["pose"]["rotation_sd_determined_rad"] == list(result.pose_sd_determined[:3])
+        assert told["pose"]["translation_sd_determined_mm"] == list(result.pose_sd_determined[3:])
     assert told["verdict"]["grade"] == result.verdict
     # the program also fits the mirror image
     told_checks = [c for c in told["verdict"]["checks"] if c["name"] != "mirror image"]
@@ -60,6 +64,7 @@ def test_an_image(run, ct):
     result = sdmgen.fit(shape, sdmgen.read(ct["ct.nii.gz"]), **named, progress=seen.append)
     compare(result, told)
     compare_measures(result, told)
+    assert "rotation about the axis" in result.open_motions and result.pose_sd_determined[2] < 0.1 < result.sd[4]
     assert abs(result.values["major"] - 2.6) < 0.1 and result.dice > 0.9 and result.evidence > 0
     assert len(seen) >= result.iterations and seen[-1].phase == "fit" and seen[0].params.shape == (2,)
     assert abs(result.surface().audit().volume - shape.mesh(result.values).audit().volume) < 3

@@ -3,9 +3,9 @@
 
 #include "commands.h"
 #include "inputs/config_shape.h"
-#include "report/report_survey.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
+#include "survey/report_survey.h"
 
 /* Names that the lists below leave out, for sdm_config_changed_keys(). */
 static const char NETWORK[] = " kind depth rank levels block modes degree fine weights skip output "

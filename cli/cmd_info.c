@@ -129,7 +129,7 @@ static sdm_status info_mesh(const cli_args *args, const char *path, sdm_error *e
     sdm_mesh mesh = {0};
     sdm_part_audit audit = {0};
     sdm_status s = cli_read_mesh(path, &mesh, err);
-    if (!s) s = sdm_part_audit_make(&mesh, true, &audit, err);
+    if (!s) s = sdm_part_audit_make(&mesh, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL, &audit, err);
     if (!s && args->json) {
         sdm_json j = {0};
         sdm_json_open(&j, NULL, '{');

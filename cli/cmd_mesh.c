@@ -18,7 +18,7 @@ static sdm_status report_audit(const cli_args *args, const sdm_mesh *mesh, sdm_e
         cli_warn_mesh(mesh, 0, mend);
         return SDM_OK;
     }
-    sdm_status s = sdm_part_audit_make(mesh, true, &audit, err);
+    sdm_status s = sdm_part_audit_make(mesh, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL, &audit, err);
     if (s) return s;
     if (args->json) {
         sdm_json json = {0};

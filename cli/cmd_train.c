@@ -13,7 +13,6 @@
 #include "page/page.h"
 #include "print_plan.h"
 #include "report/files.h"
-#include "report/report_survey.h"
 #include "report/report_verdict.h"
 #include "report/terminal.h"
 #include "report/train_progress.h"
@@ -22,6 +21,7 @@
 #include "sdm/memory.h"
 #include "sdm/picture.h"
 #include "study/evaluate.h"
+#include "survey/report_survey.h"
 
 /* Draws slices exact | network | error at the default parameters of the model. */
 static sdm_status write_picture(const sdm_model *model, const sdm_instance *shape,

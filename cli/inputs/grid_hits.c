@@ -1,8 +1,8 @@
 /* Tells which flat faces lie on planes of voxel centres. */
 #include "grid_hits.h"
 
-#include "report/report_survey.h"
 #include "report/terminal.h"
+#include "survey/findings.h"
 
 void cli_tell_hits(const sdm_mesh *mesh, const sdm_grid *g, bool counted, bool has_origin)
 {

@@ -279,7 +279,7 @@ static sdm_status write_vdb(const char *path, const cli_map *map, const cli_args
 void cli_map_compare(const sdm_mesh *shape, cli_map *map)
 {
     sdm_part_audit audit;
-    if (sdm_part_audit_make(shape, true, &audit, NULL)) return;
+    if (sdm_part_audit_make(shape, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL, &audit, NULL)) return;
     if (audit.mesh.closed && !audit.inside_out) {
         map->volume = audit.union_volume;
         if (!audit.mesh.self_intersections && !audit.mesh.nonmanifold_edges) map->pieces = audit.n;

@@ -330,16 +330,23 @@ bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text)
 {
     size_t most = 0;
     for (size_t i = 1; i < a->n; i++)
-        if (a->part[i].folded > a->part[most].folded) most = i;
-    if (!a->n || !(a->part[most].folded > SDM_PART_FOLDED_MIN)) return false;
+        if (sdm_part_tangle(&a->part[i]) > sdm_part_tangle(&a->part[most])) most = i;
+    if (!a->n || !(sdm_part_tangle(&a->part[most]) > 0)) return false;
+    const sdm_part *p = &a->part[most];
     cli_name_part(a, most, text);
-    sdm_text_add(
-        text,
-        "passes through itself, and %.2g %% of its surface faces the wrong way: what lies "
-        "behind that is missing; are two of its vertices exchanged, is the radius of a "
-        "fillet larger than half of the thickness, a wall thicker than the part is wide, or "
-        "an angle in degrees given to cos() or sin()?",
-        100 * a->part[most].folded);
+    if (p->folded > SDM_PART_FOLDED_MIN)
+        sdm_text_add(text,
+                     "passes through itself, and %.2g %% of its surface faces the wrong way: what "
+                     "lies behind that is missing; are two of its vertices exchanged, ",
+                     100 * p->folded);
+    else
+        sdm_text_add(text,
+                     "passes through itself in %.2g %% of its surface, over %g %%: is its outline "
+                     "a loop, does it go round more than once, ",
+                     100 * p->crossing, 100 * SDM_PART_CROSSING_MAX);
+    sdm_text_add(text, "is the radius of a fillet larger than half of the thickness, a wall "
+                       "thicker than the part is wide, or an angle in degrees given to cos() or "
+                       "sin()?");
     return true;
 }
 
@@ -419,7 +426,7 @@ static void warn_folded(const sdm_part_audit *audit)
 bool cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend)
 {
     sdm_part_audit audit;
-    if (sdm_part_audit_make(mesh, false, &audit, NULL)) return false;
+    if (sdm_part_audit_make(mesh, SDM_AUDIT_WALLS, NULL, &audit, NULL)) return false;
     warn_open(&audit);
     warn_unused(&audit);
     cli_warn_audit(&audit.mesh);

@@ -39,8 +39,8 @@ void cli_describe_open(const sdm_part_audit *a, sdm_text *text);
 /* Writes one line about vertices of no triangle to `text`; nothing if there are none. */
 void cli_describe_unused(const sdm_part_audit *a, sdm_text *text);
 
-/* Writes one line about the part of which the largest share faces the wrong way to `text`. false:
- * there is none; `text` stays as it was. */
+/* Writes one line about the part with the largest sdm_part_tangle() to `text`. false: there is
+ * none; `text` stays as it was. */
 bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text);
 
 /* Writes one line about part `index`, whose thickness is known and too small for voxels of this

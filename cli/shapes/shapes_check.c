@@ -12,12 +12,12 @@
 #include "report/json_values.h"
 #include "report/progress_bar.h"
 #include "report/report_audit.h"
-#include "report/report_survey.h"
 #include "report/terminal.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
 #include "sdm/picture.h"
+#include "survey/report_survey.h"
 
 enum { SAMPLES = 128, SECONDS = 60, DRAWN = 9, TITLE_MAX = 200 };
 
@@ -31,6 +31,9 @@ typedef struct check {
     sdm_distribution distribution[SDM_MAX_PARAMS];
     sdm_survey_opts opts;
     cli_progress bar;
+    unsigned told;      /* sum of the stages printed */
+    sdm_status printed; /* by print_stage(); its message */
+    sdm_error why;
 } check;
 
 static void show_progress(void *user, const char *what, double share)
@@ -112,12 +115,30 @@ static void add_line(void *user, sdm_status weight, const char *line)
     sdm_json_close(json, '}');
 }
 
-static sdm_status print_text(const check *c, sdm_error *err)
+/* Prints what a stage has found, so that it can be read while the next one runs. */
+static void print_stage(void *user, sdm_survey_stage stage)
+{
+    check *c = user;
+    const sdm_shape_survey *f = &c->survey.found;
+    if (c->args->json) return;
+    cli_progress_clear(&c->bar);
+    if (stage == SDM_SURVEY_MESHES) {
+        printf("%s: the default shape, %zu corners of the ranges, %zu random shapes\n",
+               sdm_instance_shape(c->survey.shape)->name, f->n_corners, f->n_samples);
+        printf("mesh     %zu vertices, %zu triangles, %.3g ms\n", f->n_vert, f->n_tri, f->ms_mesh);
+    }
+    if (!c->printed) c->printed = cli_survey_tell(&c->survey, stage, print_line, NULL, &c->why);
+    c->told |= stage;
+    (void)fflush(stdout);
+}
+
+static sdm_status print_rest(const check *c, sdm_error *err)
 {
     const sdm_shape_survey *f = &c->survey.found;
-    printf("%s: the default shape, %zu corners of the ranges, %zu random shapes\n",
-           sdm_instance_shape(c->survey.shape)->name, f->n_corners, f->n_samples);
-    printf("mesh     %zu vertices, %zu triangles, %.3g ms\n", f->n_vert, f->n_tri, f->ms_mesh);
+    if (c->printed) {
+        *err = c->why;
+        return c->printed;
+    }
     if (f->volume[0] <= f->volume[1])
         printf("volume   %.6g .. %.6g mm^3, of the union\n", f->volume[0], f->volume[1]);
     if (!(f->low[0] <= f->high[0]))
@@ -128,7 +149,7 @@ static sdm_status print_text(const check *c, sdm_error *err)
     if (f->has_velocity)
         printf("velocity differs from differences of meshes by %.2g at most (relative)\n",
                f->velocity_error);
-    return cli_survey_tell(&c->survey, print_line, NULL, err);
+    return cli_survey_tell(&c->survey, CLI_ALL_STAGES & ~c->told, print_line, NULL, err);
 }
 
 static void add_count(sdm_json *j, const check *c, const char *key, const sdm_survey_count *count)
@@ -217,7 +238,7 @@ static sdm_status print_json(const check *c, sdm_error *err)
     if (f->has_velocity) sdm_json_real(&j, "velocity_error", f->velocity_error);
     sdm_json_int(&j, "unlike", (int64_t)f->repeat.unlike);
     sdm_json_open(&j, "findings", '[');
-    const sdm_status s = cli_survey_tell(&c->survey, add_line, &j, err);
+    const sdm_status s = cli_survey_tell(&c->survey, CLI_ALL_STAGES, add_line, &j, err);
     sdm_json_close(&j, ']');
     sdm_json_close(&j, '}');
     if (!s) return cli_print_json(&j, err);
@@ -280,33 +301,68 @@ static sdm_status draw(const check *c, const char *path, sdm_error *err)
 
 /* ---- the command ---- */
 
-static sdm_status give_verdict(const check *c, sdm_error *err)
+/* Tests that were left out, in the words of the verdict. */
+static void add_left(const check *c, sdm_text *text)
+{
+    sdm_text left = {0};
+    cli_survey_untested(&c->survey, &left);
+    if (left.data)
+        sdm_text_add(text, "; not tested %s: %s",
+                     c->survey.found.cancelled ? "before the interrupt" : "for want of time",
+                     left.data);
+    text->failed = text->failed || left.failed;
+    sdm_text_dispose(&left);
+}
+
+/* "as far as tested", if tests were left out. */
+static const char *reach(const sdm_text *left) { return left->data ? ", as far as tested" : ""; }
+
+static sdm_status give_verdict(const check *c, const sdm_text *left, sdm_error *err)
 {
     const sdm_status verdict = sdm_shape_survey_verdict(&c->survey.found);
     const char *name = sdm_instance_shape(c->survey.shape)->name;
-    if (verdict == SDM_E_MESH)
-        return sdm_fail(err, verdict, "%s: meshes are broken: mend what is marked 'broken' first",
+    const sdm_survey_count *apart = &c->survey.found.apart;
+    if (verdict && sdm_survey_mend_first(&c->survey.found))
+        return sdm_fail(err, verdict,
+                        "%s: maps or trainings would suffer: mend what is marked 'warning', and "
+                        "check again",
                         name);
+    if (verdict == SDM_E_MESH)
+        return sdm_fail(err, verdict, "%s: meshes are broken%s: mend what is marked 'broken' first",
+                        name, reach(left));
     if (verdict == SDM_E_QUALITY)
         return sdm_fail(err, verdict,
-                        "%s: maps or trainings would suffer: mend what is marked 'warning'", name);
+                        "%s: maps or trainings would suffer%s: mend what is marked 'warning'", name,
+                        reach(left));
     if (c->args->json) return SDM_OK;
-    sdm_text left = {0};
-    cli_survey_untested(&c->survey, &left);
-    const bool failed = left.failed;
-    const sdm_survey_count *apart = &c->survey.found.apart;
-    if (!failed && apart->shapes)
+    if (apart->shapes)
         printf("%zu of %zu shapes have groups of parts that meet no other part (the note above "
                "names one): if they are meant to be apart, the shape can be trained; else let them "
-               "overlap%s%s\n",
+               "overlap%s\n",
                apart->shapes, c->survey.found.n - c->survey.found.untested,
-               left.data ? "; not tested for want of time: " : "", left.data ? left.data : "");
-    else if (!failed)
-        printf("%s: the shape can be trained%s%s%s\n", left.data ? "fine as far as tested" : "fine",
+               left->data ? left->data : "");
+    else
+        printf("%s: the shape can be trained%s%s\n", left->data ? "fine as far as tested" : "fine",
                c->survey.grid ? "" : "; give a configuration to compare it with a grid",
-               left.data ? "; not tested for want of time: " : "", left.data ? left.data : "");
+               left->data ? left->data : "");
+    return SDM_OK;
+}
+
+/* The verdict, or after an interrupt the word that it is not final. */
+static sdm_status end(const check *c, sdm_error *err)
+{
+    sdm_text left = {0};
+    add_left(c, &left);
+    sdm_status s;
+    if (left.failed)
+        s = sdm_fail(err, SDM_E_NOMEM, "out of memory for the verdict");
+    else if (c->survey.found.cancelled)
+        s = sdm_fail(err, SDM_E_CANCELLED, "interrupted: these are the findings as far as tested%s",
+                     left.data ? left.data : "");
+    else
+        s = give_verdict(c, &left, err);
     sdm_text_dispose(&left);
-    return failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the verdict") : SDM_OK;
+    return s;
 }
 
 sdm_status cli_shapes_check(const cli_args *args, sdm_error *err)
@@ -319,14 +375,16 @@ sdm_status cli_shapes_check(const cli_args *args, sdm_error *err)
     if (!s) s = cli_check_files(args, NULL, err);
     if (!s) s = open_shape(&c, err);
     c.survey.shape = c.shape;
+    c.opts.known = print_stage;
+    c.opts.mend_first = true;
     cli_progress_start(&c.bar);
     if (!s) s = sdm_shape_survey_make(c.shape, &c.opts, &c.survey.found, err);
     cli_progress_end(&c.bar, !s);
     if (!s) {
-        s = args->json ? print_json(&c, err) : print_text(&c, err);
+        s = args->json ? print_json(&c, err) : print_rest(&c, err);
         for (size_t i = 0; i < args->outputs.n && !s; i++)
             s = draw(&c, args->outputs.items[i], err);
-        if (!s) s = give_verdict(&c, err);
+        if (!s) s = end(&c, err);
         sdm_shape_survey_dispose(&c.survey.found);
     }
     sdm_instance_free(c.shape);

@@ -69,7 +69,8 @@ static sdm_status add_those_of_mesh(const sdm_instance *s, const double *p, sdm_
         sdm_mesh mesh = {0};
         sdm_part_audit audit = {0};
         status = sdm_instance_mesh(s, p, &mesh, err);
-        if (!status && (status = sdm_part_audit_make(&mesh, true, &audit, err)))
+        if (!status && (status = sdm_part_audit_make(&mesh, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL,
+                                                     &audit, err)))
             sdm_instance_fail_at(s, p, status, err);
         value[0] = audit.union_volume;
         value[1] = audit.mesh.closed ? audit.union_area : audit.mesh.area;

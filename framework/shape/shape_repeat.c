@@ -9,6 +9,9 @@
 /* What mesh() finds where it must not read: in memory that it has not written, and behind the last
  * parameter. As a double FILL is NaN, OTHER_FILL about 32.5. */
 enum { FILL = 0xff, OTHER_FILL = 0x40 };
+/* Of sdm_repeat_find(). */
+enum { THREADS = 4, SHAPES = 8, SHAPES_BRIEF = 4, TRIANGLES = 200000 };
+static const double SECONDS_BRIEF = 0.1;
 #define BEHIND 0.5
 #define OTHER_BEHIND 1.5
 
@@ -168,4 +171,27 @@ sdm_status sdm_shape_repeat_at_once(const sdm_instance *s, const double *p, size
     sdm_free(first);
     sdm_free(unlike);
     return status;
+}
+
+/* Number of shapes: fewer if the mesh at p has many triangles. */
+static size_t choose_shapes(const sdm_instance *shape, const double *p, size_t n, bool brief)
+{
+    sdm_mesh mesh = {0};
+    size_t most = brief ? SHAPES_BRIEF : SHAPES;
+    if (!sdm_instance_mesh(shape, p, &mesh, NULL) && mesh.n_tri * most > TRIANGLES)
+        most = TRIANGLES / mesh.n_tri;
+    sdm_mesh_dispose(&mesh);
+    if (most < 1) most = 1;
+    return n < most ? n : most;
+}
+
+sdm_status sdm_repeat_find(const sdm_instance *shape, const double *p, size_t n, bool brief,
+                           sdm_repeat *out, sdm_error *err)
+{
+    n = choose_shapes(shape, p, n, brief);
+    const sdm_status s = sdm_shape_repeat(shape, p, n, out, err);
+    if (s == SDM_E_PLUGIN) return SDM_OK;
+    if (s || out->unlike || sdm_is_isolated(shape)) return s;
+    return sdm_shape_repeat_at_once(shape, p, n, THREADS,
+                                    brief ? SECONDS_BRIEF : SHAPE_REPEAT_SECONDS, out, err);
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Necks and walls that are thinner than a voxel, walls that meet or cross within the ranges, lengths in metres: each is told in one line.
-# Tests: grid_cut.c output.c report_survey.c part_audit.c survey_fold.c survey_scale.c cmd_exact.c
+# Tests: grid_cut.c output.c report_survey.c tell_grid.c part_audit.c survey_fold.c survey_scale.c cmd_exact.c
 . "$(dirname "$0")/common.sh"
 [ $emulated = no ] || { finish && exit 0; } # an emulated program cannot load the file that cc builds
 

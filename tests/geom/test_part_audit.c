@@ -32,7 +32,8 @@ static void add_box(sdm_mesh *m, double low, double high, double half, bool insi
 static sdm_part_audit audit_of(const sdm_mesh *m)
 {
     sdm_part_audit a;
-    if (sdm_part_audit_make(m, true, &a, &err)) fail_msg("%s", err.text);
+    if (sdm_part_audit_make(m, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL, &a, &err))
+        fail_msg("%s", err.text);
     return a;
 }
 
@@ -298,15 +299,18 @@ static void test_refusals(void **state)
     sdm_mesh m = {0};
     sdm_part_audit a;
     size_t n;
-    assert_int_equal(sdm_part_audit_make(&m, true, &a, &err), SDM_E_MESH);
-    assert_int_equal(sdm_part_audit_make(NULL, true, &a, &err), SDM_E_ARG);
+    assert_int_equal(sdm_part_audit_make(&m, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL, &a, &err),
+                     SDM_E_MESH);
+    assert_int_equal(sdm_part_audit_make(NULL, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL, &a, &err),
+                     SDM_E_ARG);
     assert_int_equal(sdm_mesh_turn_parts(NULL, &n, &err), SDM_E_ARG);
     add_box(&m, 0, 4, 2, false);
     add_box(&m, 3, 6, 1, true);
     int failed = 0;
     for (size_t k = 1; k < 60; k++) {
         sdm_alloc_fail_after(k);
-        const sdm_status s = sdm_part_audit_make(&m, true, &a, &err);
+        const sdm_status s =
+            sdm_part_audit_make(&m, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL, &a, &err);
         sdm_alloc_fail_after(0);
         assert_true(s == SDM_OK || s == SDM_E_NOMEM);
         failed += s == SDM_E_NOMEM;
@@ -359,7 +363,8 @@ static void test_outline_that_crosses_itself(void **state)
                                       {2, 1},       {0, 1}};
         sdm_mesh m = revolve(outline, 8);
         sdm_part_audit a;
-        if (sdm_part_audit_make(&m, true, &a, &err)) fail_msg("%s", err.text);
+        if (sdm_part_audit_make(&m, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL, &a, &err))
+            fail_msg("%s", err.text);
         assert_int_equal(a.n, 1);
         assert_int_equal(a.part[0].state, SDM_PART_SOLID);
         // beyond the crossing, at radius 2.714: 32.7 of 94.2 mm^2
@@ -421,7 +426,8 @@ static void test_loop_in_another_part(void **state)
         memcpy(m.vert + 3 * v, rim.vert, 3 * rim.n_vert * sizeof *m.vert);
         for (size_t i = 0; i < 3 * rim.n_tri; i++) m.tri[3 * t + i] = rim.tri[i] + (uint32_t)v;
         sdm_part_audit a;
-        if (sdm_part_audit_make(&m, true, &a, &err)) fail_msg("%s", err.text);
+        if (sdm_part_audit_make(&m, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL, &a, &err))
+            fail_msg("%s", err.text);
         assert_int_equal(a.n, (size_t)boxes + 1);
         assert_true(fabs(a.part[boxes].folded - (boxes == 1 ? 0.347 : 0.347 / 2)) < 0.02);
         sdm_part_audit_dispose(&a);
@@ -457,6 +463,41 @@ static void test_unused_vertices(void **state)
     }
 }
 
+static bool always(void *user)
+{
+    (void)user;
+    return true;
+}
+
+// A disc whose rim is two quarter arcs, the angle of which is taken for rad: the outline goes round
+// many times, mostly in the right sense. An audit of it can be stopped.
+static void test_crossing_of_arcs(void **state)
+{
+    (void)state;
+    enum { ARC = 12, N = 2 * ARC + 2 };
+    for (int degrees = 0; degrees < 2; degrees++) {
+        double outline[N][2] = {{0}};
+        sdm_part_audit a;
+        for (int i = 0; i < 2 * ARC; i++) {
+            const double unit = degrees ? 1 : acos(-1) / 180;
+            const double angle = 90. / (ARC - 1) * (i % ARC) * unit;
+            const bool up = i >= ARC;
+            outline[i + 1][0] = 11.1 + 0.9 * (up ? cos(angle) : sin(angle));
+            outline[i + 1][1] = up ? 5.1 + 0.9 * sin(angle) : 0.9 - 0.9 * cos(angle);
+        }
+        outline[N - 1][1] = 6;
+        const sdm_mesh m = revolve((const double(*)[2])outline, N);
+        if (sdm_part_audit_make(&m, SDM_AUDIT_WALLS, NULL, &a, &err)) fail_msg("%s", err.text);
+        assert_true(a.n == 1 && a.part[0].folded < SDM_PART_FOLDED_MIN);
+        assert_true(degrees ? a.part[0].crossing > 0.5 : a.part[0].crossing == 0);
+        assert_true((sdm_part_tangle(&a.part[0]) > 0.5) == degrees);
+        sdm_part_audit_dispose(&a);
+        const sdm_exact_opts stop = {.cancelled = always};
+        assert_int_equal(sdm_part_audit_make(&m, SDM_AUDIT_WALLS, &stop, &a, &err),
+                         SDM_E_CANCELLED);
+    }
+}
+
 /* The thickness of a body whose radius is radius(z) for -1 <= z <= 1. */
 static double thickness_of(double (*radius)(double z))
 {
@@ -469,7 +510,7 @@ static double thickness_of(double (*radius)(double z))
         outline[i][1] = z;
     }
     const sdm_mesh m = revolve((const double(*)[2])outline, N);
-    if (sdm_part_audit_make(&m, false, &a, &err)) fail_msg("%s", err.text);
+    if (sdm_part_audit_make(&m, SDM_AUDIT_WALLS, NULL, &a, &err)) fail_msg("%s", err.text);
     assert_int_equal(a.n, 1);
     const double thick = a.part[0].thick;
     sdm_part_audit_dispose(&a);
@@ -549,6 +590,7 @@ int main(void)
         cmocka_unit_test(test_thickness),
         cmocka_unit_test(test_walls_in_one_place),
         cmocka_unit_test(test_thickness_of_necks),
+        cmocka_unit_test(test_crossing_of_arcs),
         cmocka_unit_test(test_outline_that_crosses_itself),
         cmocka_unit_test(test_poles_exchanged_near_the_axis),
         cmocka_unit_test(test_loop_in_another_part),

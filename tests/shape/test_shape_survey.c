@@ -1,7 +1,8 @@
 /* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
  * known from the source; shapes without faults pass.
- * Tests: shape_survey.c survey_fold.c survey_line.c survey_meeting.c survey_pole.c
- * survey_repeat.c survey_scale.c survey_still.c survey_swing.c units.c */
+ * Tests: shape_survey.c survey_fold.c survey_follow.c survey_line.c survey_meeting.c survey_pole.c
+ * survey_scale.c survey_shapes.c survey_state.c survey_still.c survey_swing.c
+ * units.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -255,7 +256,7 @@ static void a_part_without_volume(void **state)
     const sdm_mesh m = {.vert = vert, .tri = tri, .n_vert = 11, .n_tri = 14};
     sdm_part_audit a;
     size_t shortest, longest;
-    if (sdm_part_audit_make(&m, false, &a, &err)) fail_msg("%s", err.text);
+    if (sdm_part_audit_make(&m, SDM_AUDIT_WALLS, NULL, &a, &err)) fail_msg("%s", err.text);
     assert_int_equal(a.n, 2);
     assert_true(sdm_survey_part_lengths(&a, &shortest, &longest) == 0);
     assert_true(sdm_survey_part_is_flat(&a, 1));
@@ -273,11 +274,12 @@ static void a_box_winds_once(void **state)
     faulty_box(&boxes, 1, (const double[3]){0, -1, -1}, (const double[3]){2.5, 1, 1}, 1);
     const sdm_mesh m = {.vert = vert, .tri = tri, .n_vert = 16, .n_tri = 24};
     sdm_part_audit a;
-    if (sdm_part_audit_make(&m, true, &a, &err)) fail_msg("%s", err.text);
+    if (sdm_part_audit_make(&m, SDM_AUDIT_WALLS | SDM_AUDIT_UNION, NULL, &a, &err))
+        fail_msg("%s", err.text);
     assert_int_equal(a.n, 2);
     assert_true(a.part[0].volume > SDM_SURVEY_WOUND * a.union_volume);
-    for (size_t i = 0; i < 2; i++) assert_true(sdm_survey_part_winding(&m, &a, i) == 0);
-    assert_true(fabs(sdm_part_filled(&m, &a, 0) - 64) < 1e-9);
+    for (size_t i = 0; i < 2; i++) assert_true(sdm_survey_part_winding(&m, &a, i, NULL) == 0);
+    assert_true(fabs(sdm_part_filled(&m, &a, 0, NULL) - 64) < 1e-9);
     sdm_part_audit_dispose(&a);
 }
 
@@ -354,6 +356,43 @@ static void time_is_short(void **state)
     assert_true(s.failed.shapes == 0 && s.overlaps.shapes == 1);
     assert_int_equal(sdm_shape_survey_verdict(&s), SDM_OK);
     assert_true(calls >= s.n + s.lines);
+    sdm_shape_survey_dispose(&s);
+}
+
+static bool is_set(void *user) { return *(const bool *)user; }
+
+static void set(void *user, sdm_survey_stage stage)
+{
+    *(bool *)user = *(bool *)user || stage == SDM_SURVEY_MESHES;
+}
+
+// What is known before the survey is cancelled is kept.
+static void a_cancelled_survey(void **state)
+{
+    (void)state;
+    bool now = false;
+    sdm_shape_survey s = survey_with(
+        "sizes", &(sdm_survey_opts){.samples = 8, .cancelled = is_set, .known = set, .user = &now});
+    assert_true(s.cancelled && s.untested == s.n);
+    assert_true(s.resized.shapes > 0 && s.n_vert == 24);
+    assert_true(s.overlaps.shapes == 0 && s.lines == 0 && isnan(s.volume[0]));
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    sdm_shape_survey_dispose(&s);
+}
+
+// After a finding from which others follow nothing else is tested, if this is wanted.
+static void the_first_to_mend(void **state)
+{
+    (void)state;
+    for (int end = 0; end < 2; end++) {
+        sdm_shape_survey s =
+            survey_with("offset", &(sdm_survey_opts){.samples = 8, .mend_first = end});
+        assert_true(s.unused.shapes == s.n && sdm_survey_mend_first(&s));
+        assert_true((s.lines == 0) == end && isnan(s.volume[0]) >= end);
+        sdm_shape_survey_dispose(&s);
+    }
+    sdm_shape_survey s = survey("shared"); // usable with --isolate
+    assert_true(s.repeat.unlike && !sdm_survey_mend_first(&s));
     sdm_shape_survey_dispose(&s);
 }
 
@@ -597,12 +636,6 @@ static void threads_and_brief_surveys(void **state)
     }
 }
 
-static bool stop(void *user)
-{
-    (void)user;
-    return true;
-}
-
 static void refusals(void **state)
 {
     (void)state;
@@ -613,8 +646,6 @@ static void refusals(void **state)
     assert_int_equal(sdm_shape_survey_make(shape, &(sdm_survey_opts){.range = range}, &s, &err),
                      SDM_E_RANGE);
     assert_non_null(strstr(err.text, "1 .. 4 of 'size'"));
-    assert_int_equal(sdm_shape_survey_make(shape, &(sdm_survey_opts){.cancelled = stop}, &s, &err),
-                     SDM_E_CANCELLED);
     assert_int_equal(sdm_shape_survey_make(NULL, NULL, &s, &err), SDM_E_ARG);
     int failed = 0;
     for (size_t k = 1; k < 400; k += 7) {
@@ -665,6 +696,8 @@ int main(void)
         cmocka_unit_test(a_step_moves_vertices),
         cmocka_unit_test(walls_that_pass_through_each_other),
         cmocka_unit_test(time_is_short),
+        cmocka_unit_test(a_cancelled_survey),
+        cmocka_unit_test(the_first_to_mend),
         cmocka_unit_test(degrees_that_go_to_sin),
         cmocka_unit_test(degrees_that_go_to_tan),
         cmocka_unit_test(callbacks),

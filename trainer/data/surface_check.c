@@ -118,7 +118,7 @@ sdm_status trainer_exact_within(const dataset *d, const double *p, int n_threads
 static sdm_status check_parts(const sdm_mesh *m, size_t *n, double *thickness, sdm_error *err)
 {
     sdm_part_audit audit = {0};
-    const sdm_status s = sdm_part_audit_make(m, false, &audit, err);
+    const sdm_status s = sdm_part_audit_make(m, SDM_AUDIT_WALLS, NULL, &audit, err);
     *n += !s && audit.inside_out;
     *thickness = fmin(*thickness, sdm_part_audit_thickness(&audit)); // fmin() ignores NaN
     sdm_part_audit_dispose(&audit);

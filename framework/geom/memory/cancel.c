@@ -10,6 +10,6 @@ bool sdm_cancelled(const sdm_exact_opts *opts)
 
 sdm_status sdm_cancel_check(const sdm_exact_opts *opts, sdm_error *err)
 {
-    if (!opts || !sdm_cancelled(opts)) return SDM_OK;
+    if (!opts || !opts->cancelled || !opts->cancelled(opts->user)) return SDM_OK;
     return sdm_fail(err, SDM_E_CANCELLED, "preparation of the mesh stopped on request");
 }

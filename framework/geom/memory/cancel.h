@@ -7,6 +7,6 @@
  * the calling thread of the library (number 0) calls opts->cancelled; the others get false. */
 bool sdm_cancelled(const sdm_exact_opts *opts);
 
-/* For the preparation of a mesh: SDM_E_CANCELLED when sdm_cancelled(opts). opts may be NULL: never
- * cancelled. */
+/* For the preparation of a mesh, which one thread does: SDM_E_CANCELLED when opts->cancelled
+ * returns true. opts may be NULL: never cancelled. */
 sdm_status sdm_cancel_check(const sdm_exact_opts *opts, sdm_error *err);

@@ -147,8 +147,7 @@ static void measure_parts(job *j)
     }
 }
 
-/* Counts the vertices of no triangle, and finds the first run of them. */
-static sdm_status find_unused(const sdm_mesh *m, sdm_part_audit *out, sdm_error *err)
+sdm_status sdm_part_audit_unused(const sdm_mesh *m, sdm_part_audit *out, sdm_error *err)
 {
     bool *used = NULL;
     const sdm_status s = SDM_ALLOC(&used, m->n_vert, "vertices in use", err);
@@ -252,6 +251,29 @@ static void count_edges_and_contacts(job *j)
     }
 }
 
+/* Does triangle t pass through another one of its part? */
+static bool crosses_own_part(const job *j, uint32_t t)
+{
+    const sdm_contacts *c = &j->survey.contacts;
+    for (size_t i = c->first[t]; i < c->first[t + 1]; i++)
+        if (c->list[i].kind == SDM_CONTACT_CROSSING &&
+            j->out->part_of[c->list[i].other] == j->out->part_of[t])
+            return true;
+    return false;
+}
+
+/* Measures the share of each part that passes through the part itself. */
+static void measure_crossings(job *j)
+{
+    for (uint32_t t = 0; t < j->given->n_tri; t++) {
+        double area = 0, volume = 0;
+        if (j->out->part_of[t] == SDM_NO_PART || !crosses_own_part(j, t)) continue;
+        sdm_part *p = &j->out->part[j->out->part_of[t]];
+        sdm_triangle_add(j->given, t, p->min, &area, &volume);
+        if (p->area > 0) p->crossing += area / p->area;
+    }
+}
+
 /* Does part p lie in the box of another closed part? */
 static bool is_in_a_box(const sdm_part_audit *a, const sdm_part *p)
 {
@@ -324,6 +346,7 @@ static sdm_status find_parts(job *j, sdm_error *err)
     for (size_t i = 0; i < j->out->n; i++) j->group[i] = (uint32_t)i;
     measure_parts(j);
     count_edges_and_contacts(j);
+    measure_crossings(j);
     judge_parts(j);
     return find_groups(j, err);
 }
@@ -347,17 +370,17 @@ static void job_dispose(job *j)
     sdm_free(j->group);
 }
 
-sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audit *out,
-                               sdm_error *err)
+sdm_status sdm_part_audit_make(const sdm_mesh *m, unsigned what, const sdm_exact_opts *stop,
+                               sdm_part_audit *out, sdm_error *err)
 {
     if (!m || !out)
         return sdm_fail(err, SDM_E_ARG, "audit without a mesh or a place for the result");
     *out = (sdm_part_audit){.union_volume = NAN, .union_area = NAN};
-    job j = {.given = m, .out = out};
+    job j = {.given = m, .out = out, .arena = {.opts = stop}};
     sdm_status s = find_parts(&j, err);
-    if (!s) s = find_unused(m, out, err);
-    if (!s) s = measure_thickness(&j, err);
-    if (!s && with_union) s = measure_union(&j, err);
+    if (!s) s = sdm_part_audit_unused(m, out, err);
+    if (!s && (what & SDM_AUDIT_WALLS)) s = measure_thickness(&j, err);
+    if (!s && (what & SDM_AUDIT_UNION)) s = measure_union(&j, err);
     job_dispose(&j);
     if (s) sdm_part_audit_dispose(out);
     return s;
@@ -370,12 +393,13 @@ void sdm_part_audit_dispose(sdm_part_audit *a)
     *a = (sdm_part_audit){0};
 }
 
-double sdm_part_filled(const sdm_mesh *m, const sdm_part_audit *a, size_t index)
+double sdm_part_filled(const sdm_mesh *m, const sdm_part_audit *a, size_t index,
+                       const sdm_exact_opts *stop)
 {
     if (a->n == 1) return a->union_volume;
     sdm_mesh alone = {.vert = m->vert, .n_vert = m->n_vert};
     sdm_part_audit audit = {.union_volume = NAN};
-    job j = {.given = &alone, .out = &audit};
+    job j = {.given = &alone, .out = &audit, .arena = {.opts = stop}};
     sdm_status s = SDM_ALLOC(&alone.tri, 3 * a->part[index].n_tri, "triangles of a part", NULL);
     for (size_t t = 0; t < m->n_tri && !s; t++)
         if (a->part_of[t] == index)

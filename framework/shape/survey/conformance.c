@@ -215,6 +215,7 @@ static sdm_status test_meshes(tests *t, sdm_error *err)
     sdm_shape_survey *f = &t->found;
     const sdm_status s = sdm_shape_survey_make(t->instance, &opts, f, err);
     if (s) return s;
+    if (f->cancelled) return sdm_fail(err, SDM_E_CANCELLED, "the tests were cancelled");
     t->out->n_corners = f->n_corners;
     t->out->n_samples = f->n_samples;
     tell_meshes(t);

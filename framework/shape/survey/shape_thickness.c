@@ -18,7 +18,7 @@ sdm_status sdm_shape_thickness(const sdm_instance *shape, const double (*range)[
         sdm_part_audit audit = {0};
         sdm_family_sample(&f, i, p);
         s = sdm_instance_mesh(shape, p, &mesh, err);
-        if (!s) s = sdm_part_audit_make(&mesh, false, &audit, err);
+        if (!s) s = sdm_part_audit_make(&mesh, SDM_AUDIT_WALLS, NULL, &audit, err);
         if (!s)
             *mm = fmin(
                 *mm, sdm_part_audit_thickness(&audit)); // of NaN and a number fmin() is the number

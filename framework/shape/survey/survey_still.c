@@ -37,14 +37,12 @@ static sdm_status only_fatal(sdm_status s)
     return s == SDM_E_NOMEM || s == SDM_E_CANCELLED ? s : SDM_OK;
 }
 
-static sdm_status solid_make(const shape_family *f, const sdm_survey_opts *opts, const double *p,
+static sdm_status solid_make(const shape_family *f, const sdm_exact_opts *opts, const double *p,
                              solid *out, sdm_error *err)
 {
-    const sdm_exact_opts exact = {
-        .n_threads = opts->n_threads, .cancelled = opts->cancelled, .user = opts->user};
     *out = (solid){0};
     sdm_status s = sdm_instance_mesh(f->shape, p, &out->mesh, err);
-    if (!s) s = sdm_exact_create(&out->mesh, &exact, &out->exact, err);
+    if (!s) s = sdm_exact_create(&out->mesh, opts, &out->exact, err);
     return only_fatal(s);
 }
 
@@ -99,7 +97,7 @@ static sdm_status mark_surface(const solid *s, double same, bool *on, sdm_error 
 }
 
 /* *moves = the surface at q differs from that of `here`, or is not known. on: mark_surface(). */
-static sdm_status compare(const shape_family *f, const sdm_survey_opts *opts, const double *q,
+static sdm_status compare(const shape_family *f, const sdm_exact_opts *opts, const double *q,
                           const solid *here, const bool *on, double same, bool *moves,
                           sdm_error *err)
 {
@@ -128,7 +126,7 @@ static sdm_status compare(const shape_family *f, const sdm_survey_opts *opts, co
 }
 
 /* Takes back s->still of the parameters that move the surface at p. */
-static sdm_status look_at(const shape_family *f, const sdm_survey_opts *opts, const double *p,
+static sdm_status look_at(const shape_family *f, const sdm_exact_opts *opts, const double *p,
                           double same, sdm_shape_survey *s, sdm_error *err)
 {
     const size_t n = s->n_params;
@@ -152,7 +150,7 @@ static sdm_status look_at(const shape_family *f, const sdm_survey_opts *opts, co
     return status;
 }
 
-sdm_status sdm_survey_find_still(const shape_family *f, const sdm_survey_opts *opts, double size,
+sdm_status sdm_survey_find_still(const shape_family *f, const sdm_exact_opts *opts, double size,
                                  sdm_shape_survey *s, sdm_error *err)
 {
     sdm_status status = SDM_ALLOC(&s->still, s->n_params, "parameters", err);

@@ -189,7 +189,7 @@ static double thinnest_part(const fit_problem *p)
     double thick = NAN;
     if (!f->shape) return f->model ? sdm_model_get_info(f->model)->quality.thickness_mm : NAN;
     if (!sdm_instance_mesh(f->shape, p->state.params, &mesh, NULL) &&
-        !sdm_part_audit_make(&mesh, false, &audit, NULL))
+        !sdm_part_audit_make(&mesh, SDM_AUDIT_WALLS, NULL, &audit, NULL))
         thick = sdm_part_audit_thickness(&audit);
     sdm_part_audit_dispose(&audit);
     sdm_mesh_dispose(&mesh);

@@ -12,7 +12,7 @@
  *   mostly a mistake: a handle whose triangles run the wrong way vanishes. */
 #pragma once
 
-#include "sdm/mesh.h"
+#include "sdm/exact.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -61,11 +61,26 @@ typedef struct sdm_part {
      * outside, also where another part is solid. 0 in an open mesh and for parts after the first
      * 1000 */
     double folded;
+    /* share of the area in triangles that pass through others of this part; triangles that touch or
+     * share a vertex do not count */
+    double crossing;
 } sdm_part;
 
 /* A larger share is a mistake; tubes that bend sharply have a smaller one: of the ducts whose
  * section is free up to 0.0125. */
 #define SDM_PART_FOLDED_MIN 0.015
+/* A larger share of `crossing` is a mistake, such as the outline of a fillet whose angle is taken
+ * for rad. Turns of a spiral that overlap, and bends sharper than their radius, cross in a smaller
+ * one: of the ducts up to 0.3. */
+#define SDM_PART_CROSSING_MAX 0.4
+
+/* The share of the surface that faces the wrong way or passes through the part itself; 0: both are
+ * within the limits above. */
+static inline double sdm_part_tangle(const sdm_part *p)
+{
+    const double most = p->folded > p->crossing ? p->folded : p->crossing;
+    return p->folded > SDM_PART_FOLDED_MIN || p->crossing > SDM_PART_CROSSING_MAX ? most : 0;
+}
 
 /* Stands for the part of a triangle that belongs to none, because it repeats a vertex. */
 #define SDM_NO_PART UINT32_MAX
@@ -87,12 +102,22 @@ typedef struct sdm_part_audit {
     double union_volume, union_area;
 } sdm_part_audit;
 
-/* Audits the mesh and its parts. with_union: also computes the union, which takes longer. In an
- * open mesh, where the engine turns nothing, a part in the box of another closed part is taken for
- * a cavity. Errors as sdm_mesh_audit(). [any thread] */
-sdm_status sdm_part_audit_make(const sdm_mesh *m, bool with_union, sdm_part_audit *out,
-                               sdm_error *err);
+/* What an audit measures besides edges, contacts and orientations. */
+enum {
+    SDM_AUDIT_WALLS = 1, /* sdm_part.thick, doubled, folded; else NaN, false, 0 */
+    SDM_AUDIT_UNION = 2  /* the union, which takes much longer where triangles meet */
+};
+
+/* Audits the mesh and its parts. what: a sum of SDM_AUDIT_... In an open mesh, where the engine
+ * turns nothing, a part in the box of another closed part is taken for a cavity. stop: its
+ * memory_limit and `cancelled` count; NULL: none. Errors as sdm_mesh_audit(), also SDM_E_CANCELLED.
+ * [any thread] */
+sdm_status sdm_part_audit_make(const sdm_mesh *m, unsigned what, const sdm_exact_opts *stop,
+                               sdm_part_audit *out, sdm_error *err);
 void sdm_part_audit_dispose(sdm_part_audit *a);
+
+/* Sets out->unused, unused_first and unused_last alone, which takes little time. SDM_E_NOMEM. */
+sdm_status sdm_part_audit_unused(const sdm_mesh *m, sdm_part_audit *out, sdm_error *err);
 
 /* Adds the area of triangle t, mm^2, to *area, and to *volume the signed volume, mm^3, of the
  * tetrahedron of the triangle and the point `apex`: over a closed mesh these sum up to its volume.
@@ -105,9 +130,10 @@ void sdm_triangle_add(const sdm_mesh *m, size_t t, const double apex[3], double 
 void sdm_mesh_sums(const sdm_mesh *m, double *volume, double *area);
 
 /* Volume, mm^3, of the union of part `index` alone: what it winds around more than once counts
- * once. NaN: the part is open, memory is short, or it is the only one and the audit is without the
- * union. [any thread] */
-double sdm_part_filled(const sdm_mesh *m, const sdm_part_audit *a, size_t index);
+ * once. stop: as for the audit. NaN: the part is open, memory is short, it was stopped, or the part
+ * is the only one and the audit is without the union. [any thread] */
+double sdm_part_filled(const sdm_mesh *m, const sdm_part_audit *a, size_t index,
+                       const sdm_exact_opts *stop);
 
 /* The smallest distance, mm, between the surfaces of the group of part `index` and those of all
  * other parts; negative: the group lies inside one of them. NaN: there is no other group, numbers

@@ -1,7 +1,7 @@
 /* Why a shape gives other meshes when they are made again. */
 #pragma once
 
-#include <stddef.h>
+#include "sdm/registry.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -21,6 +21,13 @@ typedef struct sdm_repeat {
     sdm_repeat_cause cause;
     size_t param; /* BEHIND: the index of the first value that mesh() must not read */
 } sdm_repeat;
+
+/* Makes some of the n meshes at p[n][n_params] again, fewer if they are large; brief: fewer, and
+ * threads for a tenth of a second. *out: the first cause found, cause UNKNOWN and unlike 0 if there
+ * is none. Several threads at once are tested unless the shape is isolated, where each has a
+ * process. A call that ends the worker of an isolated shape is no error. SDM_E_NOMEM. */
+sdm_status sdm_repeat_find(const sdm_instance *shape, const double *p, size_t n, bool brief,
+                           sdm_repeat *out, sdm_error *err);
 
 /* What the author of the shape has done, and what to do: a text without a full stop. */
 const char *sdm_repeat_advice(sdm_repeat_cause cause);

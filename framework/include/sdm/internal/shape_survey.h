@@ -12,6 +12,13 @@
 extern "C" {
 #endif
 
+/* The stages of a survey, from what takes little time to what takes longest. */
+typedef enum sdm_survey_stage {
+    SDM_SURVEY_MESHES = 1, /* meshes, made again; parameters; units */
+    SDM_SURVEY_PARTS = 2,  /* edges, orientation and walls of the parts */
+    SDM_SURVEY_REST = 4
+} sdm_survey_stage;
+
 /* Zero-initialised: the shape's own ranges and distributions, no samples, no grid, the OpenMP
  * default of threads, the whole survey. */
 typedef struct sdm_survey_opts {
@@ -24,11 +31,16 @@ typedef struct sdm_survey_opts {
     const sdm_grid *grid; /* NULL: nothing is compared with a grid */
     bool brief;           /* meshes, their audits, a few repetitions: no lines, no velocities */
     int n_threads;
-    double seconds; /* what has not begun after this time is left out; 0: no limit */
-    /* called by any thread; true: the survey ends with SDM_E_CANCELLED. May be NULL. */
+    double seconds; /* what is not done after this time is left out; 0: no limit */
+    /* called by any thread; true: what is not done by then is left out. May be NULL. */
     bool (*cancelled)(void *user);
+    bool mend_first; /* it ends after a stage with a finding of sdm_survey_mend_first() */
+    /* called after each stage but the last one: the members of the result up to that stage are
+     * set. May be NULL. */
+    void (*known)(void *user, sdm_survey_stage stage);
     /* called by one thread at a time after each shape or line of a stage of the survey, of which
-     * `share` (0 .. 1) is done; `what`: "shapes", "folds" or "lines". May be NULL. */
+     * `share` (0 .. 1) is done; `what`: "meshes", "shapes", "volumes", "folds" or "lines". May be
+     * NULL. */
     void (*progress)(void *user, const char *what, double share);
     void *user;
 } sdm_survey_opts;
@@ -116,8 +128,9 @@ typedef struct sdm_shape_survey {
      * (all for at most 6 parameters, else 64 random ones in which normally distributed parameters
      * have random values; in a brief survey no more than samples), then the samples */
     size_t n, n_corners, n_samples;
-    double *p;                    /* [n][n_params] */
-    size_t untested;              /* shapes left out for want of time; never the first one */
+    double *p;       /* [n][n_params] */
+    size_t untested; /* shapes left out for want of time, the first one only if it takes long */
+    bool cancelled;  /* before all was done */
     size_t lines, lines_untested; /* lines through the ranges, and those left out */
 
     /* the meshes: those that could not be made, and properties of the others */
@@ -126,12 +139,12 @@ typedef struct sdm_shape_survey {
     sdm_survey_count unused;     /* vertices of no triangle */
     sdm_survey_count inside_out; /* parts of state SDM_PART_INSIDE_OUT (part_audit.h) */
     sdm_survey_count turned;     /* parts that are inside out and that the exact engine turns */
-    /* parts that pass through themselves (sdm_part.folded); amount: the share that faces the wrong
-     * way */
+    /* parts that pass through themselves; amount: sdm_part_tangle() */
     sdm_survey_count crossing;
-    /* solid parts that wind around their inside more than once; amount: sdm_survey_part_winding()
-     */
+    /* solid parts that wind around their inside more than once; amount: sdm_survey_part_winding(),
+     * at first without the union; wound_part: the index of the part that has most of it */
     sdm_survey_count wound;
+    size_t wound_part;
     sdm_survey_count overlaps;              /* pairs of triangles that meet: the union counts */
     bool overlaps_begin;                    /* some shapes overlap themselves, but not shape 0 */
     sdm_survey_count degenerate, duplicate; /* triangles */
@@ -139,7 +152,8 @@ typedef struct sdm_shape_survey {
     sdm_survey_count resized;  /* other numbers of vertices or triangles; amount: of vertices */
     sdm_survey_count rewired;  /* the same numbers, but other triangles than the first mesh */
     double volume[2], area[2]; /* smallest and largest of the unions, mm^3 and mm^2; closed meshes
-                                  alone; NaN in a brief survey */
+                                  alone, at first those of which no triangles meet; NaN in a brief
+                                  survey */
     double low[3], high[3];    /* box of all meshes, mm; a search widens it unless `brief` */
     sdm_survey_scale scale;
     /* [n_params] how far a vertex moves per unit of the parameter, at most, mm; NaN: not known. Of
@@ -172,7 +186,8 @@ typedef struct sdm_shape_survey {
     /* some of the meshes made again, in a brief survey fewer of them */
     sdm_repeat repeat;
 
-    /* what a brief survey leaves out */
+    /* what takes longer, and what a brief survey leaves out */
+    size_t unions_untested; /* shapes of which volume and winding are not known for want of time */
     sdm_survey_meeting meeting;
     /* corners and the first samples in which triangles have turned over within a sixteenth of the
      * straight way from shape 0: walls pass through each other; amount: the share of these
@@ -182,9 +197,10 @@ typedef struct sdm_shape_survey {
     /* [n_params] the parameter moves vertices, but no part of the surface: they lie inside of other
      * parts; not looked at where meshes are broken */
     bool *still;
-    size_t fold_tested;    /* number of shapes that were compared with shape 0 */
-    size_t fold_untested;  /* shapes left out there for want of time */
-    bool box_untested;     /* the search that widens the box was left out for want of time */
+    size_t fold_tested;   /* number of shapes that were compared with shape 0 */
+    size_t fold_untested; /* shapes left out there for want of time */
+    /* left out for want of time: the search that widens the box, velocities, `still` */
+    bool box_untested, velocity_untested, still_untested;
     double folded_at;      /* where on the way to the worst of them: 0 at shape 0, 1 at the worst */
     sdm_survey_jump *jump; /* [n_params] the worst break along each parameter */
     bool has_velocity;     /* the shape has a callback of this name */
@@ -198,7 +214,7 @@ typedef struct sdm_shape_survey {
 
 /* Surveys the shape. A mesh that cannot be made is a finding (`failed`), no error. Without a limit
  * of time the findings depend neither on the number of threads nor on the time. SDM_E_RANGE: a
- * range does not lie within the shape's; SDM_E_NOMEM, SDM_E_CANCELLED. */
+ * range does not lie within the shape's; SDM_E_NOMEM. */
 sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opts *opts,
                                  sdm_shape_survey *out, sdm_error *err);
 void sdm_shape_survey_dispose(sdm_shape_survey *s);
@@ -221,15 +237,21 @@ double sdm_survey_part_lengths(const sdm_part_audit *a, size_t *shortest, size_t
 
 /* How often part i of the mesh m, which was audited, winds around its inside, at least and on
  * average: its volume by the divergence theorem, divided by that of its box or, if the audit has
- * the union, by the volume that the part fills. 0: the part is not solid, or its triangles do not
- * meet. It counts above SDM_SURVEY_WOUND; the turns of a spiral may overlap, but above
- * SDM_SURVEY_WOUND_MAX, or if a parameter is sdm_survey_is_degree(), it is a mistake. */
-double sdm_survey_part_winding(const sdm_mesh *m, const sdm_part_audit *a, size_t i);
+ * the union, by the volume that the part fills, unless `stop` ends this. 0: the part is not solid,
+ * or its triangles do not meet. It counts above SDM_SURVEY_WOUND; the turns of a spiral may
+ * overlap, but above SDM_SURVEY_WOUND_MAX, or if a parameter is sdm_survey_is_degree(), it is a
+ * mistake. */
+double sdm_survey_part_winding(const sdm_mesh *m, const sdm_part_audit *a, size_t i,
+                               const sdm_exact_opts *stop);
 #define SDM_SURVEY_WOUND 1.1
 #define SDM_SURVEY_WOUND_MAX 2.0
 
 /* Is the part that winds most a mistake? */
 bool sdm_survey_winds_wrongly(const sdm_shape_survey *s);
+
+/* Is there a finding from which others are likely to follow: meshes that are not the same when they
+ * are made again, vertices of no triangle, an angle in degrees that is taken for rad? */
+bool sdm_survey_mend_first(const sdm_shape_survey *s);
 
 /* SDM_E_MESH: meshes are broken: they cannot be made or are not closed. SDM_E_QUALITY: the meshes
  * are usable, but a training or derivatives would suffer: vertices of no triangle, parts that are

@@ -1,4 +1,4 @@
-/* Tells the findings of a survey of shapes (shape_survey.h), one line each. */
+/* A survey of shapes whose findings are told. */
 #pragma once
 
 #include "sdm/internal/config.h"
@@ -20,16 +20,5 @@ typedef struct cli_survey {
  * derivatives would suffer; SDM_OK: good to know. */
 typedef void cli_tell(void *user, sdm_status weight, const char *line);
 
-/* Calls tell() for every finding, the gravest first. SDM_E_NOMEM. */
-sdm_status cli_survey_tell(const cli_survey *s, cli_tell *tell, void *user, sdm_error *err);
-
-/* Appends what was left out for want of time, "3 of 145 shapes, ..."; nothing if all was tested. */
-void cli_survey_untested(const cli_survey *s, sdm_text *text);
-
 /* Appends "flat faces lie exactly on planes of voxel centres along x and z, ..." to `text`. */
 void cli_describe_hits(const sdm_face_hits *h, sdm_text *text);
-
-/* A survey of about a second of the shape of a configuration, over its ranges, distributions and
- * grid, told as warnings and notices. Errors, such as that of an interrupt, are no notices: what
- * follows meets them again. */
-void cli_notice_survey(const sdm_config *c, const sdm_instance *shape);

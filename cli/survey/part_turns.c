@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#include "report_audit.h"
+#include "report/report_audit.h"
 #include "sdm/internal/config.h"
 
 /* Shapes that are looked through for one in which the part is right; halvings of a range. */
@@ -16,8 +16,8 @@ static bool is_right(const sdm_instance *shape, const double *p, size_t n, size_
     sdm_mesh mesh = {0};
     sdm_part_audit audit = {0};
     const bool right = !sdm_instance_mesh(shape, p, &mesh, NULL) &&
-                       !sdm_part_audit_make(&mesh, false, &audit, NULL) && audit.n == n &&
-                       audit.part[part].volume > 0;
+                       !sdm_part_audit_make(&mesh, SDM_AUDIT_WALLS, NULL, &audit, NULL) &&
+                       audit.n == n && audit.part[part].volume > 0;
     sdm_part_audit_dispose(&audit);
     sdm_mesh_dispose(&mesh);
     return right;

@@ -484,6 +484,18 @@ sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_erro
         return s;
     }
     sdm_text_dispose(&text);
+    const size_t thin = sdm_part_audit_thinnest(a);
+    if (thin < a->n && a->n > 1 && sdm_survey_part_is_flat(a, thin)) {
+        sdm_text part = {0};
+        cli_name_part(a, thin, &part);
+        const sdm_status s = sdm_fail(
+            err, SDM_E_QUALITY,
+            "%sis %.2g mm thick, less than a thousandth of the mesh: no grid shows it; are "
+            "its vertices, or a radius, in m?",
+            part.failed ? "a part " : part.data, a->part[thin].thick);
+        sdm_text_dispose(&part);
+        return s;
+    }
     if (!encloses) return sdm_fail(err, SDM_E_QUALITY, "the mesh encloses no volume");
     return SDM_OK;
 }

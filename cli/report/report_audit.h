@@ -48,9 +48,9 @@ bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text);
 void cli_describe_thin(const sdm_part_audit *a, size_t index, double voxel, sdm_text *text);
 
 /* Judges the mesh. SDM_E_MESH: it is not closed; SDM_E_QUALITY: vertices belong to no triangle,
- * parts are inside out and not turned by the engine or pass through themselves, or it encloses no
- * volume. The message says what is wrong and what the user can do
- * (mend, for parts that are inside out). */
+ * parts are inside out and not turned by the engine or pass through themselves, one part of
+ * several is thinner than a thousandth of the mesh, or it encloses no volume. The message says what
+ * is wrong and what the user can do (mend, for parts that are inside out). */
 sdm_status cli_audit_verdict(const sdm_part_audit *a, const char *mend, sdm_error *err);
 
 /* "fine", "warning" or "broken", for the results of cli_audit_verdict(). */

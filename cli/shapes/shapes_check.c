@@ -324,9 +324,9 @@ static sdm_status give_verdict(const check *c, const sdm_text *left, sdm_error *
     const sdm_survey_count *apart = &c->survey.found.apart;
     if (verdict && sdm_survey_mend_first(&c->survey.found))
         return sdm_fail(err, verdict,
-                        "%s: maps or trainings would suffer: mend what is marked 'warning', and "
-                        "check again",
-                        name);
+                        "%s: maps or trainings would suffer: mend what is marked '%s', and check "
+                        "again",
+                        name, cli_verdict_name(cli_survey_cause(&c->survey)));
     if (verdict == SDM_E_MESH)
         return sdm_fail(err, verdict, "%s: meshes are broken%s: mend what is marked 'broken' first",
                         name, reach(left));

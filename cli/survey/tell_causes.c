@@ -3,6 +3,13 @@
 
 #include "report/report_audit.h"
 
+sdm_status cli_survey_cause(const cli_survey *s)
+{
+    const sdm_shape_survey *f = &s->found;
+    // where mesh() reads NaN behind the parameters, there is no mesh
+    return f->repeat.cause == SDM_REPEAT_BEHIND && f->failed.shapes ? SDM_E_MESH : SDM_E_QUALITY;
+}
+
 /* Meshes that are not the same when they are made again. Other findings may follow from it. */
 static void tell_repeat(teller *t)
 {
@@ -23,7 +30,7 @@ static void tell_repeat(teller *t)
     }
     sdm_text_add(&text, "%s%s", sdm_repeat_advice(r->cause),
                  r->cause == SDM_REPEAT_THREADS ? "" : TELLER_MEND_FIRST);
-    teller_tell_cause(t, SDM_E_QUALITY, &text);
+    teller_tell_cause(t, cli_survey_cause(t->s), &text);
 }
 
 /* An angle in degrees that goes to cos() or sin(). Other findings may follow from it. */

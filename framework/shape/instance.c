@@ -221,8 +221,8 @@ sdm_status sdm_instance_mesh(const sdm_instance *s, const double *p, sdm_mesh *o
     return sdm_instance_mesh_anywhere(s, p, out, err);
 }
 
-/* The body of the two functions below; fill < 0: fills nothing but the arrays of reserve(). */
-static sdm_status make_mesh(const sdm_instance *s, const double *p, int fill, sdm_mesh *out,
+/* Calls mesh(); fill < 0: fills nothing but the arrays of reserve(). */
+static sdm_status call_mesh(const sdm_instance *s, const double *p, int fill, sdm_mesh *out,
                             sdm_error *err)
 {
     out->n_vert = out->n_tri = 0;
@@ -241,21 +241,57 @@ static sdm_status make_mesh(const sdm_instance *s, const double *p, int fill, sd
                                   ? sdm_host_call_failed(&call, "mesh", failed, SDM_E_PLUGIN, err)
                                   : mesh_check(out, &filled, err);
     sdm_host_call_end(&call);
-    if (!status) return SDM_OK;
-    out->n_vert = out->n_tri = 0;
-    return sdm_instance_fail_at(s, p, status, err);
+    if (status) out->n_vert = out->n_tri = 0;
+    return status;
+}
+
+/* Index of the first value behind the parameters without which the mesh at p[n_params +
+ * SHAPE_PARAMS_BEHIND] fails; n_params + SHAPE_PARAMS_BEHIND: it fails for another reason. */
+static size_t find_read_behind(const sdm_instance *s, double *p)
+{
+    static const double tried[] = {0.5, 8}; // one of them may lie outside of the missing range
+    const size_t end = s->n_params + SHAPE_PARAMS_BEHIND;
+    sdm_mesh mesh = {0};
+    size_t index = end;
+    for (size_t i = 0; i < sizeof tried / sizeof *tried && index == end; i++) {
+        for (size_t k = s->n_params; k < end; k++) p[k] = tried[i];
+        if (call_mesh(s, p, -1, &mesh, NULL)) continue;
+        for (index = s->n_params; index < end; index++) {
+            p[index] = NAN;
+            if (call_mesh(s, p, -1, &mesh, NULL)) break;
+            p[index] = tried[i];
+        }
+    }
+    sdm_mesh_dispose(&mesh);
+    return index;
 }
 
 sdm_status sdm_instance_mesh_anywhere(const sdm_instance *s, const double *p, sdm_mesh *out,
                                       sdm_error *err)
 {
-    return make_mesh(s, p, -1, out, err);
+    double room[SHAPE_PARAMS_MAX + SHAPE_PARAMS_BEHIND];
+    const size_t n = s->n_params;
+    memcpy(room, p, n * sizeof *room);
+    for (size_t k = n; k < n + SHAPE_PARAMS_BEHIND; k++) room[k] = NAN;
+    sdm_status status = call_mesh(s, room, -1, out, err);
+    if (!status) return SDM_OK;
+    // the process of an isolated shape has looked for the reason
+    const size_t index = status == SDM_E_PLUGIN && !sdm_is_isolated(s) && n
+                             ? find_read_behind(s, room)
+                             : n + SHAPE_PARAMS_BEHIND;
+    if (index < n + SHAPE_PARAMS_BEHIND)
+        status = sdm_fail(err, SDM_E_PLUGIN,
+                          "mesh() reads p[%zu], but the last parameter is p[%zu], '%s': its row is "
+                          "missing in the table, or .n_params is too small",
+                          index, n - 1, s->params[n - 1].name);
+    return sdm_instance_fail_at(s, p, status, err);
 }
 
 sdm_status sdm_instance_mesh_filled(const sdm_instance *s, const double *p, int fill, sdm_mesh *out,
                                     sdm_error *err)
 {
-    return make_mesh(s, p, fill, out, err);
+    const sdm_status status = call_mesh(s, p, fill, out, err);
+    return status ? sdm_instance_fail_at(s, p, status, err) : SDM_OK;
 }
 
 sdm_status sdm_instance_distance(const sdm_instance *s, const double *p, const double x[3],

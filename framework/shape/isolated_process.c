@@ -244,6 +244,12 @@ static sdm_status explain(isolated_worker *w, isolated_task task, sdm_error *err
                  sdm_format_real((double)w->how->bytes / 1e9, number));
     else if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
         snprintf(reason, sizeof reason, "the process of the plug-in was killed");
+    else if (WIFSIGNALED(status) && (state.vertices || state.triangles))
+        snprintf(reason, sizeof reason,
+                 "it has written or read beyond the %llu %s that it reserved: let it reserve as "
+                 "many as it writes",
+                 (unsigned long long)(state.vertices ? state.vertices : state.triangles),
+                 state.vertices ? "vertices" : "triangles");
     else if (WIFSIGNALED(status))
         snprintf(reason, sizeof reason, "%s", sdm_callback_crash_reason(WTERMSIG(status)));
     else

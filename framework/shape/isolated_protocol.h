@@ -48,6 +48,9 @@ typedef struct isolated_answer {
 typedef struct isolated_state {
     char running[32]; /* the callback that the worker is in, "" outside */
     uint64_t memory;  /* at a crash: address space beyond that of the start, bytes */
+    /* at a crash behind one of the arrays of reserve(): the number of vertices or triangles that it
+     * has room for; else 0 */
+    uint64_t vertices, triangles;
 } isolated_state;
 
 /* ---- isolated_bytes.c: texts of requests and answers ---- */

@@ -2,6 +2,7 @@
 #define _GNU_SOURCE // ftruncate(), sigaltstack(), MAP_ANONYMOUS
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
@@ -32,15 +33,29 @@ typedef struct worker {
 /* ---- limits ---- */
 
 static struct {
-    isolated_state *state;
+    const worker *w;
     uint64_t bytes; // address space at the start
 } crash;
 
-/* Notes how much memory there was: a plug-in that gets none crashes. */
-static void on_crash(int signal_number)
+/* Notes whether mesh() used the page behind one of its arrays, at the address `at`. */
+static void note_beyond(const worker *w, const uint8_t *at)
 {
+    const size_t page = (size_t)sysconf(_SC_PAGESIZE),
+                 reals = w->layout.index_pages - w->layout.real_pages;
+    const uint8_t *end = w->arrays + w->mapped;
+    if (!w->arrays || strcmp(w->state->running, "mesh")) return;
+    if (at >= w->arrays + reals && at < w->arrays + reals + page)
+        w->state->vertices = w->layout.n_real / 3;
+    if (at >= end - page && at < end) w->state->triangles = w->layout.n_index / 3;
+}
+
+/* Notes how much memory there was, as a plug-in that gets none crashes, and where it crashed. */
+static void on_crash(int signal_number, siginfo_t *info, void *context)
+{
+    (void)context;
     const uint64_t now = sdm_address_space();
-    crash.state->memory = now > crash.bytes ? now - crash.bytes : 0;
+    crash.w->state->memory = now > crash.bytes ? now - crash.bytes : 0;
+    if (signal_number == SIGSEGV) note_beyond(crash.w, info->si_addr);
     signal(signal_number, SIG_DFL);
     raise(signal_number);
 }
@@ -51,12 +66,12 @@ static void watch_crashes(worker *w)
     const stack_t own = {.ss_sp = stack, .ss_size = sizeof stack};
     struct sigaction action;
     static const int signals[] = {SIGSEGV, SIGBUS, SIGABRT};
-    crash.state = w->state;
+    crash.w = w;
     crash.bytes = sdm_address_space();
     sigaltstack(&own, NULL);
     memset(&action, 0, sizeof action);
-    action.sa_handler = on_crash;
-    action.sa_flags = SA_ONSTACK;
+    action.sa_sigaction = on_crash;
+    action.sa_flags = SA_ONSTACK | SA_SIGINFO;
     sigemptyset(&action.sa_mask);
     for (size_t i = 0; i < sizeof signals / sizeof *signals && !SDM_SANITIZED; i++)
         sigaction(signals[i], &action, NULL);
@@ -208,8 +223,9 @@ static sdm_status make_mesh(worker *w, const isolated_request *q, isolated_answe
     const sdm_instance *s = w->instance;
     worker_call c = {.worker = w};
     sdm_mesh_out filled = {0};
-    double p[SHAPE_PARAMS_MAX];
-    memcpy(p, q->p, sizeof p);
+    double p[SHAPE_PARAMS_MAX + SHAPE_PARAMS_BEHIND];
+    memcpy(p, q->p, s->n_params * sizeof *p);
+    for (size_t i = 0; i < SHAPE_PARAMS_BEHIND; i++) p[s->n_params + i] = NAN;
     sdm_host_call_begin(&c.call, NULL, false);
     c.call.host.reserve = reserve;
     const int failed = s->shape->mesh(s->self, &c.call.host, s->options, p, &filled);

@@ -6,6 +6,8 @@
 #include "sdm/registry.h"
 
 #define SHAPE_PARAMS_MAX 64
+/* Behind the parameters mesh() finds so many values that are NaN: one that reads them fails. */
+#define SHAPE_PARAMS_BEHIND 16
 #define SHAPE_OPTIONS_MAX 64
 #define SHAPE_MEASURES_MAX 64
 

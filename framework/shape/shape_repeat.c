@@ -13,7 +13,6 @@ enum { FILL = 0xff, OTHER_FILL = 0x40 };
 enum { THREADS = 4, SHAPES = 8, SHAPES_BRIEF = 4, TRIANGLES = 200000 };
 static const double SECONDS_BRIEF = 0.1;
 #define BEHIND 0.5
-#define OTHER_BEHIND 1.5
 
 static uint64_t checksum(const sdm_mesh *m)
 {
@@ -60,12 +59,18 @@ static void count_unlike(trial *t, const double *p, size_t n, const uint64_t *fi
 /* Does mesh() read behind the last parameter? Then out->param is the index of the first value. */
 static void read_behind(trial *t, const double *p, size_t n, const uint64_t *first, sdm_repeat *out)
 {
-    set_behind(t, OTHER_BEHIND);
-    count_unlike(t, p, n, first, FILL, SDM_REPEAT_BEHIND, out);
+    // a mesh that fails with both of the first two values may be made with the third
+    static const double others[] = {1.5, 8};
+    double other = BEHIND;
+    for (size_t i = 0; i < sizeof others / sizeof *others && !out->unlike; i++) {
+        other = others[i];
+        set_behind(t, other);
+        count_unlike(t, p, n, first, FILL, SDM_REPEAT_BEHIND, out);
+    }
     set_behind(t, BEHIND);
     if (!out->unlike) return;
     for (out->param = t->shape->n_params; out->param < 2 * SHAPE_PARAMS_MAX - 1; out->param++) {
-        t->p[out->param] = OTHER_BEHIND;
+        t->p[out->param] = other;
         const uint64_t now = make(t, p + out->first * t->shape->n_params, FILL);
         t->p[out->param] = BEHIND;
         if (now != first[out->first]) return;
@@ -119,8 +124,9 @@ const char *sdm_repeat_advice(sdm_repeat_cause cause)
         return "mesh() keeps something from one call to the next: no static or global variables "
                "that it writes, no random numbers, no clock, no files";
     case SDM_REPEAT_BEHIND:
-        return "mesh() reads more parameters than the shape has: is .n_params smaller than the "
-               "table? SDM_PARAMS(TABLE) in place of .params and .n_params counts the rows";
+        return "mesh() reads more parameters than the shape has: is a row missing in the table, "
+               "or .n_params smaller than the table? SDM_PARAMS(TABLE) in place of .params and "
+               ".n_params counts the rows";
     case SDM_REPEAT_UNSET:
         return "mesh() reads memory that it has not written: set every variable, row and array "
                "first (the compiler names many of them with -O2 -Wall, valgrind the rest)";

@@ -63,7 +63,11 @@ faulty velocity 4 '^warning +velocity\(\) is off by 0\.0099 of the largest veloc
 faulty unlike 4 '^warning +meshes have other bits when they are made again, for example at size=2\.5 reach=1\.5; mesh\(\) keeps something from one call to the next: .*; mend this first'
 faulty shared 4 '^warning +meshes have other bits when they are made again by several threads at once, for example at .*; mesh\(\) writes a static or global variable or array'
 faulty unset 4 '^warning +meshes have other bits when they are made again, for example at .*; mesh\(\) reads memory that it has not written'
-faulty behind 4 "^warning +mesh\(\) reads p\[3\], but the last parameter is p\[1\], 'reach'; mesh\(\) reads more parameters than the shape has: is \.n_params smaller"
+faulty behind 3 "^broken +mesh\(\) reads p\[3\], but the last parameter is p\[1\], 'reach'; mesh\(\) reads more parameters than the shape has: is a row missing in the table, or \.n_params smaller"
+expect 3 "shape 'faulty' at .*: mesh\(\) reads p\[3\], but the last parameter is p\[1\], 'reach': its row is missing in the table, or \.n_params is too small" \
+    sdmgen exact --shape faulty -O fault=behind --plugin "$plugin" --measure
+# also where the mesh cannot be made with most values there
+faulty unlisted 3 "^broken +mesh\(\) reads p\[2\], but the last parameter is p\[1\], 'reach'; "
 
 faulty open 3 '^broken +open or badly oriented edges in all 21 shapes, up to 3 at .*: part 2 of 2 \(11 triangles, vertices 8 \.\. 15, .* has 3 edges .*, the first at [0-9.]+ -?[0-9.]+ -?[0-9.]+ mm: add the triangles'
 faulty metres 4 '^warning +the shape is 0\.008 mm in size, 1 mm of the parameter .size. moves its vertices by 0\.0017 mm; the unit of sdmgen is mm: if the vertices are in m, multiply them by 1000$'
@@ -275,6 +279,11 @@ told 'warning: part 1 of 4 .* is inside out and larger than the rest: maps turn 
 boxes 11
 sdmgen exact --mesh boxes.off -o x.npy 2>err || bad "exact of boxes: $(cat err)"
 told '^sdmgen: the mesh is inside out; maps turn it$'
+
+# A part in m beside one in mm.
+boxes 00
+awk 'NR > 10 && NR < 19 {$2 = 1 + $2 / 2000; $3 = 1 + $3 / 2000} {print}' boxes.off >needle.off
+expect 4 "part 2 of 2 \(.*\) is 0\.001 mm thick, less than a thousandth of the mesh: no grid shows it; are its vertices, or a radius, in m\?" sdmgen mesh --mesh needle.off --audit
 
 # Mending a file: --turn-parts.
 expect 4 'is inside out and overlaps another.*--turn-parts mends this' sdmgen mesh --mesh x.ply --json

@@ -20,7 +20,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
-     "meets|groups|crumb|spare|offset|around",
+     "meets|groups|crumb|spare|offset|around|unlisted",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -106,6 +106,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "edge") && !(p[0] >= 1 && p[0] <= 3)) abort();
     // in parentheses: cmocka defines a macro fail()
     if (!strcmp(fault, "fail") && is_large) return (host->fail)(host, "too large");
+    if (!strcmp(fault, "unlisted") && !(p[2] > 3)) return (host->fail)(host, "too short");
     if (!strcmp(fault, "trained") && !access("trained/model.sdm", F_OK))
         return (host->fail)(host, "a model is there");
     if (is_large) faulty_process(fault);

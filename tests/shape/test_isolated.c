@@ -191,7 +191,7 @@ static void memory_faults_are_errors(void **state)
     if (SDM_SANITIZED) skip(); // sanitizers find these, and there is no limit of memory
     fault("flood", "mesh(): the plug-in needs more than 0.2 GB of memory", &HOW);
     fault("heap", "mesh(): the plug-in called abort(), or damaged memory; it printed: ", &HOW);
-    fault("beyond", "mesh(): the plug-in used memory that is not its own", &HOW);
+    fault("beyond", "mesh(): it has written or read beyond the 16 vertices that it reserved", &HOW);
     fault("before", "mesh() wrote outside of the arrays of reserve()", &HOW);
 }
 

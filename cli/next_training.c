@@ -166,7 +166,7 @@ void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_ti
                    double minutes)
 {
     // the verdict, with the changes of the other kind: none but the minutes
-    const sdm_verdict pod = {.minutes = minutes};
+    const sdm_verdict pod = {.minutes = fmax(minutes, r->pod_minutes)};
     const bool far = is_far(&r->verdict) && !r->unfinished && print_far(r),
                slow = print_slow(r, times);
     if (!far && !slow) return;
@@ -184,8 +184,9 @@ static void print_next_pod(const cli_args *args, const sdm_train_report *r, doub
 {
     const double ratio = r->other_voxel_mm / r->verdict.rmse_voxel_mm;
     // auto has given pod a part of the minutes
-    const sdm_verdict pod = {.minutes = r->compared ? 2 * minutes : minutes};
-    if (r->compared && ratio > MUCH_WORSE) {
+    const sdm_verdict pod = {.minutes = fmax(r->compared ? 2 * minutes : minutes, r->pod_minutes)};
+    // with too few maps pod shows nothing of what it can do
+    if (r->compared && ratio > MUCH_WORSE && !(r->pod_minutes > minutes)) {
         printf(
             "  next        no training is known to help near the surface: pod, which auto has "
             "trained, too, is %.2g times worse there; exact maps (sdmgen exact, fit --exact) have "
@@ -203,7 +204,9 @@ static void print_finish(const char *begin, const cli_args *args, const sdm_trai
 {
     const sdm_verdict *v = &r->verdict;
     const char *other = r->kind == SDM_NETWORK_POD ? "template" : "pod";
-    sdm_verdict changes = {.minutes = fmax(minutes, v->minutes), .cut = v->cut, .to = v->to};
+    const double asked = r->kind == SDM_NETWORK_POD ? 0 : r->pod_minutes,
+                 least = fmax(minutes, asked);
+    sdm_verdict changes = {.minutes = fmax(least, v->minutes), .cut = v->cut, .to = v->to};
     if (!strncmp(v->key, "grid.", 5)) memcpy(changes.key, v->key, sizeof changes.key);
     if (!args->files.n || !print_command(begin, args, r, &changes, other)) return;
     printf("              (auto had no time left for %s", other);
@@ -214,7 +217,7 @@ static void print_finish(const char *begin, const cli_args *args, const sdm_trai
     // trials and first training used one half
     if (minutes > 0)
         printf("; train.minutes=%.6g with auto compares both",
-               ceil(20 * fmax(minutes, r->seconds / 60)) / 10);
+               ceil(10 * (least + fmax(minutes, r->seconds / 60))) / 10);
     printf(")\n");
 }
 

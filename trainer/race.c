@@ -23,6 +23,14 @@ static const double ENOUGH = 1.0 / 500;
    than this, it is not trained. */
 static const double HOPELESS = 15;
 
+/* The trial of `pod` takes up to about twice as long as that of the template, for its bases. It is
+   left out where both would take more than this part of a budget of time. */
+static const double POD_TRIAL = 2, TRIALS_MOST = 1.0 / 3;
+
+/* On a busy machine the few maps of a trial are made faster than the many of a training (measured:
+   by a factor of 1.2 to 2). */
+static const double BURST = 1.5;
+
 /* Part of the budget for a template that is trained before `pod`. */
 static const double TEMPLATE_SHARE = 1.0 / 3;
 
@@ -35,6 +43,7 @@ typedef struct entrant {
     bool cut;            /* the budget of time ended before all maps of the trial were made */
     turn_figures errors; /* of its trial */
     double filling;      /* s, when its maps were begun, of the run */
+    double per_map;      /* s a map */
     double seconds;
     char left_out[SDM_ERROR_TEXT_MAX]; /* why the shape does not allow it; "": it does */
     trainer run;                       /* its trial; run.kind is NULL without one */
@@ -150,8 +159,10 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
         s = SDM_OK;
     } else {
         if (s && err) *err = reason;
-        e->filling = trainer_seconds(t);
+        e->filling = trainer_shared_seconds(t);
         if (!s) s = trainer_dataset_fill(&r->data, r->n_threads, &hooks, err);
+        e->per_map = (trainer_shared_seconds(t) - e->filling) /
+                     fmax(1, (double)(r->data.n_holdout + r->data.n_start));
         if (!s) s = trainer_check_grid(r, err);
         if (!s) s = r->kind->begin(r, err);
         if (!s) {
@@ -186,18 +197,39 @@ static sdm_status try_kind(trainer *t, sdm_config *config, entrant *e, sdm_error
     return s;
 }
 
-/* Decides which kinds are trained; returns the reason. */
-static const char *decide(const entrant *carried, const entrant *pod, training_turns *out)
+/* Before the trial of pod, with a budget of time: tells how many maps fit into it. Returns the
+ * minutes that hold those which the parameters ask for, 0: the budget does. *no_time: it is too
+ * short for the trial. */
+static double tell_pace(trainer *t, sdm_config *scratch, const entrant *carried, bool *no_time)
+{
+    const double budget = 60 * t->config->train.minutes, now = trainer_shared_seconds(t);
+    if (!trainer_by_time(t)) return 0;
+    *no_time = (1 + POD_TRIAL) * now > TRIALS_MOST * budget;
+    *scratch = *t->config;
+    sdm_config_choose_kind(scratch, SDM_NETWORK_POD);
+    // a template that is ready is measured in about the time of its trial
+    const double first = carried->ready ? now : (budget - now) * TEMPLATE_SHARE,
+                 trial = *no_time ? 0 : POD_TRIAL * now;
+    return trainer_tell_pace(t, scratch, BURST * carried->per_map,
+                             0.5 * (budget - now - trial - first));
+}
+
+/* Decides which kinds are trained; returns the reason. no_time: the budget is too short for a trial
+ * of pod. */
+static const char *decide(const entrant *carried, const entrant *pod, bool no_time,
+                          training_turns *out)
 {
     *out = (training_turns){.n = 1, .kind = {SDM_NETWORK_TEMPLATE}, .chosen = true, .share = 1};
     if (!carried->finished) {
         out->kind[0] = SDM_NETWORK_POD;
         return "the only kind left";
     }
-    if (!pod->finished) return "hardly any error is left";
-    const double ratio = trainer_score(&pod->errors) / trainer_score(&carried->errors);
-    // a trial with fewer maps than planned rules nothing out
-    if (ratio > HOPELESS && !pod->cut) return "training does not make up for such a difference";
+    if (!pod->finished && !no_time) return "hardly any error is left";
+    const double ratio =
+        no_time ? INFINITY : trainer_score(&pod->errors) / trainer_score(&carried->errors);
+    // a trial with fewer maps than planned, or none, rules nothing out
+    if (ratio > HOPELESS && !pod->cut && !no_time)
+        return "training does not make up for such a difference";
     if (ratio <= 1) {
         out->kind[0] = SDM_NETWORK_POD;
         return "its error (at the surface, and a tenth of that everywhere) is the smaller one, and "
@@ -205,6 +237,12 @@ static const char *decide(const entrant *carried, const entrant *pod, training_t
     }
     out->n = 2, out->kind[1] = SDM_NETWORK_POD;
     out->share = carried->ready ? 1 : TEMPLATE_SHARE;
+    if (no_time)
+        return carried->ready
+                   ? "ready, then pod is trained, without a trial, for which "
+                     "train.minutes is short, and the better one is kept"
+                   : "trained with a third of the budget, then pod, without a trial, for "
+                     "which train.minutes is short, and the better one is kept";
     return carried->ready
                ? "ready, then pod is trained, and the better one is kept"
                : "trained with a third of the budget, then pod, and the better one is kept";
@@ -227,9 +265,15 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
     sdm_status s = try_kind(t, scratch, &e[0], err);
     const bool done =
         e[0].finished && trainer_score(&e[0].errors) < ENOUGH * t->config->grid.spacing[0];
-    if (!s && e[0].finished && !done) s = try_kind(t, scratch, &e[1], err);
+    bool no_time = false;
+    double pod_minutes = 0;
+    if (!s && e[0].finished && !done) {
+        pod_minutes = tell_pace(t, scratch, &e[0], &no_time);
+        if (!no_time) s = try_kind(t, scratch, &e[1], err);
+    }
     if (!s) {
-        const char *reason = decide(&e[0], &e[1], out);
+        const char *reason = decide(&e[0], &e[1], no_time, out);
+        out->pod_minutes = pod_minutes;
         const entrant *other = out->kind[0] == e[0].kind ? &e[1] : &e[0];
         out->tried_other = other->finished;
         if (out->tried_other) out->other = other->errors;

@@ -87,6 +87,7 @@ static sdm_status train_turn(run *r, const trainer *common, bool *unfit, sdm_tra
 /* Adds the figures of the trial of the kind that was not trained. */
 static void report_trial(const training_turns *r, sdm_train_report *report)
 {
+    report->pod_minutes = fmax(report->pod_minutes, r->pod_minutes);
     if (!r->tried_other) return;
     report->tried = true;
     report->other = (sdm_accuracy){.rmse_mm = r->other.rmse_mm};
@@ -107,7 +108,7 @@ static sdm_status begin_second(run *r, const trainer *t, sdm_train_report *repor
                         second);
         report->unfinished = true;
         report_trial(&r->turns, report);
-        trainer_verdict_unfinished(first, second, &report->verdict);
+        trainer_verdict_unfinished(first, second, r->turns.tried_other, &report->verdict);
         return SDM_OK;
     }
     const turn_figures figures = trainer_turn_figures(r->turns.kind[0], &r->turns.first);
@@ -140,6 +141,7 @@ static sdm_status keep_better(run *r, trainer *t, sdm_train_report *report, sdm_
     report->seconds = both[0].seconds + both[1].seconds;
     report->verdict.saved_seconds = both[1].verdict.saved_seconds;
     report->compared = true;
+    report->pod_minutes = fmax(both[0].pod_minutes, both[1].pod_minutes);
     report->other = both[!best].accuracy;
     report->other_voxel_mm = both[!best].verdict.rmse_voxel_mm;
     report->other_ms = both[!best].map_ms;

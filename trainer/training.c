@@ -42,10 +42,26 @@ static void tell_forecast(trainer *t, size_t done)
                     ceil(10 * 2 * seconds / 60) / 10);
 }
 
+/* Tells once how many maps fit into the budget, after the second that shows their pace. */
+static void tell_pace(trainer *t, size_t done)
+{
+    enum { FEWEST = 8 };
+    const double now = trainer_seconds(t), since = now - t->phase_started,
+                 half = 0.5 * 60 * t->config->train.minutes;
+    if (t->config->network.kind != SDM_NETWORK_POD || t->data.store || t->overrun_told ||
+        t->pace_told || done < FEWEST || since < fmin(1, 0.1 * half))
+        return;
+    // held-out maps train nothing
+    const double per_map = since / (double)done;
+    trainer_tell_pace(t, t->config, per_map,
+                      half - t->phase_started - per_map * (double)t->data.n_holdout);
+}
+
 static void fill_report(void *user, size_t done, size_t all)
 {
     trainer *t = user;
     tell_forecast(t, done);
+    tell_pace(t, done);
     t->pace.done = (int64_t)done;
     trainer_report(t, trainer_start_fraction(t), done == all);
 }
@@ -96,11 +112,16 @@ static sdm_status train_make_maps(trainer *t, bool resumed, sdm_error *err)
     t->phase = SDM_PHASE_DATA;
     // the time of a resumed run does not count here
     t->overrun_told |= resumed;
+    t->pace_told |= resumed;
     if (!resumed) t->phase_started = trainer_seconds(t);
     trainer_pace_start(t, 1);
     tell_stored(t);
     t->data.known = t->tried.n_voxels ? &t->tried : NULL;
+    const double known = (double)(t->tried.n_holdout + t->tried.n_start),
+                 began = trainer_seconds(t);
     const sdm_status s = trainer_dataset_fill(&t->data, t->n_threads, &hooks, err);
+    const double made = (double)(t->data.n_holdout + t->data.n_static + t->data.n_start) - known;
+    if (made > 0) t->map_seconds = (trainer_seconds(t) - began) / made;
     t->data.known = NULL;
     trainer_dataset_dispose(&t->tried);
     if (s) return s;
@@ -125,7 +146,9 @@ static sdm_status train_prepare(trainer *t, bool resumed, size_t n_taken, sdm_er
     t->phase = SDM_PHASE_BASES;
     trainer_pace_start(t, 0);
     trainer_report(t, trainer_start_fraction(t), true);
+    const double began = trainer_seconds(t);
     if (!s) s = t->kind->begin(t, err);
+    t->begin_seconds = trainer_seconds(t) - began;
     if (!s) s = trainer_samples_start(t, err);
     if (!s && resumed) s = trainer_samples_retake(t, n_taken, err);
     if (s == SDM_E_CANCELLED && is_second(t))

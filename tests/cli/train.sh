@@ -126,13 +126,13 @@ cat >far.yaml <<'YAML'
 shape: {name: linkage, options: {links: 2, length: 1, radius: 1, tip: 1, joint: 1, base: 1}}
 grid: {spacing: 0.2}
 data: {static: 2, start: 64, online: 0, holdout: 12}
-train: {minutes: 0.05}
+train: {minutes: 0.5}
 YAML
 pod='^  far away    where distances far from the surface matter: pod; '
 expect 0 - sdmgen train far.yaml --out far --quiet
 has '^  verdict     Far from the surface .*: nothing to change for surfaces, level sets and fits near the surface; where distances far away matter, set network.kind to pod'
 has "${pod}auto has tried it, too: within a voxel of the surface [0-9.]+ mm, [0-9.e+]+ times worse; everywhere [0-9.]+ mm, .* \(a trial, which training improves\)\$"
-has '^              sdmgen train far\.yaml train\.minutes=0\.05 network\.kind=pod --out far-2$'
+has '^              sdmgen train far\.yaml train\.minutes=0\.5 network\.kind=pod --out far-2$'
 expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 --out named --quiet
 has "${pod}this run has not measured it: near the surface it may be worse\$"
 has '^              sdmgen train far\.yaml train\.minutes=0\.02 network\.kind=pod --out named-2$'
@@ -161,13 +161,16 @@ rm -r both
 expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 --out both --quiet --json
 has '"other": \{"kind": "(pod|template)", .*"ms_network": [0-9.e-]+, "grade": "[a-z]+", "model": "both/model-(pod|template)\.sdm"\}'
 sdmgen train link.yaml data.start=300 data.memory_gb=6 train.steps=0 train.minutes=0.0001 --out both --force >out 2>err || bad "hurried: $(cat err)"
+grep -Eq '^sdmgen: [0-9.e+]+ exact maps a second: about 0 fit into their part of train\.minutes \(0\.0001\); [0-9] parameters? asks? for [0-9]+, which train\.minutes=[0-9.]+ holds$' err ||
+    bad "no word about the pace of maps: $(cat err)"
 grep -Eq '^sdmgen: the run will take longer than train.minutes \(0.0001\): a trial of network.kind: auto makes at least [0-9]+ maps, which takes about ' err ||
     bad "no word about the trials ahead: $(cat err)"
 # hardly any of the budget is left for the other kind: the verdict says so, and the command trains that kind
-has '^  verdict     network\.kind: auto has compared template with a trial of pod alone, for whose training no time was left: pod may be better, near the surface, too\. '
+has '^  verdict     network\.kind: auto had no time left to train pod, too: pod may be better than template, near the surface, too\. '
 [ "$(grep -c 'nothing to change\|has not measured it' out)" -eq 0 ] || bad "an unfinished comparison: $(cat out)"
-has '^  (next|better) +sdmgen train link\.yaml .*train\.minutes=0\.0001 network\.kind=pod --out both-2$'
-has '^              \(auto had no time left for pod: its trial left [0-9.]+ mm within a voxel of the surface, [0-9.]+ mm everywhere, which training improves; train\.minutes=[0-9.]+ with auto compares both\)$'
+has '^  (next|better) +sdmgen train link\.yaml .*train\.minutes=[0-9.]+ network\.kind=pod --out both-2$'
+grep -q 'train\.minutes=0\.0001 network' out && bad "minutes that did not suffice: $(cat out)"
+has '^              \(auto had no time left for pod; train\.minutes=[0-9.]+ with auto compares both\)$'
 rm -r both
 expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 --out both --quiet --json
 # A model that --force replaces is compared if its shape, ranges and grid are the same. With the kind given, the command names none.

@@ -1,6 +1,7 @@
 /* The verdict on a training: the decision from given figures, the measured parts, and that
  * following the advice makes the error smaller. Tests: judge.c verdict.c verdict_unfit.c
- * pod_parts.c tree_pass.c history.c progress.c */
+ * pod_parts.c tree_pass.c history.c progress.c
+ * forecast.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -16,6 +17,7 @@
 #include "data/surface_check.h"
 #include "sdm/internal/text.h"
 #include "sdm/model.h"
+#include "state/forecast.h"
 #include "state/history.h"
 #include "state/judge.h"
 #include "state/progress.h"
@@ -46,6 +48,20 @@ static sdm_verdict decide(const char *override, sdm_cause cause, double fall, do
     assert_true(v.limited);
     assert_int_equal(v.limit, cause);
     return v;
+}
+
+// Four maps for each term of the polynomials, at most data.start; half of the time is for maps, and
+// a third is left for steps.
+static void minutes_hold_the_maps(void **state)
+{
+    (void)state;
+    sdm_config c = config_of(NULL, 0);
+    c.network.degree = 6, c.data.start = 3456;
+    assert_true(trainer_maps_asked(&c, 4) == 840);
+    assert_true(trainer_maps_asked(&c, 6) == 3456);
+    assert_true(trainer_minutes_for(3456, 0.03, 0) == 3.5);
+    assert_true(trainer_minutes_for(3456, 0.03, 103) == 5.5);
+    assert_true(trainer_minutes_for(100, 0.01, 0) == 0.1);
 }
 
 // The largest part limits; its key, the doubled value and the rest of the error are in the
@@ -130,6 +146,27 @@ static void length_of_the_training(void **state)
     v.saved_seconds = 36;
     trainer_verdict_decide(&in_time, &v);
     assert_true(fabs(v.minutes - 2.4) < 1e-9);
+    // minutes that hold the maps at the measured pace, where twice the budget would not, whichever
+    // part limits
+    static const struct {
+        sdm_cause cause;
+        double steps, asked, minutes;
+    } few[] = {{SDM_CAUSE_MAPS, 1500, 5.5, 5.5},
+               {SDM_CAUSE_MAPS, 1500, 2, 3},
+               {SDM_CAUSE_NETWORK, 0, 7, 7},
+               {SDM_CAUSE_BASES, 1500, 5.5, 5.5}};
+    for (size_t k = 0; k < sizeof few / sizeof *few; k++) {
+        verdict_input short_of_maps = in_time;
+        short_of_maps.cut = true, short_of_maps.steps = few[k].steps;
+        short_of_maps.minutes_asked = few[k].asked;
+        v = figures();
+        v.part_mm2[few[k].cause] = 1e-4;
+        trainer_verdict_decide(&short_of_maps, &v);
+        const bool bases = few[k].cause == SDM_CAUSE_BASES;
+        assert_string_equal(v.key, bases ? "network.rank" : "train.minutes");
+        assert_true((bases ? v.minutes : v.to) == few[k].minutes);
+        assert_true(!bases || strstr(v.sentence, "train.minutes from 1.5 to 5.5 for the maps"));
+    }
     v = figures();
     v.part_mm2[SDM_CAUSE_NETWORK] = 1e-4;
     v.saved_seconds = 90;
@@ -691,6 +728,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(largest_part_limits),
         cmocka_unit_test(length_of_the_training),
+        cmocka_unit_test(minutes_hold_the_maps),
         cmocka_unit_test(patience_left_time),
         cmocka_unit_test(static_grid_took_the_time),
         cmocka_unit_test(error_far_from_the_surface),

@@ -8,6 +8,7 @@
 
 #include "data/workbench.h"
 #include "data_files.h"
+#include "forecast.h"
 #include "history.h"
 #include "judge.h"
 #include "kind.h"
@@ -411,6 +412,7 @@ sdm_status trainer_export_judge(trainer *t, sdm_train_report *report, sdm_error 
         report->kind = t->config->network.kind;
         report->chosen = t->turns->chosen;
         report->map_ms = map_ms;
+        report->pod_minutes = trainer_minutes_asked(t);
     }
     description_free(d);
     return s;

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "data/surface_check.h"
+#include "forecast.h"
 #include "history.h"
 #include "progress.h"
 #include "sdm/internal/shape_box.h"
@@ -49,7 +50,8 @@ static void advise_budget(const verdict_input *in, sdm_verdict *v)
 {
     const sdm_config *c = in->config;
     if (c->train.minutes > 0)
-        advise(v, "train.minutes", in->budget, (in->steps > 0 ? 2 : 4) * in->budget);
+        advise(v, "train.minutes", in->budget,
+               fmax((in->steps > 0 ? 2 : 4) * in->budget, in->minutes_asked));
     else
         advise(v, c->train.steps > 0 ? "train.steps" : "train.samples", in->budget, 2 * in->budget);
 }
@@ -218,10 +220,13 @@ static double minutes_for(const verdict_input *in, const sdm_verdict *v)
     if (!strcmp(v->key, "grid.spacing")) factor = pow(v->from / v->to, 3);
     if (v->limit == SDM_CAUSE_MAPS && !in->cut) factor = 2;
     if (v->limit == SDM_CAUSE_NETWORK && !strncmp(v->key, "network.", 8)) factor = 2;
+    // too few maps limit the next training, too, whatever else it changes
+    if (!(factor > 1) && in->minutes_asked > 0 && strcmp(v->key, "train.minutes") && v->key[0])
+        return in->minutes_asked;
     if (!(c->train.minutes > 0) || !(factor > 1)) return 0;
     // the time that train.patience has saved is there already
     const double minutes = ceil(10 * (factor * in->budget - v->saved_seconds / 60)) / 10;
-    return minutes > in->budget ? minutes : 0;
+    return fmax(minutes > in->budget ? minutes : 0, factor * in->minutes_asked);
 }
 
 /* text = what follows from an error far from the surface, of which no key of a template takes away
@@ -276,17 +281,17 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
     if (v->minutes > 0)
         snprintf(time, sizeof time, ", and train.minutes from %.3g to %.3g for %s", in->budget,
                  v->minutes,
-                 v->limit == SDM_CAUSE_MAPS      ? "the maps"
-                 : v->limit == SDM_CAUSE_NETWORK ? "a larger network"
-                                                 : "more voxels");
+                 v->limit == SDM_CAUSE_MAPS || v->minutes <= in->minutes_asked ? "the maps"
+                 : v->limit == SDM_CAUSE_NETWORK                               ? "a larger network"
+                                                                               : "more voxels");
     if (v->limit == SDM_CAUSE_GRID)
         snprintf(result, sizeof result,
                  "; between its voxels exact maps miss the surface by %.2g mm",
                  sqrt(v->part_mm2[SDM_CAUSE_GRID]));
     else if (v->limit != SDM_CAUSE_NETWORK && v->at_best_mm > 0)
         snprintf(result, sizeof result,
-                 "; without this part the RMSE would be %.2g mm, not %.2g mm", v->at_best_mm,
-                 v->rmse_mm);
+                 "; without this part the RMSE would be %.2g mm at best, not %.2g mm",
+                 v->at_best_mm, v->rmse_mm);
     if (v->limit != SDM_CAUSE_GRID) {
         const double rest = v->at_best_mm * v->at_best_mm, part = v->part_mm2[v->limit];
         snprintf(share, sizeof share, " (%.0f %% of the mean square error)",
@@ -363,7 +368,7 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
     tell_few(v);
 }
 
-void trainer_verdict_unfinished(const char *own, const char *other, sdm_verdict *v)
+void trainer_verdict_unfinished(const char *own, const char *other, bool tried, sdm_verdict *v)
 {
     char rest[sizeof v->sentence];
     if (v->inside_out > 0) return;
@@ -375,10 +380,11 @@ void trainer_verdict_unfinished(const char *own, const char *other, sdm_verdict 
         tell_few(v);
     }
     memcpy(rest, v->sentence, sizeof rest);
-    snprintf(v->sentence, sizeof v->sentence,
-             "network.kind: auto has compared %s with a trial of %s alone, for whose training no "
-             "time was left: %s may be better, near the surface, too. %.340s",
-             own, other, other, rest);
+    snprintf(
+        v->sentence, sizeof v->sentence,
+        "network.kind: auto had no time left to train %s, too%s: %s may be better than %s, near "
+        "the surface, too. %.340s",
+        other, tried ? ", after a trial" : "", other, own, rest);
 }
 
 /* Distributes the error of the model over its causes. What a template leaves besides its correction
@@ -497,6 +503,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                               .full = full,
                               .ended_early = t->saved_seconds > 0,
                               .steps = (double)t->step,
+                              .minutes_asked = trainer_minutes_asked(t),
                               .budget = t->turns->budget};
     set_derivatives(t, &errors->derivatives, out);
     if (triangles < d->n_params)

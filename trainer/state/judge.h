@@ -31,17 +31,19 @@ typedef struct verdict_input {
     double maps;  /* training maps made by the run */
     double fixed; /* those of them on the static grid */
     double n_params;
-    bool cut;         /* the time of the budget ended before all maps of data.start were made */
-    bool full;        /* data.memory_gb did not hold all of them */
-    bool ended_early; /* by train.patience */
-    double steps;     /* of the optimiser */
-    double budget;    /* of the run, in the unit of the key that gives it; with `auto` this training
-                         may have had a part of it */
+    bool cut;             /* the time of the budget ended before all maps of data.start were made */
+    bool full;            /* data.memory_gb did not hold all of them */
+    bool ended_early;     /* by train.patience */
+    double steps;         /* of the optimiser */
+    double minutes_asked; /* trainer_minutes_asked() */
+    double budget; /* of the run, in the unit of the key that gives it; with `auto` this training
+                      may have had a part of it */
 } verdict_input;
 
 /* Sets grade, limit, key, values and sentence from the figures in *v. */
 void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v);
 
 /* The sentence becomes that of a run that had no time to train `other`, too, after `own`: what
-   limits its model says nothing about whether the other kind is better. */
-void trainer_verdict_unfinished(const char *own, const char *other, sdm_verdict *v);
+   limits its model says nothing about whether the other kind is better. tried: `other` had a trial.
+ */
+void trainer_verdict_unfinished(const char *own, const char *other, bool tried, sdm_verdict *v);

@@ -54,7 +54,10 @@ typedef struct trainer {
     struct sdm_text *metrics;  /* all lines of metrics.jsonl */
     double prepared_seconds;   /* trainer_seconds() before the first step */
     double saved_seconds;      /* by train.patience */
+    double map_seconds;        /* s a map while the maps before the first step were made */
+    double begin_seconds;      /* s, of train_kind.begin() */
     bool overrun_told;         /* that the maps will not fit into the budget of time */
+    bool pace_told;            /* how many maps fit into it */
     sdm_accuracy accuracy;     /* accuracy of the finished model */
     sdm_model_quality quality; /* the verdict on it, for its file */
 } trainer;

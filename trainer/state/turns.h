@@ -20,8 +20,10 @@ typedef struct training_turns {
     double share;             /* part of the budget left by the trials that the first of two may
                                  use, 0 .. 1 */
     sdm_train_report first;   /* result of the first, while the second trains */
-    bool tried_other;         /* the kind that is not trained, or trained later, had a trial: */
-    turn_figures other;       /* its errors in the trial */
+    double pod_minutes; /* train.minutes for a training of pod alone at the pace of the trials; 0:
+                           the budget holds its maps */
+    bool tried_other;   /* the kind that is not trained, or trained later, had a trial: */
+    turn_figures other; /* its errors in the trial */
 } training_turns;
 
 /* *out = `asked` with the kind of the present turn, its defaults for all keys that have those of

@@ -90,6 +90,9 @@ typedef struct sdm_train_report {
     bool tried;
     /* The other kind was to be trained, too, but hardly any of the budget was left. */
     bool unfinished;
+    /* train.minutes that hold the maps which the parameters ask of a training of `pod`, at the
+       pace of this run; 0: it had them, or the budget is no time. */
+    double pod_minutes;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled

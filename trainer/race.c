@@ -111,6 +111,7 @@ static void trial_report(void *user, size_t done, size_t all)
     const size_t random = d->n_start < FILL_LEAST_RANDOM ? d->n_start : FILL_LEAST_RANDOM;
     double seconds;
     (void)all;
+    trainer_report(t, trainer_start_fraction(t), false);
     if (t->overrun_told || !trainer_forecast(t, e->filling, done, d->n_holdout + random, &seconds))
         return;
     t->overrun_told = true;
@@ -186,6 +187,7 @@ static sdm_status try_kind(trainer *t, sdm_config *config, entrant *e, sdm_error
     size_t n_params;
     sdm_instance_params(t->shape, &n_params);
     trial_config(t->config, n_params, e->kind, config);
+    trainer_report(t, trainer_start_fraction(t), true);
     const sdm_status s = trial(t, config, e, err);
     if (!s && e->finished)
         trainer_message(t,
@@ -262,6 +264,7 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
     entrant e[] = {{.kind = SDM_NETWORK_TEMPLATE, .race = t}, {.kind = SDM_NETWORK_POD, .race = t}};
     turn_figures figures[2];
     size_t n = 0;
+    t->phase = SDM_PHASE_TRIAL;
     sdm_status s = try_kind(t, scratch, &e[0], err);
     const bool done =
         e[0].finished && trainer_score(&e[0].errors) < ENOUGH * t->config->grid.spacing[0];
@@ -291,5 +294,6 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
         if (winner->finished) hand_on(winner, &gain[i]);
     }
     for (size_t i = 0; i < 2; i++) entrant_dispose(&e[i]);
+    t->phase = SDM_PHASE_DATA;
     return s;
 }

@@ -16,7 +16,7 @@ typedef struct training {
 
 static const char *phase_name(sdm_phase phase)
 {
-    static const char *const names[] = {"data", "bases", "fit", "refine", "evaluate"};
+    static const char *const names[] = {"data", "bases", "fit", "refine", "evaluate", "trial"};
     return names[phase];
 }
 

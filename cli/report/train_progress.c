@@ -10,6 +10,8 @@
 static const char *phase_name(sdm_phase phase)
 {
     switch (phase) {
+    case SDM_PHASE_TRIAL:
+        return "trial";
     case SDM_PHASE_DATA:
         return "data";
     case SDM_PHASE_BASES:
@@ -82,8 +84,17 @@ static void format_steps(const sdm_progress *p, char *text, size_t size)
 static void on_progress(void *user, const sdm_progress *p)
 {
     char text[256];
+    char maps_text[32], left[32];
     const bool makes_maps = p->phase == SDM_PHASE_DATA || p->phase == SDM_PHASE_BASES;
-    if (makes_maps)
+    format_time(left, sizeof left, p->seconds_left);
+    if (p->phase == SDM_PHASE_TRIAL)
+        snprintf(text, sizeof text, "%s left  short trials choose the kind of network", left);
+    else if (p->phase == SDM_PHASE_BASES)
+        snprintf(text, sizeof text, "%s left  preparations from %s exact maps", left,
+                 cli_format_count(p->samples_at_start, maps_text));
+    else if (p->phase == SDM_PHASE_EVALUATE)
+        snprintf(text, sizeof text, "the model is trained and is measured now");
+    else if (makes_maps)
         format_maps(p, text, sizeof text);
     else
         format_steps(p, text, sizeof text);

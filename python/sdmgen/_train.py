@@ -17,7 +17,7 @@ from ._shape import Registry, Shape
 
 @dataclass(frozen=True)
 class Progress:
-    """State of a training. `phase`: "data", "bases", "fit", "refine" or "evaluate"; `fraction` of the
+    """State of a training. `phase`: "trial", "data", "bases", "fit", "refine" or "evaluate"; `fraction` of the
     budget, 0 .. 1; numbers that are not known are NaN."""
 
     phase: str

@@ -52,6 +52,17 @@ static void note_warning(void *user, const char *text)
     snprintf(warned, sizeof warned, "%s", text);
 }
 
+/* The phases of the first and of the last report of progress. */
+static sdm_phase first_phase, last_phase;
+static size_t n_reports;
+
+static void note_phase(void *user, const sdm_progress *p)
+{
+    (void)user;
+    if (n_reports++ == 0) first_phase = p->phase;
+    last_phase = p->phase;
+}
+
 static sdm_instance *shape_of(const sdm_config *c)
 {
     sdm_instance *out;
@@ -68,7 +79,8 @@ static sdm_instance *shape_of(const sdm_config *c)
 
 static sdm_train_report train(const sdm_config *c)
 {
-    const sdm_train_hooks hooks = {.message = listen, .warning = note_warning};
+    const sdm_train_hooks hooks = {
+        .message = listen, .progress = note_phase, .warning = note_warning};
     sdm_error e = {0};
     sdm_train_report r;
     sdm_instance *shape = shape_of(c);
@@ -299,7 +311,9 @@ static void template_remains(void **state)
     assert_non_null(strstr(warned, "template is kept, because pod failed: test.yaml: data.static"));
     assert_kind("template");
     assert_true(!r.compared && r.tried && !r.unfinished);
+    n_reports = 0;
     r = train(&brief);
+    assert_true(first_phase == SDM_PHASE_TRIAL && last_phase == SDM_PHASE_EVALUATE);
     assert_non_null(strstr(said, "hardly any of the budget is left for pod"));
     assert_kind("template");
     // so short a budget has no trial of pod; the run tells the minutes that hold its maps

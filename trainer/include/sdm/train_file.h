@@ -14,7 +14,7 @@ extern "C" {
 
 /* State of a run. */
 typedef struct sdm_training_progress {
-    const char *phase; /* "data", "bases", "fit", "refine" or "evaluate" */
+    const char *phase; /* "trial", "data", "bases", "fit", "refine" or "evaluate" */
     double fraction;   /* used fraction of the whole budget, 0 .. 1 */
     int64_t step;      /* optimiser steps so far */
     int64_t maps;      /* exact training maps so far */

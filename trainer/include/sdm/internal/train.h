@@ -14,7 +14,7 @@
 extern "C" {
 #endif
 
-/* Phases of a run, in order. Checkpoints store these numbers. */
+/* Phases of a run, in order but for the last. Checkpoints store these numbers. */
 typedef enum sdm_phase {
     /* Exact maps are computed. */
     SDM_PHASE_DATA = 0,
@@ -26,7 +26,9 @@ typedef enum sdm_phase {
     /* `pod`: all weights are trained together on maps. */
     SDM_PHASE_REFINE,
     /* The errors of the finished model are measured on the held-out maps. */
-    SDM_PHASE_EVALUATE
+    SDM_PHASE_EVALUATE,
+    /* Before all others: the short trials of network.kind: auto. */
+    SDM_PHASE_TRIAL
 } sdm_phase;
 
 /* State of a run, passed to the progress callback. */

@@ -461,7 +461,13 @@ static void uses_and_spacing(void **state)
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "exact fits by the network alone: its thinnest part, 2.3 mm thick "
                                "in a few held-out shapes, has 2.9 voxels across, and fits need "
-                               "four: fit --exact --spacing 0.57\n");
+                               "4: fit --exact --spacing 0.46, or 1.2 times the blur of the image "
+                               "where that is less\n");
+    // with the four voxels that the check `map voxels` of a fit asks for, and a fifth to spare
+    v.thickness_mm = 3.9 * v.coarse_mm;
+    assert_true(sdm_verdict_fit_spacing(&v) < 0.81 * v.thickness_mm / 4);
+    v.thickness_mm = 4.1 * v.coarse_mm;
+    assert_true(isnan(sdm_verdict_fit_spacing(&v)));
     v.thickness_mm = NAN;
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "");

@@ -129,8 +129,8 @@ double sdm_spacing_for_volume(double spacing, double off)
 
 double sdm_verdict_fit_spacing(const sdm_verdict *v)
 {
-    return v->thickness_mm < SDM_GRID_THIN_VOXELS * v->coarse_mm ? rounded_down(v->thickness_mm / 4)
-                                                                 : NAN;
+    const double enough = v->thickness_mm / SDM_GRID_FIT_VOXELS;
+    return enough < v->coarse_mm ? rounded_down(SDM_GRID_FIT_ADVISED * enough) : NAN;
 }
 
 double sdm_verdict_spacing(const sdm_verdict *v)

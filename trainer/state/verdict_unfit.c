@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/verdict.h"
 
 /* The lines so far. */
@@ -66,8 +67,9 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
     if (finer > 0 && !sdm_verdict_lacks_part(v))
         add(l,
             "exact fits by the network alone: its thinnest part, %.2g mm thick in a few held-out "
-            "shapes, has %.2g voxels across, and fits need four: fit --exact --spacing %.2g",
-            v->thickness_mm, v->thickness_mm / v->coarse_mm, finer);
+            "shapes, has %.2g voxels across, and fits need %d: fit --exact --spacing %.2g, or 1.2 "
+            "times the blur of the image where that is less",
+            v->thickness_mm, v->thickness_mm / v->coarse_mm, SDM_GRID_FIT_VOXELS, finer);
 }
 
 void sdm_verdict_unfit(const sdm_verdict *v, char text[SDM_MODEL_UNFIT])

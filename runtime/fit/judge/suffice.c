@@ -7,17 +7,16 @@
 #include "finding.h"
 #include "noise.h"
 #include "sdm/internal/part_audit.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
 // smallest median distance of the points from their middle, over the reach of the shape
 #define SPREAD_MIN 0.1
 
-// longest edge of a voxel that shows the thickness, over the radius of the largest ball inside
-#define VOXEL_OVER_RADIUS_MAX 0.5
-// the same over the thickness of the thinnest part, see sdm_too_thin()
+// longest edge of a voxel that shows the thinnest part at all, over its thickness: sdm_too_thin()
 #define VOXEL_DIAGONAL 1.4142
-// from this edge on, over the same radius, voxels miss the shape
+// from this edge on, over the radius of the largest ball inside, voxels miss the shape
 #define VOXEL_OVER_RADIUS_FAR 2
 // larger voxels bias the standard deviations: edge over the sd of the point spread
 #define VOXEL_OVER_BLUR_MAX 1.5
@@ -25,8 +24,6 @@
 #define VOXEL_OVER_LABEL_MAX 1.5
 // sd of the point spread, over the voxels of the image, where the maps are too coarse to show it
 #define BLUR_OVER_IMAGE_VOXEL 0.5
-// advised edge of a voxel, over the longest edge that passes
-#define ADVISED 0.8
 // the limit by the details is known to this share of it: an edge so little beyond passes
 #define LIMIT_ERROR 0.05
 // shortest gradient of a distance whose details are shown
@@ -203,7 +200,7 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
     const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
                  thinnest = thinnest_part(p), details = detail_share(&p->maps);
     // coarse maps show the largest ball inside too small; no part is thicker than it
-    const double thick = VOXEL_OVER_RADIUS_MAX * fmax(radius, 0.5 * thinnest),
+    const double thick = fmax(2 * radius, thinnest) / SDM_GRID_FIT_VOXELS,
                  // at edges the share grows with the voxel
         edges = voxel * DETAILS_MAX / details * (1 + LIMIT_ERROR),
                  // in walls thinner than two voxels all of the surface bends at once
@@ -217,12 +214,12 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
                          "the voxels of the labels");
     if (blur > 0) coarseness_limit(&c, VOXEL_OVER_BLUR_MAX * blur, "the point spread of the image");
     c.blind = voxel > VOXEL_OVER_RADIUS_FAR * radius;
-    if (voxel > c.limit) c.advice = ADVISED * c.limit;
+    if (voxel > c.limit) c.advice = SDM_GRID_FIT_ADVISED * c.limit;
     // an estimate of the point spread at its smallest value with these maps is an upper bound:
     // finer maps may show a shorter one
     if (voxel > c.limit && blur > 0 && blur <= p->maps.min_blur * (1 + LIMIT_ERROR))
-        c.advice = fmin(c.advice, ADVISED * VOXEL_OVER_BLUR_MAX * BLUR_OVER_IMAGE_VOXEL *
-                                      fit_longest_edge(&p->target->grid));
+        c.advice = fmin(c.advice, SDM_GRID_FIT_ADVISED * VOXEL_OVER_BLUR_MAX *
+                                      BLUR_OVER_IMAGE_VOXEL * fit_longest_edge(&p->target->grid));
     return c;
 }
 

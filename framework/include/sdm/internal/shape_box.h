@@ -32,6 +32,12 @@ sdm_status sdm_shape_thickness(const sdm_instance *shape, const double (*range)[
 /* Grids that follow the thinnest part of a shape have so many voxels across it. */
 #define SDM_GRID_THIN_VOXELS 3
 
+/* Fits to good data need so many voxels across the thinnest part, or across the largest ball in the
+ * shape. A spacing that is advised for them is this part of the largest that passes: the fitted
+ * shape may be thinner than those that were measured. */
+#define SDM_GRID_FIT_VOXELS 4
+#define SDM_GRID_FIT_ADVISED 0.8
+
 /* Returns how far the point x (mm) lies beyond the outer voxel centres of the grid along the axis
  * where it is farthest, in mm; 0: within them. beyond[axis][side], unless NULL, is raised to the
  * distance below the first voxel (side 0) and above the last one (side 1). [any thread] */

@@ -166,8 +166,9 @@ bool sdm_verdict_needs_pod(const sdm_verdict *v);
 bool sdm_verdict_lacks_part(const sdm_verdict *v);
 
 /* Fits to good data show the thinnest part more exactly than maps that have fewer than
-   SDM_GRID_THIN_VOXELS voxels across it: the spacing for four, mm, rounded down to two digits; NaN:
-   the maps have enough, or the thickness is not known. [any thread] */
+   SDM_GRID_FIT_VOXELS voxels across it: SDM_GRID_FIT_ADVISED times the spacing for so many, mm,
+   rounded down to two digits; NaN: the maps have enough, or the thickness is not known. [any
+   thread] */
 double sdm_verdict_fit_spacing(const sdm_verdict *v);
 
 /* The one spacing that the verdict advises, mm: that of its key, or the spacing that shows the

@@ -6,10 +6,20 @@
 #include <string.h>
 
 #include "args/shell_word.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/text.h"
 
 /* A template saves little time if exact maps take less than this many times as long. */
 #define SLOW 3.0
+
+/* A kind whose maps take less than this part of the time of the other kind's is named for it. */
+#define FASTER 0.2
+
+/* A smaller error at the surface than this part of a voxel is worth no training. */
+#define SMALL 0.02
+
+/* A finer grid has at most this many times the voxels, or it is not advised for a use alone. */
+#define FINER 8.0
 
 /* A longer training of a kind that errs by more than this multiple of another makes it no better
    than the other. */
@@ -140,15 +150,24 @@ static bool print_far(const sdm_train_report *r)
     return !r->compared || r->other.rmse_mm < v->rmse_mm;
 }
 
-/* The line `slow`. Returns whether pod may help. */
+/* The line `slow` or `faster`. Returns whether pod may help. */
 static bool print_slow(const sdm_train_report *r, const cli_timing *times)
 {
     const bool known = r->compared || r->tried;
     const double other = known ? r->other_ms : NAN;
+    const bool slow = times->ms_exact < SLOW * times->ms_network,
+               faster = r->compared && r->other_grade != SDM_GRADE_POOR &&
+                        other < FASTER * times->ms_network;
     // a little less time is worth no other errors
-    if (r->kind != SDM_NETWORK_TEMPLATE || !(times->ms_exact < SLOW * times->ms_network) ||
-        other > 0.5 * times->ms_network)
+    if (r->kind != SDM_NETWORK_TEMPLATE || (!slow && !faster) || other > 0.5 * times->ms_network)
         return false;
+    if (!slow) {
+        printf(
+            "  faster      a map of pod takes %.2g ms, %.2g times less than one of this template, "
+            "with RMSE %.2g mm, within a voxel of the surface %.2g mm\n",
+            other, times->ms_network / other, r->other.rmse_mm, r->other_voxel_mm);
+        return true;
+    }
     printf(
         "  slow        exact maps take only %.2g times as long as this template: the network saves "
         "little time; pod ",
@@ -221,6 +240,48 @@ static void print_finish(const char *begin, const cli_args *args, const sdm_trai
     printf(")\n");
 }
 
+/* The grid.spacing, mm, with which the network has enough voxels for fits, rounded down to two
+ * digits; NaN: it has. */
+static double fit_grid_spacing(const sdm_verdict *v)
+{
+    const double most = v->thickness_mm / SDM_GRID_FIT_VOXELS,
+                 unit = pow(10, floor(log10(most)) - 1);
+    return isnan(sdm_verdict_fit_spacing(v)) ? NAN : floor(most / unit) * unit;
+}
+
+/* The line `better` of a good model whose error at the surface is small: a grid for the first use
+ * that it leaves out for its voxels, or that nothing needs to change. Returns whether it is
+ * printed.
+ */
+static bool print_enough(const cli_args *args, const sdm_train_report *r, const char *kind,
+                         double minutes)
+{
+    const sdm_verdict *v = &r->verdict;
+    const double volumes = sdm_verdict_spacing(v), voxels = v->rmse_voxel_mm / v->voxel_mm,
+                 spacing = isfinite(volumes) ? volumes : fit_grid_spacing(v),
+                 factor = pow(v->coarse_mm / spacing, 3);
+    char unfit[SDM_MODEL_UNFIT];
+    sdm_verdict_unfit(v, unfit);
+    if (v->grade != SDM_GRADE_GOOD || !(voxels < SMALL) || !strncmp(v->key, "grid.", 5))
+        return false;
+    if (!unfit[0]) {
+        printf(
+            "  better      nothing needs to change: the error at the surface is %.2g voxels, and "
+            "no use is left out\n",
+            voxels);
+        return true;
+    }
+    if (!(factor > 1 && factor <= FINER) || !args->files.n || args->dataset) return false;
+    sdm_verdict finer = {.to = spacing,
+                         .minutes = r->steps > 0 ? ceil(2 * factor * minutes) / 2 : 0};
+    strcpy(finer.key, "grid.spacing");
+    if (!print_command("  better      ", args, r, &finer, kind)) return false;
+    printf("              (for %s, which `not for` leaves out; the error at the surface, %.2g "
+           "voxels, needs no change)\n",
+           isfinite(volumes) ? "volumes of surfaces" : "fits by the network alone", voxels);
+    return true;
+}
+
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
                     double ms_map, double minutes)
 {
@@ -236,6 +297,7 @@ void cli_print_next(const cli_args *args, const sdm_train_report *r, const char 
         print_next_pod(args, r, minutes);
         return;
     }
+    if (print_enough(args, r, kind, minutes)) return;
     if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || other_maps) return;
     const bool printed = print_command(begin, args, r, v, kind);
     if (printed && kind && isfinite(ms_map))

@@ -137,6 +137,11 @@ expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 --out 
 has "${pod}this run has not measured it: near the surface it may be worse\$"
 has '^              sdmgen train far\.yaml train\.minutes=0\.02 network\.kind=pod --out named-2$'
 
+# A good model with a small error: the command mends the first use that it leaves out.
+expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 grid.spacing=0.3 --out fine --quiet
+has '^  better      sdmgen train far\.yaml network\.kind=template train\.minutes=0\.02 grid=auto grid\.spacing=0\.1[0-9]+ --out fine-2$'
+has '^              \(for volumes of surfaces, which `not for` leaves out; the error at the surface, 0\.01[0-9]* voxels, needs no change\)$'
+
 # A template that saves little time against exact maps: the line names pod, and what is known of it.
 expect 0 - sdmgen train far.yaml network.kind=template shape.options.edge=2 shape.options.links=1 grid.spacing=0.05 data.holdout=2 --out large --quiet
 if grep -oE '[0-9.]+ times as long' out | head -1 | awk '{ exit !($1 < 2.99) }'; then

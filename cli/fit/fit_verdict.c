@@ -120,18 +120,31 @@ static bool only(const sdm_fit_verdict *v, sdm_fit_grade grade, const sdm_fit_ch
     return true;
 }
 
+/* Are the points too few to test the fit? Then the check has no bound. */
+static bool untested(const sdm_fit_verdict *v)
+{
+    for (size_t i = 0; i < v->n_findings; i++)
+        if (v->findings[i].kind == SDM_FIT_CHECK_RESIDUALS)
+            return v->findings[i].grade == SDM_FIT_DOUBTFUL && isnan(v->findings[i].limit);
+    return false;
+}
+
 /* What a verdict that is not `passed` means for the user of the values. */
 static const char *in_short(const sdm_fit_verdict *v)
 {
     static const sdm_fit_check_kind end[] = {SDM_FIT_CHECK_CONVERGED},
-                                    few[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA},
+                                    part[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA},
+                                    few[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA,
+                                             SDM_FIT_CHECK_RESIDUALS},
                                     maps[] = {SDM_FIT_CHECK_VOXELS, SDM_FIT_CHECK_NETWORK_ERROR,
                                               SDM_FIT_CHECK_NETWORK};
     if (v->grade == SDM_FIT_FAILED)
         return only(v, SDM_FIT_FAILED, end, 1)
                    ? "do not use the values: the fit has not come to an end"
                    : "do not use the values: the data contradict them or do not decide";
-    if (only(v, SDM_FIT_DOUBTFUL, few, sizeof few / sizeof *few))
+    if (untested(v) && only(v, SDM_FIT_DOUBTFUL, few, sizeof few / sizeof *few))
+        return "the points are too few to test the fit: its values may be right or wrong";
+    if (only(v, SDM_FIT_DOUBTFUL, part, sizeof part / sizeof *part))
         return "the data show a part of the shape: do not use what the lines below name, nor what "
                "is `not determined`";
     if (only(v, SDM_FIT_DOUBTFUL, maps, sizeof maps / sizeof *maps))

@@ -129,4 +129,15 @@ END
 expect 0 - sdmgen experiment hole.yaml --out hole -q
 grep -q '^1,true,' hole/right/fits.csv || bad "right fit: $(tail -n 1 hole/right/fits.csv)"
 grep -q '^1,false,.*of the volume of the shape is empty in the labels' hole/wrong/fits.csv || bad "wrong fit: $(tail -n 1 hole/wrong/fits.csv)"
+
+# Forty points have no neighbours: nothing tests them but a standard deviation that is known.
+expect 0 - sdmgen phantom --shape capsule -p radius=1.2 -p length=5 --spacing 0.5 -o few.nii --surface few.csv --surface-points 40 --surface-noise 0.05 -q
+few='sdmgen fit --shape capsule few.csv --rotation 0,0,0 -q'
+expect 0 - $few
+has '^  in short +the points are too few to test the fit'
+has '^  residuals +doubtful +the points lie too far apart .* \(--point-sd\), keep it \(--keep appearance\)$'
+expect 0 - $few --point-sd 0.05 --keep appearance
+has '^verdict: passed$'
+expect 0 - $few --point-sd 0.02 --keep appearance
+has '^  residuals +doubtful .*: the points lie 0\.0[0-9]+ mm off the surface, .* as given: another shape, or it is larger$'
 finish

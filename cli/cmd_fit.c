@@ -53,6 +53,10 @@ static void show_progress(void *user, const sdm_fit_progress *p)
         show_search(w, p);
         return;
     }
+    if (p->phase == SDM_FIT_JUDGE) {
+        cli_progress_show(&w->bar, "verdict", 0, "checks, and the shape in other poses");
+        return;
+    }
     char text[140] = "";
     if (w->f->candidate)
         snprintf(text, sizeof text, "candidate %zu of %zu, ", w->f->candidate, w->f->n_candidates);

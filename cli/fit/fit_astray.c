@@ -112,8 +112,8 @@ static sdm_status start_distances(const cli_fit *f, const cloud *c, bool at_midd
     return s;
 }
 
-/* *passes = the fit from the same start is trustworthy with half a turn of the points about it,
- * which changes the signs of x and y. */
+/* *passes = the fit from the same start lies on the points with half a turn of them about it, which
+ * changes the signs of x and y. */
 static sdm_status fit_turned(const cli_fit *f, const double start[3], bool *passes, sdm_error *err)
 {
     const size_t n = f->target.n_points;
@@ -128,6 +128,9 @@ static sdm_status fit_turned(const cli_fit *f, const double start[3], bool *pass
     turned.points = x;
     if (!s) s = sdm_fit(&f->source, &turned, &opts, &r, err);
     *passes = !s;
+    for (size_t i = 0; i < r.verdict.n_findings; i++)
+        if (r.verdict.findings[i].kind == SDM_FIT_CHECK_RESIDUALS)
+            *passes = *passes && r.verdict.findings[i].grade == SDM_FIT_PASSED;
     sdm_fit_dispose(&r);
     sdm_free(x);
     return s == SDM_E_NOMEM || s == SDM_E_CANCELLED ? s : SDM_OK;
@@ -180,7 +183,8 @@ static sdm_status check_frame(const cli_fit *f, const cloud *c, const double sta
     advise_frame(f, !placed || passes || hypot(at[0], at[1]) < ON_AXIS * c->size, advice,
                  sizeof advice);
     if (passes)
-        snprintf(text, size, "; with x and y of the other sign the fit passes: %s", advice);
+        snprintf(text, size, "; with x and y of the other sign the fit lies on the points: %s",
+                 advice);
     else
         snprintf(text, size,
                  "; with x and y of the other sign most points lie within %.2g mm of the shape at "

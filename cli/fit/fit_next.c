@@ -9,13 +9,12 @@
 #include "fit_command.h"
 #include "sdm/internal/hardly_known.h"
 
-/* Options that say where a fit starts and what it writes, or which maps it takes: the command has
+/* Options that say where a fit starts, how much it prints, or which maps it takes: the command has
  * its own. */
 static const char *const STARTS[] = {
-    "param",  "rotation",     "translation",   "start-centre", "start-axis",
-    "turns",  "start-points", "find",          "turns-sphere", "candidates",
-    "output", "label-out",    "json",          "report",       "returnparameterfile",
-    "force",  "quiet",        "max-iterations"};
+    "param", "rotation",     "translation", "start-centre",   "start-axis",
+    "turns", "start-points", "find",        "turns-sphere",   "candidates",
+    "json",  "force",        "quiet",       "max-iterations", "returnparameterfile"};
 static const char *const MAPS[] = {"exact", "polish", "spacing"};
 
 static bool is_left_out(const char *name, bool same_maps)
@@ -64,7 +63,7 @@ void cli_fit_print_next(const cli_fit *f)
         a->cohort.cases || (!voxels && !more && !unpassed(f, SDM_FIT_CHECK_NETWORK_ERROR)))
         return;
     sdm_text t = {0};
-    char text[96], price[48] = "";
+    char text[96], price[80] = "";
     sdm_text_add(&t, "sdmgen fit");
     for (size_t i = 0; i < a->files.n; i++) cli_add_next_word(&t, a->files.items[i]);
     for (size_t i = 0; i < a->n_given; i++) {
@@ -84,8 +83,11 @@ void cli_fit_print_next(const cli_fit *f)
     if (voxels && !more) {
         snprintf(text, sizeof text, "%.2g", r->advised_voxel_mm);
         add_option(&t, "spacing", text);
-        snprintf(price, sizeof price, "; %.2g times as many voxels",
-                 pow(cli_fit_map_voxel(f) / r->advised_voxel_mm, 3));
+        // a map and its samples take no longer than in proportion to its voxels
+        const double factor = pow(cli_fit_map_voxel(f) / r->advised_voxel_mm, 3),
+                     most = factor * (r->seconds - r->seconds_search);
+        snprintf(price, sizeof price, "; %.2g times as many voxels, up to %.2g %s", factor,
+                 most < 100 ? most : most / 60, most < 100 ? "s" : "minutes");
     }
     for (size_t i = 0; i < f->n_params; i++) {
         if (lacks && sdm_fit_hardly_known(r, i)) {

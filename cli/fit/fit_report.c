@@ -7,7 +7,7 @@
 
 // A component of the pose is that of an open motion, of which the data say nothing, if its standard
 // deviation without the open motions is so small beside the largest one of the vector ...
-#define OPEN_WITHOUT 0.05
+#define OPEN_WITHOUT 0.15
 // ... and that with them so large.
 #define OPEN_WITH 10.0
 
@@ -87,7 +87,8 @@ static void print_blur(const cli_fit *f)
     const double blur = f->result.blur, voxel = cli_fit_map_voxel(f);
     printf("  point spread %.3g mm", blur);
     if (!f->opts.keep_blur && blur <= 0.5 * voxel * (1 + 1e-6))
-        printf(", the least with voxels of the maps of %.3g mm: that of the image may be less",
+        printf(", the smallest that maps with voxels of %.3g mm can show; that of the image may be "
+               "smaller",
                voxel);
     printf("\n");
 }
@@ -163,7 +164,8 @@ void cli_fit_print(const cli_fit *f)
     printf("%s after %zu iterations (%s)\n", r->converged ? "converged" : "NOT CONVERGED",
            r->n_iterations, r->reason);
     if (r->n_restarts)
-        printf("  restarts     %zu: a refused fit went on from another value of a parameter\n",
+        printf("  restarts     %zu: a refused fit went on from a better pose or value of a "
+               "parameter\n",
                r->n_restarts);
     print_maps(f);
     printf(

@@ -120,6 +120,14 @@ static bool only(const sdm_fit_verdict *v, sdm_fit_grade grade, const sdm_fit_ch
     return true;
 }
 
+/* Is this check among those that did not pass? */
+static bool doubts(const sdm_fit_verdict *v, sdm_fit_check_kind kind)
+{
+    for (size_t i = 0; i < v->n_findings; i++)
+        if (v->findings[i].kind == kind) return v->findings[i].grade != SDM_FIT_PASSED;
+    return false;
+}
+
 /* Are the points too few to test the fit? Then the check has no bound. */
 static bool untested(const sdm_fit_verdict *v)
 {
@@ -137,18 +145,28 @@ static const char *in_short(const sdm_fit_verdict *v)
                                     few[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA,
                                              SDM_FIT_CHECK_RESIDUALS},
                                     maps[] = {SDM_FIT_CHECK_VOXELS, SDM_FIT_CHECK_NETWORK_ERROR,
-                                              SDM_FIT_CHECK_NETWORK};
+                                              SDM_FIT_CHECK_NETWORK},
+                                    coarse[] = {SDM_FIT_CHECK_VOXELS,  SDM_FIT_CHECK_NETWORK_ERROR,
+                                                SDM_FIT_CHECK_NETWORK, SDM_FIT_CHECK_RESIDUALS,
+                                                SDM_FIT_CHECK_BESIDE,  SDM_FIT_CHECK_OFFSET};
     if (v->grade == SDM_FIT_FAILED)
         return only(v, SDM_FIT_FAILED, end, 1)
                    ? "do not use the values: the fit has not come to an end"
                    : "do not use the values: the data contradict them or do not decide";
-    if (untested(v) && only(v, SDM_FIT_DOUBTFUL, few, sizeof few / sizeof *few))
-        return "the points are too few to test the fit: its values may be right or wrong";
     if (only(v, SDM_FIT_DOUBTFUL, part, sizeof part / sizeof *part))
         return "the data show a part of the shape: do not use what the lines below name, nor what "
                "is `not determined`";
+    if (untested(v) && only(v, SDM_FIT_DOUBTFUL, few, sizeof few / sizeof *few))
+        return doubts(v, SDM_FIT_CHECK_COVERED)
+                   ? "the data show a part of the shape, and too few points to test the fit: do "
+                     "not use what the lines below name, nor what is `not determined`"
+                   : "the points are too few to test the fit: its values may be right or wrong";
     if (only(v, SDM_FIT_DOUBTFUL, maps, sizeof maps / sizeof *maps))
         return "the maps limit the fit: the values are near, but their +- may be too small";
+    if (doubts(v, SDM_FIT_CHECK_VOXELS) &&
+        only(v, SDM_FIT_DOUBTFUL, coarse, sizeof coarse / sizeof *coarse))
+        return "the maps are too coarse for these data: fit with finer ones before you judge the "
+               "values";
     return "the data may differ from the shape as the lines below say: look at a picture "
            "(-o fit.png) before you use the values";
 }

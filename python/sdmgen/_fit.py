@@ -37,7 +37,7 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class FitProgress:
-    """State after an iteration. `phase`: "search", "fit" or "polish". In a search with several starts
+    """State after an iteration. `phase`: "search", "fit", "polish" or, once, when the steps are over, "judge". In a search with several starts
     `start` of `starts` in `round` 1 (all of them) or 2 (the best ones); else 0."""
 
     phase: str
@@ -112,7 +112,7 @@ class FitResult:
     #: why the fit stopped
     reason: str
     iterations: int
-    #: how often a refused fit went on from another value of a parameter
+    #: how often a refused fit went on from another pose or value of a parameter
     restarts: int
     #: with a network: the last iterations took exact maps
     polished: bool
@@ -634,7 +634,7 @@ def _run(
         c = _abi.structs["sdm_fit_progress"].from_address(at)
         if progress is not None:
             params = np.array((ctypes.c_double * len(names)).from_address(c.params))
-            phase = ("search", "fit", "polish")[c.phase]
+            phase = ("search", "fit", "polish", "judge")[c.phase]
             pose = Pose._of(c.pose)
             progress(FitProgress(phase, c.iteration, c.objective, c.step, params, pose, c.round, c.start, c.n_starts))
 

@@ -594,12 +594,25 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     return s;
 }
 
+// tells that the steps are over, and the judgement begins
+static void announce_judgement(const fit_problem *p)
+{
+    if (!p->opts->progress) return;
+    sdm_fit_progress g = {
+        .phase = SDM_FIT_JUDGE, .iteration = p->n_steps, .params = p->state.params};
+    g.objective = sdm_fit_objective(p);
+    sdm_rotation_vector(p->state.rotation, g.pose.rotation);
+    memcpy(g.pose.translation, p->state.translation, sizeof g.pose.translation);
+    p->opts->progress(p->opts->user, &g);
+}
+
 /* From the state of *p to a verdict. *fitted: the state that the result reports. */
 static sdm_status attempt(fit_problem *p, sdm_fit_result *out, fit_state *fitted, sdm_error *err)
 {
     // 5. maximise the posterior; 6. covariance
     sdm_status s = maximise(p, out, err);
     const double from = sdm_clock();
+    if (!s) announce_judgement(p);
     if (!s) s = assess(p, out, err);
     if (!s) sdm_fit_accept_small_steps(p, out);
     // 7. report the result, also of a fit that failed with SDM_E_QUALITY; 8. judge it
@@ -632,16 +645,18 @@ static sdm_status attempt_renew(fit_problem *p, sdm_fit_result *out, sdm_error *
     return s;
 }
 
-/* A fit that was refused may have stopped at a wrong value of a parameter: goes on from a better
- * one, if there is one. `exact`: the kind of maps with which the fit began. */
+/* A fit that was refused may have stopped in a wrong pose or at a wrong value of a parameter: goes
+ * on from a better one, if there is one. `exact`: the kind of maps with which the fit began. */
 static sdm_status attempt_again(fit_problem *p, bool exact, sdm_fit_result *out, fit_state *fitted,
                                 bool *again, sdm_error *err)
 {
     const double from = sdm_clock();
-    p->state = *fitted;
+    p->state = p->has_better ? p->better : *fitted;
     p->maps.exact = exact;
     p->maps_params[0] = NAN;
-    sdm_status s = sdm_fit_other_values(p, NULL, again, err);
+    *again = p->has_better;
+    sdm_status s = p->has_better ? SDM_OK : sdm_fit_other_values(p, NULL, again, err);
+    p->has_better = false;
     const double seconds = sdm_clock() - from;
     out->seconds_search += seconds;
     if (s || !*again) return s;
@@ -650,8 +665,8 @@ static sdm_status attempt_again(fit_problem *p, bool exact, sdm_fit_result *out,
     return s ? s : attempt(p, out, fitted, err);
 }
 
-/* Fits and judges, and begins again from another value of a parameter as long as the fit is refused
- * and such a value explains the data better. */
+/* Fits and judges, and begins again from another pose or value of a parameter as long as the fit is
+ * refused and this explains the data better. */
 static sdm_status attempts(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;

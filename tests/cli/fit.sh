@@ -90,7 +90,7 @@ has 'reference: Dice 0.9'
 has 'converged after'
 has '^  map voxels   doubtful  0.35, need at most 0.2.*coarse beside the point spread of the image: .*with voxels of 0.2[0-9]* mm \(--exact --spacing\)'
 # the command that goes on from here with finer maps
-has '^finer maps from here; [0-9.]+ times as many voxels:$'
+has '^finer maps from here; [0-9.]+ times as many voxels, up to [0-9.e+]+ (s|minutes):$'
 eval "$(sed -n 's/^  sdmgen fit ct/expect 0 - sdmgen fit ct/p' out)"
 has '^  map voxels   passed '
 # the truth of the test image beside the estimate; that of another shape, and a file without parameters, are refused
@@ -238,6 +238,8 @@ has 'NOT TO BE TRUSTED'
 has 'NOT CONVERGED'
 has '^more iterations from here:$'
 eval "$(sed -n 's/^  sdmgen fit ct/expect 0 - sdmgen fit ct/p' out)"
+present no.stl # the command keeps the files that are to be written
+rm -f no.stl no.vdb
 expect 4 'not converged' sdmgen fit $fit ct.nii.gz $near_truth --max-iterations 1 -o forced.json --json --force
 [ "$(json trusted)" = false ] || bad 'a fit that failed must be marked'
 present forced.json

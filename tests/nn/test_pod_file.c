@@ -275,7 +275,8 @@ static void refusals_quote_the_training(toy *t)
          "derivatives of the volume by stem: off by 34 % of their own size: this\nits tips\n",
          "derivatives of volumes of its maps are off by 21 % for the worst parameter, more than 20 "
          "%; take",
-         "; the training found derivatives of the volume by stem: off by 34 % of their own size: "
+         "; in the words of the training: derivatives of the volume by stem: off by 34 % of their "
+         "own size: "
          "this"},
         {0.204, "derivatives of the volume by a: off by 20 %\n",
          "derivatives of volumes of its maps are off by 20.4 % for a, more than 20 %; take",

@@ -109,7 +109,7 @@ sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error 
     if (f->lines) worst = find_worst(q->unfit, f->lines, f->error);
     return sdm_fail(err, SDM_E_QUALITY, "%s are off by %s %%%s%s, more than %g %%%s%s%.*s", f->name,
                     percent, f->lines ? " for " : "", worst.name, 100 * f->bad, f->remedy,
-                    worst.lines ? "; the training found " : "",
+                    worst.lines ? "; in the words of the training: " : "",
                     worst.lines ? (int)strcspn(worst.lines, "\n") : 0,
                     worst.lines ? worst.lines : "");
 }

@@ -53,12 +53,13 @@ fit_at_bounds sdm_fit_at_bounds(const fit_problem *p, const sdm_fit_result *r, d
         if (length + strlen(name) + 3 < sizeof b.names)
             snprintf(b.names + length, sizeof b.names - length, "%s%s", length ? ", " : "", name);
         const double gain = gain_beyond(p, k, upper) / factor;
-        if (gain > hinted)
+        // of a parameter that they do not determine the data want nothing
+        if (gain > hinted && !r->by_prior[k])
             snprintf(b.hint, sizeof b.hint,
                      "the data may want %.60s to be %s than %.6g, the %s value of its range", name,
                      upper ? "more" : "less", upper ? p->high[k] : p->low[k],
                      upper ? "largest" : "smallest");
-        hinted = fmax(hinted, gain);
+        if (!r->by_prior[k]) hinted = fmax(hinted, gain);
         if (!(gain > SDM_FIT_PREFERRED)) continue;
         b.n_wanted++;
         if (!(gain > most)) continue;

@@ -53,9 +53,6 @@
 // share of the surface that a parameter moves, weighted by the square of the motion, without points
 // from which on this is why the points do not determine the parameter
 #define UNSEEN_MIN 0.5
-// such a share from which on a parameter of an incompletely covered shape is named in any case: its
-// standard deviation rests on points at the edge of the surface alone
-#define UNSEEN_NEARLY_ALL 0.9
 // motion of the surface by one standard deviation of such a parameter, over the standard deviation
 // of the points, from which on it is named, too: a single point on the part that it moves fastest
 // would tell as much
@@ -219,10 +216,10 @@ static const double *middle_of_bare(const fit_places *surface, const bool *bare)
 }
 
 /* Names the parameters that the points hardly determine and that move a surface which has no
-   points: text[size]. covered: the shape as a whole has points. Returns the largest share of such a
-   surface without points; 0: there is none. */
+   points: text[size]. Returns the largest share of such a surface without points; 0: there is none.
+ */
 static double name_unseen(const fit_problem *p, const sdm_fit_result *r, const fit_places *surface,
-                          const bool *bare, bool covered, char *text, size_t size)
+                          const bool *bare, char *text, size_t size)
 {
     const double edge = fit_longest_edge(&p->maps.grid);
     double most = 0;
@@ -240,8 +237,7 @@ static double name_unseen(const fit_problem *p, const sdm_fit_result *r, const f
         }
         const double known =
             fmin(SDM_FIT_HARDLY_KNOWN * sd, MOTION_HARDLY_KNOWN * p->state.point_sd / fastest);
-        if (!(fastest * sd > edge) || !(unseen > UNSEEN_MIN * all)) continue;
-        if (!(r->sd[k] > known) && (covered || !(unseen > UNSEEN_NEARLY_ALL * all))) continue;
+        if (!(fastest * sd > edge) || !(unseen > UNSEEN_MIN * all) || !(r->sd[k] > known)) continue;
         most = fmax(most, unseen / all);
         sdm_fit_bounds(p->source, k, &low, &high, &name);
         const size_t used = strlen(text);
@@ -293,14 +289,14 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
             snprintf(beside, sizeof beside,
                      "; or the voxels of the maps, %.2g mm, are too coarse to show its surface",
                      voxel);
-        const bool covered = bare <= UNCOVERED_MAX;
-        const double unseen = name_unseen(p, r, &surface, bare_at, covered, names, sizeof names);
+        const double unseen = name_unseen(p, r, &surface, bare_at, names, sizeof names);
         if (unseen > 0)
             snprintf(unseen_text, sizeof unseen_text,
                      "the data hardly determine %s: no points lie near the part of the fitted "
                      "surface that %s; start from other values (sdm_fit_opts.start_params), take "
                      "points from there, or keep a known value (sdm_fit_opts.kept)",
                      names, strchr(names, ',') ? "they move" : "it moves");
+        const bool covered = bare <= UNCOVERED_MAX;
         if (covered && unseen > 0)
             sdm_fit_judge_add(v, SDM_FIT_CHECK_COVERED, false, SDM_FIT_DOUBTFUL, unseen, UNSEEN_MIN,
                               "%s", unseen_text);

@@ -68,6 +68,7 @@ typedef struct nearest {
     size_t param;       /* as fit_start.param */
     double value;       /* of this parameter */
     double rotation[3]; /* rotation vector of the shape, rad */
+    fit_state state;
     char symmetry[240]; /* how the surface may be turned and stays the same; "": not at all */
 } nearest;
 
@@ -336,6 +337,7 @@ static void nearest_take(nearest *least, const fit_problem *p, const own_fit *ow
     least->param = param;
     if (param) least->value = p->state.params[param - 1];
     sdm_rotation_vector(p->state.rotation, least->rotation);
+    least->state = p->state;
 }
 
 // Lowers *least where the fit, turned to a surface that is nearly its own, climbs to a better
@@ -369,8 +371,8 @@ static void tell_symmetry(const turns *t, nearest *least)
     snprintf(
         least->symmetry, sizeof least->symmetry,
         "turned by %.0f degrees about (%.2g, %.2g, %.2g) (LPS) the surface is the same, so the "
-        "rotation may be either, as by other symmetries of the shape; no pose with another surface "
-        "is as good",
+        "rotation may be either, as by other symmetries of the shape; of the poses that were tried "
+        "none with another surface is as good",
         angle * 57.29577951308232, v[0] / angle + 0, v[1] / angle + 0, v[2] / angle + 0);
 }
 
@@ -476,6 +478,9 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
                     : "start from this pose, or try more turns");
     // errors of coarse maps at sharp edges weigh more in fits to points than a small gain
     const bool doubt = points && least.gain > -CLEARLY_BETTER;
+    // a fit to an image takes long, and such an image mostly shows another shape
+    p->has_better = points && !doubt && !equal;
+    p->better = least.state;
     sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, false, doubt ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED,
                       least.gain, SDM_FIT_PREFERRED, "%s", text);
     return doubt ? SDM_OK : sdm_fail(err, SDM_E_QUALITY, "%s", text);

@@ -13,6 +13,7 @@
    both, with the tissues of each. A rival whose surface is nearly that of the fit is none. No
    finding where the pose is kept or where no rival remains, as for a ball of given size. factor:
    how many correlated voxels of an image count as one independent one. *p is left at a rival, with
-   samples from that ball. SDM_E_QUALITY: the finding failed; SDM_E_NOMEM, SDM_E_CANCELLED. */
+   samples from that ball; points: p->better is the rival, where the finding failed because it
+   explains them better. SDM_E_QUALITY: the finding failed; SDM_E_NOMEM, SDM_E_CANCELLED. */
 sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdict *v,
                                    sdm_error *err);

@@ -113,6 +113,10 @@ typedef struct fit_problem {
     bool has_runner_up;
     double runner_up_objective;
     fit_state runner_up;
+    /* points: the judgement has refused the fit because the shape in this pose explains them better
+     */
+    bool has_better;
+    fit_state better;
     /* where the search for the start is, for progress(); see sdm_fit_progress */
     size_t search_round, search_start, search_starts;
     const double *search_best;

@@ -117,7 +117,9 @@ typedef enum sdm_fit_phase {
     SDM_FIT_SEARCH = 0,
     SDM_FIT_MAIN = 1,
     /* steps with exact maps after the fit with a network */
-    SDM_FIT_POLISH = 2
+    SDM_FIT_POLISH = 2,
+    /* checks, and comparisons with rivals, after the last step: one call at the beginning */
+    SDM_FIT_JUDGE = 3
 } sdm_fit_phase;
 
 /* State after an iteration; params is valid during the call of progress(). */
@@ -249,9 +251,10 @@ typedef struct sdm_fit_opts {
        of the shape, see SDM_FIT_CHECK_MISSING: other spaces of the same material */
     double beside;
 
-    /* how often a fit that its checks refuse may go on from another value of one parameter, if that
-       explains the data better: a long shape may have stopped with one end on the data and the
-       other one beyond them. 0: never; nor where parameters or pose are kept */
+    /* how often a fit that its checks refuse may go on from another value of one parameter or,
+       points, from another pose, if that explains the data better: a long shape may have stopped
+       with one end on the data and the other one beyond them, or the start may have been turned.
+       0: never; nor where parameters or pose are kept */
     size_t max_restarts;
     /* [n_params] true: this parameter is not estimated and keeps its start value; NULL: all or none
        are estimated, see keep_params */
@@ -513,7 +516,7 @@ typedef struct sdm_fit_result {
     /* [n_params] standard deviation of each parameter before the fit: that of its prior or, without
        a prior, of a uniform distribution over its range */
     double *prior_sd;
-    /* how often a refused fit went on from another value of a parameter, see
+    /* how often a refused fit went on from another pose or value of a parameter, see
        sdm_fit_opts.max_restarts; the result is that of the last of these fits */
     size_t n_restarts;
     /* true: the fit began with a network and ended with exact maps, see

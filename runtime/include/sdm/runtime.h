@@ -96,10 +96,12 @@ SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, 
    changes with the parameters. Training measures them for the worst parameter;
    sdm_model_check_use(SDM_USE_DERIVATIVE) tells whether they are right within 20 %. Where walls are
    thin beside the voxels they may be wrong several times over: sdm_exact_shape_jacobian() is exact.
-   Rounding: the map depends smoothly on the parameters. If weights are stored as bytes, it differs
-   from that of sdm_generate(), for cochleas by 2e-4 mm root mean square, 2e-3 mm at most, and the
-   derivatives are off by 2e-4 root mean square, 1.5e-3 at most, of the largest one by the same
-   parameter. Errors as for sdm_generate() and sdm_exact_shape_jacobian(). [any thread] */
+   Near the surface the map depends smoothly on the parameters; far from it the map of a template
+   has small jumps, where another part of the shape becomes the nearest one. Rounding: if weights
+   are stored as bytes, the map differs from that of sdm_generate(), for cochleas by 2e-4 mm root
+   mean square, 2e-3 mm at most, and the derivatives are off by 2e-4 root mean square, 1.5e-3 at
+   most, of the largest one by the same parameter. Errors as for sdm_generate() and
+   sdm_exact_shape_jacobian(). [any thread] */
 SDM_API sdm_status sdm_generate_jacobian(const sdm_model *m, const double *params,
                                          const sdm_generate_opts *opts, float *values,
                                          float *jacobian, sdm_result *result, sdm_error *err);

@@ -3,6 +3,7 @@
 
 #include "commands.h"
 #include "inputs/config_shape.h"
+#include "inputs/setup.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
 #include "survey/report_survey.h"
@@ -75,7 +76,8 @@ sdm_status cmd_config(const cli_args *args, sdm_error *err)
     sdm_instance *shape = NULL;
     sdm_status s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && !args->dump) tell_vain_keys(config);
-    if (!s && !args->dump) cli_notice_survey(config, shape);
+    if (!s && !args->dump)
+        cli_notice_survey(config, shape, cli_other_process(args, registry, shape));
     if (!s && !args->dump) s = cli_check_memory(config, shape, err);
     if (!s && args->dump) {
         sdm_config_dump(config, &text);

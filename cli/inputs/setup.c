@@ -19,17 +19,34 @@
 
 static void tell(const char *text) { cli_notice("%s", text); }
 
+static sdm_isolation isolation_of(const cli_args *args)
+{
+    return (sdm_isolation){
+        .program = "/proc/self/exe",
+        .seconds = args->isolate_seconds > 0 ? args->isolate_seconds : 10,
+        .bytes = (uint64_t)(1e9 * (args->isolate_memory > 0 ? args->isolate_memory : 2)),
+        .notice = tell};
+}
+
+sdm_repeat_process cli_other_process(const cli_args *args, const sdm_registry *r,
+                                     const sdm_instance *shape)
+{
+    const char *name = sdm_instance_shape(shape)->name;
+    sdm_repeat_process process = {.how = isolation_of(args)};
+    process.how.notice = NULL; // what the plug-in prints is to be seen already
+    for (size_t i = 0; i < sdm_registry_count(r); i++)
+        if (!strcmp(sdm_registry_at(r, i)->name, name) && sdm_registry_origin(r, i)[0] == '/')
+            process.plugin = sdm_registry_origin(r, i);
+    return process;
+}
+
 /* The options --isolate. */
 static sdm_status isolate(const cli_args *args, sdm_registry *r, sdm_error *err)
 {
     if (!args->isolate && (args->isolate_seconds > 0 || args->isolate_memory > 0))
         return sdm_fail(err, SDM_E_ARG, "--isolate-%s needs --isolate",
                         args->isolate_seconds > 0 ? "seconds" : "memory");
-    const sdm_isolation how = {
-        .program = "/proc/self/exe",
-        .seconds = args->isolate_seconds > 0 ? args->isolate_seconds : 10,
-        .bytes = (uint64_t)(1e9 * (args->isolate_memory > 0 ? args->isolate_memory : 2)),
-        .notice = tell};
+    const sdm_isolation how = isolation_of(args);
     return args->isolate ? sdm_registry_isolate(r, &how, err) : SDM_OK;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "args/options.h"
+#include "sdm/internal/shape_repeat.h"
 #include "sdm/model.h"
 #include "sdm/registry.h"
 #include "sdm/runtime.h"
@@ -19,6 +20,11 @@ const sdm_shape *cli_find_shape(const sdm_registry *r, const char *name, sdm_err
  * current folder. *out is freed with sdm_instance_free(). SDM_E_ARG with "did you mean". */
 sdm_status cli_create_shape(const sdm_registry *r, const char *name, const cli_list *options,
                             sdm_instance **out, sdm_error *err);
+
+/* Where meshes of the shape, which the registry holds, can be made in another process; its
+ * `plugin` is NULL if the shape is built in. Stays valid as long as the registry. */
+sdm_repeat_process cli_other_process(const cli_args *args, const sdm_registry *r,
+                                     const sdm_instance *shape);
 
 /* A shape with the registry that holds it and the parameter values of the command line.
  * Zero-initialise; cli_shape_dispose() frees, also after an error. */

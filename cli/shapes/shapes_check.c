@@ -377,6 +377,7 @@ sdm_status cli_shapes_check(const cli_args *args, sdm_error *err)
     c.survey.shape = c.shape;
     c.opts.known = print_stage;
     c.opts.mend_first = true;
+    if (!s) c.opts.process = cli_other_process(args, c.registry, c.shape);
     cli_progress_start(&c.bar);
     if (!s) s = sdm_shape_survey_make(c.shape, &c.opts, &c.survey.found, err);
     cli_progress_end(&c.bar, !s);

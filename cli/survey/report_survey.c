@@ -49,6 +49,18 @@ static void tell_untested(teller *t)
     sdm_text_dispose(&left);
 }
 
+static void tell_no_process(teller *t)
+{
+    const sdm_error *why = &t->s->found.process_untested;
+    sdm_text text = {0};
+    if (!why->status || t->s->brief) return;
+    sdm_text_add(&text,
+                 "not tested: meshes in another process, which show a static variable that keeps "
+                 "what the first call of mesh() set; %s",
+                 why->text);
+    teller_tell(t, SDM_OK, &text);
+}
+
 sdm_status cli_survey_tell(const cli_survey *s, unsigned stages, cli_tell *tell_line, void *user,
                            sdm_error *err)
 {
@@ -70,6 +82,7 @@ sdm_status cli_survey_tell(const cli_survey *s, unsigned stages, cli_tell *tell_
         tell_overlaps(&t);
         tell_groups(&t);
         tell_untested(&t);
+        tell_no_process(&t);
     }
     teller_dispose(&t);
     return t.failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory for the findings") : SDM_OK;
@@ -84,7 +97,7 @@ static void notice(void *user, sdm_status weight, const char *line)
         cli_notice("%s", line);
 }
 
-void cli_notice_survey(const sdm_config *c, const sdm_instance *shape)
+void cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_repeat_process process)
 {
     double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS], range[SDM_MAX_PARAMS][2];
     sdm_distribution distribution[SDM_MAX_PARAMS];
@@ -103,6 +116,7 @@ void cli_notice_survey(const sdm_config *c, const sdm_instance *shape)
                                   .seed = c->seed,
                                   .grid = &c->grid,
                                   .brief = true,
+                                  .process = process,
                                   .mend_first = true,
                                   .n_threads = (int)c->threads,
                                   .cancelled = cli_interrupted};

@@ -15,6 +15,6 @@ sdm_status cli_survey_tell(const cli_survey *s, unsigned stages, cli_tell *tell,
 void cli_survey_untested(const cli_survey *s, sdm_text *text);
 
 /* A survey of about a second of the shape of a configuration, over its ranges, distributions and
- * grid, told as warnings and notices. Errors, such as that of an interrupt, are no notices: what
- * follows meets them again. */
-void cli_notice_survey(const sdm_config *c, const sdm_instance *shape);
+ * grid, told as warnings and notices; some meshes are made in the process, too. Errors, such as
+ * that of an interrupt, are no notices: what follows meets them again. */
+void cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_repeat_process process);

@@ -13,6 +13,9 @@ sdm_status cli_survey_cause(const cli_survey *s)
 /* Meshes that are not the same when they are made again. Other findings may follow from it. */
 static void tell_repeat(teller *t)
 {
+    static const char *const where[] = {[SDM_REPEAT_THREADS] = " by several threads at once",
+                                        [SDM_REPEAT_PROCESS] =
+                                            " in another process, which made another shape first"};
     const sdm_repeat *r = &t->s->found.repeat;
     const size_t n = t->s->found.n_params;
     sdm_text text = {0};
@@ -23,7 +26,7 @@ static void tell_repeat(teller *t)
                      r->param, n - 1, sdm_instance_params(t->s->shape, NULL)[n - 1].name);
     else
         sdm_text_add(&text, "meshes have other bits when they are made again%s, for example at ",
-                     r->cause == SDM_REPEAT_THREADS ? " by several threads at once" : "");
+                     where[r->cause] ? where[r->cause] : "");
     if (r->cause != SDM_REPEAT_BEHIND) {
         teller_add_params(t->s, r->first, SIZE_MAX, &text);
         sdm_text_add(&text, "; ");

@@ -130,6 +130,9 @@ sdm_status sdm_instance_mesh_filled(const sdm_instance *s, const double *p, int 
 /* stack_fill.c: fills the stack where the next calls of the caller have their variables. */
 void sdm_fill_stack(int fill);
 
+/* shape_repeat.c: of the numbers, vertices and triangles of a mesh. */
+uint64_t sdm_mesh_checksum(const sdm_mesh *m);
+
 /* shape_repeat.c: makes the meshes at p[n][n_params] one after the other and again: backwards, with
  * other values behind the parameters, and with other bytes in the memory that mesh() has to write.
  * A mesh that can be made at one time and not at another counts as unlike. Runs in one worker

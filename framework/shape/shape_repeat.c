@@ -14,7 +14,7 @@ enum { THREADS = 4, SHAPES = 8, SHAPES_BRIEF = 4, TRIANGLES = 200000 };
 static const double SECONDS_BRIEF = 0.1;
 #define BEHIND 0.5
 
-static uint64_t checksum(const sdm_mesh *m)
+uint64_t sdm_mesh_checksum(const sdm_mesh *m)
 {
     const uint64_t sizes[2] = {m->n_vert, m->n_tri};
     uint64_t c = sdm_crc64(0, sizes, sizeof sizes);
@@ -34,7 +34,7 @@ static uint64_t make(trial *t, const double *p, int fill)
 {
     memcpy(t->p, p, t->shape->n_params * sizeof *p);
     sdm_mesh *m = &t->mesh[fill == OTHER_FILL];
-    return sdm_instance_mesh_filled(t->shape, t->p, fill, m, NULL) ? 0 : checksum(m);
+    return sdm_instance_mesh_filled(t->shape, t->p, fill, m, NULL) ? 0 : sdm_mesh_checksum(m);
 }
 
 static void set_behind(trial *t, double value)
@@ -94,7 +94,7 @@ static void read_history(trial *t, const double *p, size_t n, const uint64_t *fi
 static void again(const sdm_instance *s, const double *p, uint64_t first, sdm_mesh *mesh,
                   bool *unlike)
 {
-    if ((sdm_instance_mesh(s, p, mesh, NULL) ? 0 : checksum(mesh)) == first) return;
+    if ((sdm_instance_mesh(s, p, mesh, NULL) ? 0 : sdm_mesh_checksum(mesh)) == first) return;
 #pragma omp atomic write
     *unlike = true;
 }
@@ -133,6 +133,9 @@ const char *sdm_repeat_advice(sdm_repeat_cause cause)
     case SDM_REPEAT_THREADS:
         return "mesh() writes a static or global variable or array, which threads share: make it "
                "local to mesh(), or use --isolate, which gives every thread a process";
+    case SDM_REPEAT_PROCESS:
+        return "a static or global variable keeps what the first call of mesh() set: let mesh() "
+               "compute it anew in every call";
     default:
         return "mesh() must depend on its arguments alone";
     }
@@ -169,7 +172,8 @@ sdm_status sdm_shape_repeat_at_once(const sdm_instance *s, const double *p, size
     sdm_status status = SDM_ALLOC(&first, n, "checksums of meshes", err);
     if (!status) status = SDM_ALLOC(&unlike, n, "repeated meshes", err);
     for (size_t i = 0; i < n && !status; i++)
-        first[i] = sdm_instance_mesh(s, p + i * s->n_params, &mesh, NULL) ? 0 : checksum(&mesh);
+        first[i] =
+            sdm_instance_mesh(s, p + i * s->n_params, &mesh, NULL) ? 0 : sdm_mesh_checksum(&mesh);
     sdm_mesh_dispose(&mesh);
     if (!status) repeat_at_once(s, p, n, n_threads, seconds, first, unlike);
     for (size_t i = 0; i < n && !status; i++)

@@ -20,7 +20,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
-     "meets|groups|crumb|spare|offset|around|unlisted",
+     "meets|groups|crumb|spare|offset|around|unlisted|sticky",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -138,6 +138,9 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     shared = p[0];
     for (int i = 0; i < 20000 && !strcmp(fault, "shared"); i++) shift += 0 * shared;
     double r = !strcmp(fault, "shared") ? shared : p[0];
+    static double sticky; // of the first shape
+    if (!(sticky > 0)) sticky = p[0];
+    if (!strcmp(fault, "sticky")) r = sticky;
     if (!strcmp(fault, "changed") && !access("trained/model.sdm", F_OK)) r *= 1.01;
     const double body[2][3] = {{-r, -r, -r}, {r, r, r}};
     // `wall`: the sides of the handle pass through each other at size 1.75; `step`: a reach above

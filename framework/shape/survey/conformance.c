@@ -259,7 +259,8 @@ static sdm_status test_repeated(tests *t, int test, int n_threads, sdm_error *er
                  r.first);
     else if (n_threads == 1 && f->repeat.unlike)
         result(t, test, SDM_TEST_FAILED, (double)f->repeat.unlike,
-               "%zu meshes have other bits in another process", f->repeat.unlike);
+               "%zu meshes have other bits in another process: %s", f->repeat.unlike,
+               sdm_repeat_advice(SDM_REPEAT_PROCESS));
     else
         result(t, test, SDM_TEST_PASSED, 0, "the same bits, %s", how);
     return SDM_OK;

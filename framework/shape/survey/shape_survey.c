@@ -55,6 +55,18 @@ static sdm_status widen_box(survey *v, sdm_error *err)
     return status == SDM_E_PLUGIN ? SDM_OK : status;
 }
 
+/* Makes some of the meshes again, here and in another process. */
+static sdm_status repeat(const survey *v, sdm_error *err)
+{
+    sdm_shape_survey *s = v->out;
+    const sdm_instance *shape = v->family.shape;
+    const sdm_repeat_process *process = &v->opts->process;
+    const sdm_status status = sdm_repeat_find(shape, s->p, s->n, v->opts->brief, &s->repeat, err);
+    if (!status && !s->repeat.unlike && process->plugin)
+        (void)sdm_repeat_in_process(shape, process, s->p, s->n, &s->repeat, &s->process_untested);
+    return status;
+}
+
 /* What takes longer: unions, lines through the ranges, the largest box, surfaces that stay. */
 static sdm_status look_closer(survey *v, int n_threads, sdm_error *err)
 {
@@ -108,7 +120,7 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
     if (!s) s = sdm_family_set(&v.family, shape, opts->range, opts->distribution, opts->seed, err);
     if (!s) s = choose(&v.family, opts, out, err);
     if (!s) s = SDM_ALLOC(&v.found, out->n, "findings of a survey", err);
-    if (!s) s = sdm_repeat_find(shape, out->p, out->n, opts->brief, &out->repeat, err);
+    if (!s) s = repeat(&v, err);
     // further findings are to be those of the shape
     if (out->repeat.cause == SDM_REPEAT_THREADS) n_threads = 1;
     if (!s) s = survey_meshes(&v, n_threads, err);

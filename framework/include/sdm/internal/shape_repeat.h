@@ -1,6 +1,7 @@
 /* Why a shape gives other meshes when they are made again. */
 #pragma once
 
+#include "sdm/internal/isolation.h"
 #include "sdm/registry.h"
 
 #ifdef __cplusplus
@@ -12,7 +13,8 @@ typedef enum sdm_repeat_cause {
     SDM_REPEAT_HISTORY, /* the mesh depends on the calls before */
     SDM_REPEAT_BEHIND,  /* mesh() reads values behind the last parameter */
     SDM_REPEAT_UNSET,   /* mesh() reads memory that it has not written */
-    SDM_REPEAT_THREADS  /* the mesh changes when several threads call at once */
+    SDM_REPEAT_THREADS, /* the mesh changes when several threads call at once */
+    SDM_REPEAT_PROCESS  /* the mesh is another one in a process that made another shape first */
 } sdm_repeat_cause;
 
 typedef struct sdm_repeat {
@@ -28,6 +30,19 @@ typedef struct sdm_repeat {
  * process. A call that ends the worker of an isolated shape is no error. SDM_E_NOMEM. */
 sdm_status sdm_repeat_find(const sdm_instance *shape, const double *p, size_t n, bool brief,
                            sdm_repeat *out, sdm_error *err);
+
+/* How a plug-in is loaded into another process. */
+typedef struct sdm_repeat_process {
+    const char *plugin; /* its file; NULL: there is no other process */
+    sdm_isolation how;
+} sdm_repeat_process;
+
+/* Makes some of the n meshes at p[n][n_params] here and in another process, there that of the last
+ * shape first, and compares their bits. *out: cause PROCESS, or UNKNOWN and unlike 0. Takes the
+ * start of a process and at most four meshes. SDM_E_UNSUPPORTED: there are no such processes here;
+ * SDM_E_IO, SDM_E_PLUGIN: the process or the plug-in in it fails. */
+sdm_status sdm_repeat_in_process(const sdm_instance *shape, const sdm_repeat_process *process,
+                                 const double *p, size_t n, sdm_repeat *out, sdm_error *err);
 
 /* What the author of the shape has done, and what to do: a text without a full stop. */
 const char *sdm_repeat_advice(sdm_repeat_cause cause);

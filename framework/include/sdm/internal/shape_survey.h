@@ -34,6 +34,8 @@ typedef struct sdm_survey_opts {
     double seconds; /* what is not done after this time is left out; 0: no limit */
     /* called by any thread; true: what is not done by then is left out. May be NULL. */
     bool (*cancelled)(void *user);
+    /* some meshes are made in this process, too; its `plugin` NULL: they are not */
+    sdm_repeat_process process;
     bool mend_first; /* it ends after a stage with a finding of sdm_survey_mend_first() */
     /* called after each stage but the last one: the members of the result up to that stage are
      * set. May be NULL. */
@@ -183,8 +185,9 @@ typedef struct sdm_shape_survey {
        above SDM_SURVEY_SURPLUS_MAX the grid is far too large. 0: there is no grid; NaN: no mesh */
     double surplus, surplus_along[3];
 
-    /* some of the meshes made again, in a brief survey fewer of them */
+    /* some of the meshes made again, in a brief survey fewer of them; then in opts->process */
     sdm_repeat repeat;
+    sdm_error process_untested; /* why they were not made there; its status is 0 if they were */
 
     /* what takes longer, and what a brief survey leaves out */
     size_t unions_untested; /* shapes of which volume and winding are not known for want of time */

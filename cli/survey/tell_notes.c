@@ -1,30 +1,27 @@
 /* Tells what is no mistake by itself: triangles that meet, and groups of parts. */
 #include "teller.h"
 
-#include <math.h>
-
 #include "report/report_audit.h"
+
+/* A part that meets itself in a smaller share of its surface is not named. */
+#define CROSSING_MIN 1e-3
 
 /* Appends "; 12 of them within part 1 of 2 (...) alone; ..." about the part of shape `c->worst`
  * that meets itself most. */
 static void add_crossed(teller *t, const sdm_survey_count *c, sdm_text *text)
 {
-    size_t most = 0;
     const sdm_part_audit *audit = teller_audit(t, c->worst);
-    if (audit && audit->n) {
-        for (size_t i = 1; i < audit->n; i++)
-            if (audit->part[i].crossed > audit->part[most].crossed) most = i;
-        if (audit->part[most].crossed) {
-            // pairs that share a vertex are no overlaps
-            sdm_text_add(text, "; %.0f of them within ",
-                         fmin((double)audit->part[most].crossed, c->amount));
-            cli_name_part(audit, most, text);
-            sdm_text_add(text,
-                         "alone (%.2g %% of its surface); to see what faces the wrong way there: ",
-                         100 * audit->part[most].crossing);
-            teller_add_command(t->s, c->worst, "--certify -o x.nrrd", text);
-        }
+    const sdm_part *most = NULL;
+    for (size_t i = 0; audit && i < audit->n; i++) {
+        const sdm_part *p = &audit->part[i];
+        if (p->crossing >= CROSSING_MIN && p->overlaps > (most ? most->overlaps : 0)) most = p;
     }
+    if (!most) return;
+    sdm_text_add(text, "; %zu of them within ", most->overlaps);
+    cli_name_part(audit, (size_t)(most - audit->part), text);
+    sdm_text_add(text, "alone (%.2g %% of its surface); to see what faces the wrong way there: ",
+                 100 * most->crossing);
+    teller_add_command(t->s, c->worst, "--certify -o x.nrrd", text);
 }
 
 void tell_overlaps(teller *t)

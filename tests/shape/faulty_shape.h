@@ -20,7 +20,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
-     "meets|groups|crumb|spare|offset|around|unlisted|sticky",
+     "meets|groups|crumb|spare|offset|around|unlisted|sticky|diagonal",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -178,6 +178,9 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         static const uint32_t OTHER[6] = {0, 2, 1, 1, 2, 3};
         memcpy(out->tri, OTHER, sizeof OTHER);
     }
+    // a corner of the body just beyond the diagonal of its face: the two triangles of it overlap
+    for (size_t d = 0; d < 2 && !strcmp(fault, "diagonal"); d++)
+        out->vert[18 + d] = (d ? -0.02 : 0.02) * r;
     for (size_t i = 0; i < 3 * spare; i++) out->vert[24 * boxes + i] = 500;
     // the handle has vertices of the body, and leaves out its last four
     for (size_t i = 36; i < 72 && !strcmp(fault, "offset"); i++) out->tri[i] -= 4;
@@ -202,6 +205,8 @@ static int faulty_velocity(const void *self, const sdm_host *host, const sdm_opt
         velocity[3 * v] = 1;
         velocity[3 * (n_vert + v)] = moves || v >= 16 || v & 1 ? (wrong ? 1.01 : 1) : 0;
     }
+    for (size_t d = 0; d < 2 && !strcmp(options[0].text, "diagonal"); d++)
+        velocity[18 + d] = d ? -0.02 : 0.02;
     return 0;
 }
 

@@ -225,6 +225,21 @@ static sdm_status find_groups(job *j, sdm_error *err)
     return SDM_OK;
 }
 
+static bool share_vertex(const sdm_topology *topo, uint32_t a, uint32_t b)
+{
+    for (size_t i = 0; i < 9; i++)
+        if (topo->tri[3 * (size_t)a + i / 3] == topo->tri[3 * (size_t)b + i % 3]) return true;
+    return false;
+}
+
+/* Counts a pair of triangles of one part that meet. */
+static void count_own(job *j, uint32_t part, uint32_t a, uint32_t b)
+{
+    sdm_part *p = &j->out->part[part];
+    p->crossed++;
+    p->overlaps += !share_vertex(&j->survey.topo, a, b);
+}
+
 /* Counts open edges and contacts between parts. */
 static void count_edges_and_contacts(job *j)
 {
@@ -241,13 +256,13 @@ static void count_edges_and_contacts(job *j)
         p->open_edges++;
     }
     for (size_t i = 0; i < contacts->n; i++) {
-        const uint32_t a = j->out->part_of[contacts->list[i].tri],
-                       b = j->out->part_of[contacts->list[i].other];
+        const uint32_t tri = contacts->list[i].tri, other = contacts->list[i].other,
+                       a = j->out->part_of[tri], b = j->out->part_of[other];
         if (a == SDM_NO_PART || b == SDM_NO_PART) continue;
         if (a != b)
             count_meeting(j, a, b);
-        else if (contacts->list[i].tri < contacts->list[i].other) // the list has each pair twice
-            j->out->part[a].crossed++;
+        else if (tri < other) // the list has each pair twice
+            count_own(j, a, tri, other);
     }
 }
 

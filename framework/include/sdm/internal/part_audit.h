@@ -42,6 +42,7 @@ typedef struct sdm_part {
     size_t group; /* lowest index of the parts that such pairs connect with it; a cavity belongs to
                      the part around it */
     size_t crossed;        /* pairs of triangles of this part that meet */
+    size_t overlaps;       /* those of them that share no vertex: as sdm_audit.self_intersections */
     double volume, area;   /* signed, mm^3, as given; mm^2 */
     double min[3], max[3]; /* bounding box, mm */
     bool turned;           /* the engine reverses its triangles, alone or with the whole mesh */

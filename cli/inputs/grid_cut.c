@@ -57,26 +57,24 @@ void cli_warn_cut_map(const char *where, const sdm_grid *g, const float *values,
 #define TORN_SHARE 0.005
 enum { TORN_MIN = 7 };
 
-/* Is none of the 26 neighbours of an inner voxel inside? */
-static bool is_alone(const float *v, int64_t line, int64_t plane)
-{
-    for (int k = -1; k <= 1; k++)
-        for (int j = -1; j <= 1; j++)
-            for (int i = -1; i <= 1; i++)
-                if (v[k * plane + j * line + i] < 0) return false;
-    return true;
-}
+/* A tip or an edge without a voxel inside reaches so far from the last ones inside, voxels. */
+enum { TIP_VOXELS = 3 };
 
-/* Voxels on the surface of a map, and those of them at which it is torn. */
+/* A map: an array of values or blocks. */
+typedef struct map {
+    const sdm_grid *grid;
+    const float *values; /* NULL: the blocks */
+    const sdm_blocks *blocks;
+} map;
+
+/* Voxels on the surface of a map, and those of them that have no neighbour inside. */
 typedef struct tally {
-    size_t n, torn;
+    size_t n, alone;
+    /* of those alone: between voxels inside or far from all of them, where a neck or a wall is
+     * torn; the others lie beyond a tip or an edge */
+    size_t torn;
     double first[3]; /* the first place at which it is torn, mm */
 } tally;
-
-static void tally_torn(tally *t, const sdm_grid *g, int64_t i, int64_t j, int64_t k)
-{
-    if (!t->torn++) sdm_grid_world(g, (double[3]){(double)i, (double)j, (double)k}, t->first);
-}
 
 /* Half of the shortest edge of a voxel, mm. */
 static float half_voxel(const sdm_grid *g)
@@ -86,28 +84,13 @@ static float half_voxel(const sdm_grid *g)
 
 static bool warn_torn(const char *where, const sdm_grid *g, const tally *t, const char *mend)
 {
-    if (t->torn < TORN_MIN || (double)t->torn < TORN_SHARE * (double)t->n) return false;
+    if (!t->torn || t->alone < TORN_MIN || (double)t->alone < TORN_SHARE * (double)t->n)
+        return false;
     cli_warn("%sthe surface is torn: at %zu of the %zu voxels on it no voxel is inside (the first "
              "at %.4g %.4g %.4g mm): the shape is thinner than a voxel there, %.3g mm; %s",
-             where, t->torn, t->n, t->first[0], t->first[1], t->first[2], sdm_grid_coarsest(g),
+             where, t->alone, t->n, t->first[0], t->first[1], t->first[2], sdm_grid_coarsest(g),
              mend);
     return true;
-}
-
-bool cli_warn_torn_map(const char *where, const sdm_grid *g, const float *values, const char *mend)
-{
-    const int64_t line = g->n[0], plane = g->n[0] * g->n[1];
-    const float half = half_voxel(g);
-    tally t = {0};
-    for (int64_t k = 1; k + 1 < g->n[2]; k++)
-        for (int64_t j = 1; j + 1 < g->n[1]; j++)
-            for (int64_t i = 1; i + 1 < g->n[0]; i++) {
-                const float *v = values + k * plane + j * line + i;
-                if (!(fabsf(*v) < half)) continue;
-                t.n++;
-                if (*v >= 0 && is_alone(v, line, plane)) tally_torn(&t, g, i, j, k);
-            }
-    return warn_torn(where, g, &t, mend);
 }
 
 /* The distance at a voxel of the grid of b, mm. */
@@ -120,30 +103,74 @@ static float block_value(const sdm_blocks *b, int64_t i, int64_t j, int64_t k)
     return b->values[tile][(k % size * size + j % size) * size + i % size];
 }
 
-static bool is_alone_in_blocks(const sdm_blocks *b, int64_t i, int64_t j, int64_t k)
+static bool is_inside(const map *m, const int64_t at[3])
 {
-    for (int64_t z = k - 1; z <= k + 1; z++)
-        for (int64_t y = j - 1; y <= j + 1; y++)
-            for (int64_t x = i - 1; x <= i + 1; x++)
-                if (block_value(b, x, y, z) < 0) return false;
-    return true;
+    for (int d = 0; d < 3; d++)
+        if (at[d] < 0 || at[d] >= m->grid->n[d]) return false;
+    return (m->values ? m->values[sdm_grid_voxel(m->grid, at[0], at[1], at[2])]
+                      : block_value(m->blocks, at[0], at[1], at[2])) < 0;
+}
+
+/* Voxels inside that lie within `reach` voxels of another one along each axis. */
+typedef struct around {
+    size_t n;
+    int sum[3];  /* of their offsets */
+    bool behind; /* the offset of one does not point along a given direction */
+} around;
+
+static around look_around(const map *m, const int64_t at[3], int reach, const int along[3])
+{
+    around found = {0};
+    for (int k = -reach; k <= reach; k++)
+        for (int j = -reach; j <= reach; j++)
+            for (int i = -reach; i <= reach; i++) {
+                if (!is_inside(m, (int64_t[]){at[0] + i, at[1] + j, at[2] + k})) continue;
+                found.n++;
+                found.sum[0] += i, found.sum[1] += j, found.sum[2] += k;
+                found.behind |= i * along[0] + j * along[1] + k * along[2] <= 0;
+            }
+    return found;
+}
+
+/* Counts a voxel on the surface. */
+static void tally_voxel(tally *t, const map *m, const int64_t at[3])
+{
+    t->n++;
+    if (is_inside(m, at) || look_around(m, at, 1, (int[3]){0}).n) return;
+    t->alone++;
+    const around near = look_around(m, at, TIP_VOXELS, (int[3]){0});
+    if (near.n && !look_around(m, at, TIP_VOXELS, near.sum).behind) return;
+    if (!t->torn++)
+        sdm_grid_world(m->grid, (double[3]){(double)at[0], (double)at[1], (double)at[2]}, t->first);
+}
+
+bool cli_warn_torn_map(const char *where, const sdm_grid *g, const float *values, const char *mend)
+{
+    const map m = {.grid = g, .values = values};
+    const float half = half_voxel(g);
+    tally t = {0};
+    int64_t at[3];
+    for (at[2] = 1; at[2] + 1 < g->n[2]; at[2]++)
+        for (at[1] = 1; at[1] + 1 < g->n[1]; at[1]++)
+            for (at[0] = 1; at[0] + 1 < g->n[0]; at[0]++)
+                if (fabsf(values[sdm_grid_voxel(g, at[0], at[1], at[2])]) < half)
+                    tally_voxel(&t, &m, at);
+    return warn_torn(where, g, &t, mend);
 }
 
 bool cli_warn_torn_blocks(const char *where, const sdm_blocks *b, const char *mend)
 {
+    const map m = {.grid = &b->grid, .blocks = b};
     const int64_t *n = b->grid.n;
     const float half = half_voxel(&b->grid);
     tally t = {0};
     for (size_t block = 0; block < b->n_block; block++)
         for (int64_t v = 0; v < SDM_BLOCK_VOXELS; v++) {
             const int32_t *first = b->first[block];
-            const int64_t i = first[0] + v % 8, j = first[1] + v / 8 % 8, k = first[2] + v / 64;
-            const float value = b->values[block][v];
-            if (!(fabsf(value) < half) || i < 1 || j < 1 || k < 1 || i + 1 >= n[0] ||
-                j + 1 >= n[1] || k + 1 >= n[2])
-                continue;
-            t.n++;
-            if (value >= 0 && is_alone_in_blocks(b, i, j, k)) tally_torn(&t, &b->grid, i, j, k);
+            const int64_t at[3] = {first[0] + v % 8, first[1] + v / 8 % 8, first[2] + v / 64};
+            if (fabsf(b->values[block][v]) < half && at[0] >= 1 && at[1] >= 1 && at[2] >= 1 &&
+                at[0] + 1 < n[0] && at[1] + 1 < n[1] && at[2] + 1 < n[2])
+                tally_voxel(&t, &m, at);
         }
     return warn_torn(where, &b->grid, &t, mend);
 }

@@ -16,8 +16,9 @@ void cli_warn_cut_shape(const sdm_grid *g, const sdm_mesh *mesh, const char *men
 void cli_warn_cut_map(const char *where, const sdm_grid *g, const float *values, const char *mend);
 
 /* Warns in one line if the surface of the map is torn: if it passes within half a voxel of voxels
- * beside which no voxel is inside. Something is thinner than a voxel there. Returns whether it
- * warned. */
+ * beside which no voxel is inside, and some of these lie between voxels inside or over three voxels
+ * from all of them. Something is thinner than a voxel there; the others lie beyond tips and edges.
+ * Returns whether it warned. */
 bool cli_warn_torn_map(const char *where, const sdm_grid *g, const float *values, const char *mend);
 /* The same of a map in blocks. */
 bool cli_warn_torn_blocks(const char *where, const sdm_blocks *b, const char *mend);

@@ -19,7 +19,10 @@ cat >rings.c <<'C'
 #ifndef BOTTOM
 #define BOTTOM p[1]
 #endif
-#ifdef BAR
+#ifdef ROOF
+#define RINGS {20, -30}, {20, -10}, {p[0], -8}, {p[0], 8}, {26, 8}, {4, 20}
+enum { N = 6 };
+#elif defined BAR
 #define RINGS {20, -30}, {20, -10}, {p[0], -8}, {p[0], 8}, {20, 10}, {20, 30}
 enum { N = 6 };
 #else
@@ -78,6 +81,14 @@ grep -Eq '^sdmgen: warning: torn.stl: the surface has 2 pieces, the shape 1: a n
 sdmgen exact --shape rings --plugin ./bar.so $grid -o torn.vdb --quiet 2>in_blocks || bad "exact of a level set with a thin neck: $(cat in_blocks)"
 [ "$(grep 'is torn: at' in_blocks)" = "$(grep 'is torn: at' err)" ] || bad "torn in blocks: $(cat in_blocks) instead of $(cat err)"
 expect 0 - sdmgen exact --shape rings --plugin ./bar.so $grid -p neck=8 -o whole.stl --quiet
+
+# The edges of a roof end between voxel centres, too: nothing is torn.
+build roof -DBAR -DROOF
+eaves='--spacing 1 --origin -29.3,-29.3,-35.1 --size 60,60,60'
+for file in roof.nrrd roof.vdb; do
+    expect 0 - sdmgen exact --shape rings --plugin ./roof.so $eaves -o $file --quiet
+    if grep -q 'is torn' err; then bad "$file: the edges of a roof are told: $(cat err)"; fi
+done
 
 # Walls that lie on each other at an end of the range, and walls that cross in the neck, which is little of the surface.
 build right

@@ -216,6 +216,13 @@ static int sheet_mesh(const void *self, const sdm_host *host, const sdm_option_v
     return scaled_plate(host, p, 3, out);
 }
 
+static int slate_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                      const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    return scaled_plate(host, p, 1.2, out);
+}
+
 static int foil_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                      const double *p, sdm_mesh_out *out)
 {
@@ -251,6 +258,28 @@ static void test_thinner(void **state)
         sdm_text_dispose(&line);
         sdm_instance_free(sheet);
     }
+}
+
+// A grid that is coarser than three voxels across the thinnest part by less than a tenth is fine
+// enough: no finer one is proposed.
+static void test_hardly_finer(void **state)
+{
+    (void)state;
+    static const char text[] = "shape: {name: plate}\ntrain: {steps: 1}\n";
+    sdm_shape thin = plate_shape;
+    sdm_config c;
+    sdm_text line = {0};
+    sdm_error e = {0};
+    sdm_instance *slate = NULL;
+    thin.mesh = slate_mesh;
+    if (sdm_instance_create(&thin, NULL, 0, NULL, &slate, &e) ||
+        sdm_config_parse("test.yaml", text, strlen(text), NULL, 0, &c, &e) ||
+        sdm_train_complete(&c, slate, &line, &e))
+        fail_msg("%s", e.text);
+    if (!strstr(line.data, " in place of ") || strstr(line.data, "finer with"))
+        fail_msg("%s", line.data);
+    sdm_text_dispose(&line);
+    sdm_instance_free(slate);
 }
 
 /* Distance, in voxels, of a plane perpendicular to an axis from the closest voxel centres. */
@@ -381,11 +410,11 @@ static void test_proposal(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_around),          cmocka_unit_test(test_capsule),
-        cmocka_unit_test(test_metres),          cmocka_unit_test(test_thin),
-        cmocka_unit_test(test_thinner),         cmocka_unit_test(test_faces),
-        cmocka_unit_test(test_surplus),         cmocka_unit_test(test_proposal),
-        cmocka_unit_test(test_faces_on_planes),
+        cmocka_unit_test(test_around),   cmocka_unit_test(test_capsule),
+        cmocka_unit_test(test_metres),   cmocka_unit_test(test_thin),
+        cmocka_unit_test(test_thinner),  cmocka_unit_test(test_hardly_finer),
+        cmocka_unit_test(test_faces),    cmocka_unit_test(test_surplus),
+        cmocka_unit_test(test_proposal), cmocka_unit_test(test_faces_on_planes),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

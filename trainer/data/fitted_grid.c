@@ -15,6 +15,9 @@ enum { BOX_SAMPLES = 256, THIN_SAMPLES = 8, FACE_SAMPLES = 8, BOX_SEED = 1 };
 enum { VOXELS_MOST = 96, VOXELS_END = 4096, LEAST_ACROSS = 2 };
 static const double COUNT_MOST = 4e5;
 
+/* A spacing that is finer by less than this factor is not proposed: it hardly shows more. */
+static const double FINER_MIN = 1.1;
+
 /* Most voxels of any fitted grid: a map of floats has 8 GB then. */
 static const double COUNT_LIMIT = 2e9;
 
@@ -152,6 +155,8 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
     if (!s) s = avoid_faces(shape, &f, &grid, err);
     if (s) return s;
     const bool finer = grid.spacing[0] < usual;
+    const double advised = thick / SDM_GRID_THIN_VOXELS;
+    if (limit && grid.spacing[0] < FINER_MIN * advised) limit = NULL;
     sdm_config_set_grid(config, &grid);
     if (!line) return SDM_OK;
     sdm_text_add(line, "grid: ");
@@ -167,9 +172,8 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
                      grid.spacing[0], usual, THIN_SAMPLES, thick, SDM_GRID_VOXELS);
     if (limit)
         sdm_text_add(line, "; %s; %s with grid: {spacing: %.2g}", limit,
-                     finer ? "still finer" : "finer for the thinnest part",
-                     thick / SDM_GRID_THIN_VOXELS);
-    if (limit) sdm_train_add_price(config, n_params, &grid, thick / SDM_GRID_THIN_VOXELS, line);
+                     finer ? "still finer" : "finer for the thinnest part", advised);
+    if (limit) sdm_train_add_price(config, n_params, &grid, advised, line);
     return line->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
 }
 

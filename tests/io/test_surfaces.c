@@ -70,6 +70,32 @@ static void test_hidden_parts_colours_and_scale(void **state)
     free(p[1].rgb);
 }
 
+/* The top of a plate whose sides share its vertices is flat: one shade from edge to edge. */
+static void test_flat_face(void **state)
+{
+    (void)state;
+    sdm_error err;
+    sdm_mesh m = {0};
+    static const uint32_t TRI[36] = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                                     2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+    assert_int_equal(sdm_mesh_reserve(&m, 8, 12, &err), SDM_OK);
+    for (size_t i = 0; i < 24; i++) m.vert[i] = (i / 3 >> i % 3 & 1) ? (i % 3 < 2 ? 10 : 1) : 0;
+    memcpy(m.tri, TRI, sizeof TRI);
+    const sdm_picture_surface s = {"plate", &m, NULL};
+    if (sdm_picture_surfaces("test_flat.png", &s, 1, "none", &err)) fail_msg("%s", err.text);
+    const picture p = read_png("test_flat.png");
+    const double pixels = 400 / (10 * (0.5 * sqrt(3) + 0.5));
+    size_t count[256] = {0}, most = 0;
+    for (int y = 46; y < 46 + 10 * pixels + 40; y++)
+        for (int x = 0; x < p.w; x++) {
+            const unsigned char *c = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)x);
+            if (c[0] > c[2] + 4 && ++count[c[0]] > most) most = count[c[0]]; // not grey
+        }
+    assert_true((double)most > 0.95 * 100 * pixels * pixels);
+    free(p.rgb);
+    sdm_mesh_dispose(&m);
+}
+
 /* Five surfaces stand in two rows of three columns: the coloured fifth is below the middle of the
  * first row. It is a square of 10 mm, whose oblique view is half as high as wide. */
 static void test_gallery(void **state)
@@ -176,6 +202,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_hidden_parts_colours_and_scale),
+        cmocka_unit_test(test_flat_face),
         cmocka_unit_test(test_gallery),
         cmocka_unit_test(test_long_titles_are_broken),
         cmocka_unit_test(test_wrong_arguments_are_refused),

@@ -14,8 +14,9 @@ enum {
     SURFACES_MAX = 8,
     GALLERY_MAX = 16,
     N_VIEWS = 2,
-    OBLIQUE = 1, /* index of the view of a gallery */
-    FINE = 3,    /* samples along each side of a pixel */
+    OBLIQUE = 1,    /* index of the view of a gallery */
+    FAN_MAX = 1000, /* a vertex of more triangles has no mean normal */
+    FINE = 3,       /* samples along each side of a pixel */
     N_SHADES = 255,
     MIDDLE = N_SHADES / 2, /* index of the colour of 0 */
     PANEL = 400,           /* pixels of the longer side of the largest view */
@@ -119,17 +120,33 @@ static void triangle_cross(const sdm_mesh *m, size_t t, double cross[3])
                        m->vert + 3 * (size_t)m->tri[3 * t + 2], cross);
 }
 
-/* Adds to normal[n_vert][3], for each vertex, the cross product of each triangle at the vertex; the
-   sums are normal to the surface, but not of unit length. */
-static void add_normals(const sdm_mesh *m, double *normal)
+/* The triangles at each vertex, tri[first[v]] .. tri[first[v + 1] - 1], and the cross product of
+ * each triangle. */
+typedef struct fans {
+    uint32_t *first; /* [n_vert + 2], the last one is unused */
+    uint32_t *tri;   /* [3 n_tri] */
+    double *cross;   /* [n_tri][3] */
+} fans;
+
+static void fans_dispose(fans *f)
 {
-    for (size_t t = 0; t < m->n_tri; t++) {
-        double cross[3];
-        triangle_cross(m, t, cross);
-        for (int k = 0; k < 3; k++)
-            for (int d = 0; d < 3; d++)
-                normal[3 * m->tri[3 * t + (size_t)k] + (size_t)d] += cross[d];
-    }
+    sdm_free(f->first);
+    sdm_free(f->tri);
+    sdm_free(f->cross);
+}
+
+static sdm_status fans_find(const sdm_mesh *m, fans *f, sdm_error *err)
+{
+    sdm_status s = SDM_ALLOC(&f->first, m->n_vert + 2, "triangles at vertices", err);
+    if (!s) s = SDM_ALLOC(&f->tri, 3 * m->n_tri, "triangles at vertices", err);
+    if (!s) s = SDM_ALLOC(&f->cross, 3 * m->n_tri, "normals of a picture", err);
+    if (s) return s;
+    // counting sort: first[v + 1] counts on from the triangles before those of v
+    for (size_t i = 0; i < 3 * m->n_tri; i++) f->first[m->tri[i] + 2]++;
+    for (size_t v = 0; v < m->n_vert; v++) f->first[v + 2] += f->first[v + 1];
+    for (size_t i = 0; i < 3 * m->n_tri; i++) f->tri[f->first[m->tri[i] + 1]++] = (uint32_t)(i / 3);
+    for (size_t t = 0; t < m->n_tri; t++) triangle_cross(m, t, f->cross + 3 * t);
+    return SDM_OK;
 }
 
 /* Lambert shading with ambient light 0.42 and a light from the upper left behind the viewer. Back
@@ -193,20 +210,28 @@ static void draw_triangle(const scene *sc, raster *r, const view *v, const corne
         }
 }
 
-/* n[3] = unit normal for the shading of a triangle at one of its vertices: the mean normal of the
- * surface there, or, at an edge of the shape, the triangle's own normal cross[3]. */
-static void corner_normal(const double mean[3], const double cross[3], double n[3])
+/* n[3] = unit normal for the shading of triangle t at vertex v: the mean, by area, of the triangles
+ * there that lie within 30 degrees of it. Beyond a sharp edge a surface has another normal. */
+static void corner_normal(const fans *f, size_t t, size_t v, double n[3])
 {
-    const double EDGE = 0.82; // cosine of 35 degrees
-    const double a = sqrt(dot(mean, mean)), b = sqrt(dot(cross, cross));
-    const bool smooth = !(dot(mean, cross) < EDGE * a * b);
-    const double length = smooth ? a : b;
-    for (int d = 0; d < 3; d++) n[d] = length > 0 ? (smooth ? mean : cross)[d] / length : 0;
+    const double SMOOTH = 0.86602540378443865; // cosine of 30 degrees
+    const double *own = f->cross + 3 * t;
+    const uint32_t alone = (uint32_t)t;
+    const size_t n_fan = f->first[v + 1] - f->first[v], n_tri = n_fan > FAN_MAX ? 1 : n_fan;
+    const uint32_t *tri = n_fan > FAN_MAX ? &alone : f->tri + f->first[v];
+    double sum[3] = {0};
+    for (size_t i = 0; i < n_tri; i++) {
+        const double *cross = f->cross + 3 * (size_t)tri[i];
+        const double lengths = sqrt(dot(own, own) * dot(cross, cross));
+        for (int d = 0; d < 3 && dot(own, cross) >= SMOOTH * lengths; d++) sum[d] += cross[d];
+    }
+    const double length = sqrt(dot(sum, sum));
+    for (int d = 0; d < 3; d++) n[d] = length > 0 ? sum[d] / length : 0;
 }
 
 /* Renders a surface in one view. */
 static void draw_surface(const scene *sc, raster *r, int view_index, const sdm_picture_surface *p,
-                         const double *normal)
+                         const fans *f)
 {
     const view *v = &VIEWS[view_index];
     const double scale = sc->pixels * FINE,
@@ -214,8 +239,6 @@ static void draw_surface(const scene *sc, raster *r, int view_index, const sdm_p
                               0.5 * (sc->low[view_index][1] + sc->high[view_index][1])};
     for (size_t t = 0; t < p->mesh->n_tri; t++) {
         corner c[3];
-        double cross[3];
-        triangle_cross(p->mesh, t, cross);
         for (size_t k = 0; k < 3; k++) {
             const size_t i = p->mesh->tri[3 * t + k];
             const double *x = p->mesh->vert + 3 * i;
@@ -223,7 +246,7 @@ static void draw_surface(const scene *sc, raster *r, int view_index, const sdm_p
             c[k].y = 0.5 * r->h - scale * (dot(x, v->axis[1]) - middle[1]);
             c[k].z = dot(x, v->axis[2]);
             c[k].value = p->values ? p->values[i] : 0;
-            corner_normal(normal + 3 * i, cross, c[k].normal);
+            corner_normal(f, t, i, c[k].normal);
         }
         draw_triangle(sc, r, v, c, !p->values);
     }
@@ -250,20 +273,19 @@ static sdm_status draw_panel(const scene *sc, sdm_canvas *c, size_t column, int 
     const sdm_picture_surface *p = &sc->surfaces[column];
     raster r = {.w = box.w * FINE, .h = box.h * FINE};
     const size_t n = (size_t)r.w * (size_t)r.h;
-    double *normal = NULL;
+    fans f = {0};
     sdm_status s = SDM_ALLOC(&r.depth, n, "depth of a picture", err);
     if (!s) s = SDM_ALLOC(&r.rgb, 3 * n, "panel of a picture", err);
-    if (!s) s = SDM_ALLOC(&normal, 3 * p->mesh->n_vert, "normals of a picture", err);
+    if (!s) s = fans_find(p->mesh, &f, err);
     if (!s) {
         for (size_t i = 0; i < n; i++) r.depth[i] = -INFINITY;
         memset(r.rgb, 255, 3 * n);
-        add_normals(p->mesh, normal);
-        draw_surface(sc, &r, v, p, normal);
+        draw_surface(sc, &r, v, p, &f);
         sdm_canvas_image(c, box, raster_pixel, &r);
     }
     sdm_free(r.depth);
     sdm_free(r.rgb);
-    sdm_free(normal);
+    fans_dispose(&f);
     return s;
 }
 

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "args/shell_word.h"
-#include "sdm/internal/shape_box.h"
 #include "sdm/internal/text.h"
 
 /* A template saves little time if exact maps take less than this many times as long. */
@@ -19,7 +18,7 @@
 #define SMALL 0.02
 
 /* A finer grid has at most this many times the voxels, or it is not advised for a use alone. */
-#define FINER 8.0
+#define FINER 16.0
 
 /* A longer training of a kind that errs by more than this multiple of another makes it no better
    than the other. */
@@ -240,15 +239,6 @@ static void print_finish(const char *begin, const cli_args *args, const sdm_trai
     printf(")\n");
 }
 
-/* The grid.spacing, mm, with which the network has enough voxels for fits, rounded down to two
- * digits; NaN: it has. */
-static double fit_grid_spacing(const sdm_verdict *v)
-{
-    const double most = v->thickness_mm / SDM_GRID_FIT_VOXELS,
-                 unit = pow(10, floor(log10(most)) - 1);
-    return isnan(sdm_verdict_fit_spacing(v)) ? NAN : floor(most / unit) * unit;
-}
-
 /* The line `better` of a good model whose error at the surface is small: a grid for the first use
  * that it leaves out for its voxels, or that nothing needs to change. Returns whether it is
  * printed.
@@ -258,17 +248,17 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
 {
     const sdm_verdict *v = &r->verdict;
     const double volumes = sdm_verdict_spacing(v), voxels = v->rmse_voxel_mm / v->voxel_mm,
-                 spacing = isfinite(volumes) ? volumes : fit_grid_spacing(v),
+                 spacing = isfinite(volumes) ? volumes : sdm_verdict_fit_spacing(v),
                  factor = pow(v->coarse_mm / spacing, 3);
-    char unfit[SDM_MODEL_UNFIT];
+    char unfit[SDM_MODEL_UNFIT], wait[80] = "nothing else needs to change";
     sdm_verdict_unfit(v, unfit);
     if (v->grade != SDM_GRADE_GOOD || !(voxels < SMALL) || !strncmp(v->key, "grid.", 5))
         return false;
+    if (v->key[0]) snprintf(wait, sizeof wait, "%s, named by the verdict, can wait", v->key);
     if (!unfit[0]) {
         printf(
-            "  better      nothing needs to change: the error at the surface is %.2g voxels, and "
-            "no use is left out\n",
-            voxels);
+            "  better      %s: the error at the surface is %.2g voxels, and no use is left out\n",
+            v->key[0] ? wait : "nothing needs to change", voxels);
         return true;
     }
     if (!(factor > 1 && factor <= FINER) || !args->files.n || args->dataset) return false;
@@ -276,9 +266,11 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
                          .minutes = r->steps > 0 ? ceil(2 * factor * minutes) / 2 : 0};
     strcpy(finer.key, "grid.spacing");
     if (!print_command("  better      ", args, r, &finer, kind)) return false;
-    printf("              (for %s, which `not for` leaves out; the error at the surface, %.2g "
-           "voxels, needs no change)\n",
-           isfinite(volumes) ? "volumes of surfaces" : "fits by the network alone", voxels);
+    printf(
+        "              (for %s, which `not for` leaves out: %.2g times the voxels; %s: the error "
+        "at the surface is %.2g voxels)\n",
+        isfinite(volumes) ? "volumes of surfaces" : "fits by the network alone", factor, wait,
+        voxels);
     return true;
 }
 
@@ -299,10 +291,9 @@ void cli_print_next(const cli_args *args, const sdm_train_report *r, const char 
     }
     if (print_enough(args, r, kind, minutes)) return;
     if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || other_maps) return;
-    const bool printed = print_command(begin, args, r, v, kind);
-    if (printed && kind && isfinite(ms_map))
-        printf(
-            "              (%s again, %.3g ms a map on this grid; network.kind=auto would choose "
-            "anew)\n",
-            kind, ms_map);
+    if (!print_command(begin, args, r, v, kind) || !kind || !isfinite(ms_map)) return;
+    // the maps of another grid take another time
+    char time[40] = "";
+    if (strncmp(v->key, "grid.", 5)) snprintf(time, sizeof time, ", %.3g ms a map", ms_map);
+    printf("              (%s again%s; network.kind=auto would choose anew)\n", kind, time);
 }

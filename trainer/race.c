@@ -216,9 +216,23 @@ static double tell_pace(trainer *t, sdm_config *scratch, const entrant *carried,
                              0.5 * (budget - now - trial - first));
 }
 
+/* true: at the pace of its trial, the training of a template that finished it leaves hardly any of
+ * a budget of time for another kind. */
+static bool leaves_little(const trainer *t, const entrant *e)
+{
+    const dataset *d = &e->run.data;
+    const double budget = 60 * t->config->train.minutes, now = trainer_shared_seconds(t),
+                 share = e->ready ? 0 : TEMPLATE_SHARE * fmax(0, budget - now),
+                 made = (double)(d->n_holdout + d->n_start),
+                 missing = (double)t->config->data.holdout - (double)d->n_holdout,
+                 // held-out maps and the end of a training take their time whatever its share is
+        needed = e->per_map * missing + fmax(0, e->seconds - e->per_map * made);
+    return trainer_by_time(t) && now + fmax(share, needed) > (1 - TRAINER_ENOUGH_LEFT) * budget;
+}
+
 /* Decides which kinds are trained; returns the reason. no_time: the budget is too short for a trial
- * of pod. */
-static const char *decide(const entrant *carried, const entrant *pod, bool no_time,
+ * of pod. little: hardly any of it will be left for the training of pod. */
+static const char *decide(const entrant *carried, const entrant *pod, bool no_time, bool little,
                           training_turns *out)
 {
     *out = (training_turns){.n = 1, .kind = {SDM_NETWORK_TEMPLATE}, .chosen = true, .share = 1};
@@ -239,6 +253,9 @@ static const char *decide(const entrant *carried, const entrant *pod, bool no_ti
     }
     out->n = 2, out->kind[1] = SDM_NETWORK_POD;
     out->share = carried->ready ? 1 : TEMPLATE_SHARE;
+    if (little)
+        return "at the measured pace its training leaves hardly any of the budget for pod; more "
+               "train.minutes compare both";
     if (no_time)
         return carried->ready
                    ? "ready, then pod is trained, without a trial, for which "
@@ -275,7 +292,8 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
         if (!no_time) s = try_kind(t, scratch, &e[1], err);
     }
     if (!s) {
-        const char *reason = decide(&e[0], &e[1], no_time, out);
+        const char *reason =
+            decide(&e[0], &e[1], no_time, e[0].finished && leaves_little(t, &e[0]), out);
         out->pod_minutes = pod_minutes;
         const entrant *other = out->kind[0] == e[0].kind ? &e[1] : &e[0];
         out->tried_other = other->finished;

@@ -12,8 +12,8 @@
 
 #include "next_training.h"
 
-/* text = the first line that cli_print_next() prints; "": nothing. */
-static void next_line(const sdm_train_report *r, double minutes, char text[512])
+/* text, second = the first two lines that cli_print_next() prints; "": nothing. */
+static void next_lines(const sdm_train_report *r, double minutes, char text[512], char second[512])
 {
     const char *words[] = {"can.yaml", "train.minutes=1"};
     const cli_args args = {.files = {.items = words, .n = 2}};
@@ -27,6 +27,7 @@ static void next_line(const sdm_train_report *r, double minutes, char text[512])
     close(before);
     rewind(file);
     if (!fgets(text, 512, file)) text[0] = '\0';
+    if (!fgets(second, 512, file)) second[0] = '\0';
     fclose(file);
 }
 
@@ -48,7 +49,7 @@ static void template_that_errs_near_the_surface(void **state)
          "  next        no training is known to help near the surface: pod, which auto has "
          "trained, too, is 3 times worse there; exact maps (sdmgen exact, fit --exact) have no "
          "such error\n"}};
-    char text[512];
+    char text[512], second[512];
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const sdm_train_report r = {.model_path = "run/model.sdm",
                                     .compared = cases[i].compared,
@@ -59,19 +60,62 @@ static void template_that_errs_near_the_surface(void **state)
                                                 .voxel_mm = 3.5,
                                                 .rmse_voxel_mm = 0.4,
                                                 .dice = 0.97}};
-        next_line(&r, cases[i].minutes, text);
+        next_lines(&r, cases[i].minutes, text, second);
         assert_string_equal(text, cases[i].line);
     }
     // a good one needs nothing
     const sdm_train_report good = {
         .model_path = "run/model.sdm",
         .verdict = {.limited = true, .limit = SDM_CAUSE_FAR, .voxel_mm = 3.5, .dice = 0.99}};
-    next_line(&good, 2, text);
-    assert_string_equal(text, "");
+    next_lines(&good, 2, text, second);
+    assert_string_equal(text,
+                        "  better      nothing needs to change: the error at the surface is 0 "
+                        "voxels, and no use is left out\n");
+}
+
+// A grid for the first use in `not for` comes before the key of the verdict, and says so. The time
+// of a map is told for the same grid alone.
+static void grid_or_key(void **state)
+{
+    (void)state;
+    char text[512], second[512];
+    sdm_train_report r = {.model_path = "run/model.sdm",
+                          .steps = 1000,
+                          .verdict = {.limited = true,
+                                      .limit = SDM_CAUSE_BASES,
+                                      .grade = SDM_GRADE_GOOD,
+                                      .voxel_mm = 3,
+                                      .coarse_mm = 3,
+                                      .rmse_voxel_mm = 0.024,
+                                      .dice = 0.99,
+                                      .thickness_mm = 6.3,
+                                      .key = "network.rank",
+                                      .from = 9,
+                                      .to = 18}};
+    next_lines(&r, 1, text, second);
+    assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.2 "
+                              "train.minutes=16 network.kind=template --out run-2\n");
+    assert_string_equal(second, "              (for fits by the network alone, which `not for` "
+                                "leaves out: 16 times the voxels; network.rank, named by the "
+                                "verdict, can wait: the error at the surface is 0.008 voxels)\n");
+    r.verdict.thickness_mm = 30;
+    next_lines(&r, 1, text, second);
+    assert_string_equal(text, "  better      network.rank, named by the verdict, can wait: the "
+                              "error at the surface is 0.008 voxels, and no use is left out\n");
+    r.verdict.rmse_voxel_mm = 0.1;
+    next_lines(&r, 1, text, second);
+    assert_string_equal(second,
+                        "              (template again, 1 ms a map; network.kind=auto would "
+                        "choose anew)\n");
+    strcpy(r.verdict.key, "grid.spacing");
+    next_lines(&r, 1, text, second);
+    assert_string_equal(second,
+                        "              (template again; network.kind=auto would choose anew)\n");
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(template_that_errs_near_the_surface)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(template_that_errs_near_the_surface),
+                                       cmocka_unit_test(grid_or_key)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

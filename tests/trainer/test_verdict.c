@@ -424,6 +424,29 @@ static void parts_too_thin_for_the_grid(void **state)
     }
 }
 
+// A comparison that could not end names the other kind as the change: no key of this one beside it,
+// which the command `next` does not change, but the grid of both.
+static void unfinished_names_one_change(void **state)
+{
+    (void)state;
+    sdm_verdict v = figures();
+    v.limited = true, v.limit = SDM_CAUSE_NETWORK, v.at_best_mm = 0.03, v.minutes = 2;
+    v.part_mm2[SDM_CAUSE_NETWORK] = 0.0027;
+    strcpy(v.key, "network.depth");
+    strcpy(v.sentence, "Polynomials alone limit it: raise network.depth from 0 to 3.");
+    trainer_verdict_unfinished("template", "pod", false, &v);
+    assert_string_equal(v.sentence,
+                        "network.kind: auto had no time left to train pod, too: pod may be better "
+                        "than template, near the surface, too. Of its error 75 % is the further "
+                        "error of the network on training maps.");
+    assert_true(!v.key[0] && v.minutes == 0);
+    strcpy(v.key, "grid.spacing");
+    strcpy(v.sentence, "The grid limits the surface: lower grid.spacing from 2 to 1.");
+    trainer_verdict_unfinished("template", "pod", false, &v);
+    assert_non_null(strstr(v.sentence, "lower grid.spacing from 2 to 1."));
+    assert_string_equal(v.key, "grid.spacing");
+}
+
 // The text of a grade leaves out what other figures exclude, says of a poor model that it is not
 // for use, and why; and the verdict advises one spacing.
 static void uses_and_spacing(void **state)
@@ -433,8 +456,8 @@ static void uses_and_spacing(void **state)
     sdm_verdict v = figures();
     v.coarse_mm = v.voxel_mm, v.thickness_mm = 5, v.volume_error = v.surface_volume_error = 0.01;
     assert_string_equal(sdm_grade_text(&v, text),
-                        "for level sets, surfaces, measurements and fits to images with voxels of "
-                        "0.8 mm or more");
+                        "for level sets, surfaces, measurements and fits to images with a blur "
+                        "(standard deviation), or labels with voxels, of 0.67 mm or more");
     assert_true(isnan(sdm_verdict_spacing(&v)));
     char lines[SDM_MODEL_UNFIT];
     sdm_verdict_unfit(&v, lines);
@@ -443,11 +466,13 @@ static void uses_and_spacing(void **state)
     v.volume_error = 0.03;
     assert_string_equal(
         sdm_grade_text(&v, text),
-        "for level sets, surfaces and fits to images with voxels of 0.8 mm or more");
+        "for level sets, surfaces and fits to images with a blur (standard deviation), or labels "
+        "with voxels, of 0.67 mm or more");
     v.volume_error = 0.004, v.surface_volume_error = 0.029;
     assert_string_equal(
         sdm_grade_text(&v, text),
-        "for level sets, surfaces and fits to images with voxels of 0.8 mm or more");
+        "for level sets, surfaces and fits to images with a blur (standard deviation), or labels "
+        "with voxels, of 0.67 mm or more");
     assert_true(fabs(sdm_verdict_spacing(&v) - 0.46) < 1e-9);
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "volumes of surfaces (.stl): off by 2.9 %, voxels of 0.8 mm cut "
@@ -459,16 +484,33 @@ static void uses_and_spacing(void **state)
     v.volume_error = v.surface_volume_error = 0.004, v.thickness_mm = 2.9 * v.coarse_mm;
     assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and measurements");
     sdm_verdict_unfit(&v, lines);
-    assert_string_equal(lines, "exact fits by the network alone: its thinnest part, 2.3 mm thick "
-                               "in a few held-out shapes, has 2.9 voxels across, and fits need "
-                               "4: fit --exact --spacing 0.46, or 1.2 times the blur of the image "
-                               "where that is less\n");
-    // with the four voxels that the check `map voxels` of a fit asks for, and a fifth to spare
-    v.thickness_mm = 3.9 * v.coarse_mm;
+    assert_string_equal(lines,
+                        "exact fits by the network alone: its thinnest part, 2.3 mm thick "
+                        "in a few held-out shapes, has 2.9 voxels across; fits need 4 there, "
+                        "5 with a margin: sdmgen fit --exact --spacing S (S = 0.46, or 1.2 "
+                        "times the blur of the image if that is less)\n");
+    // not 4 where there are nearly so many
+    v.thickness_mm = 3.96 * v.coarse_mm;
+    sdm_verdict_unfit(&v, lines);
+    assert_non_null(strstr(lines, " has 3.9 voxels across; "));
+    // the promise leaves a fifth of the four voxels that the check `map voxels` of a fit asks for:
+    // the fitted shape may be thinner
+    v.thickness_mm = 4.9 * v.coarse_mm;
     assert_true(sdm_verdict_fit_spacing(&v) < 0.81 * v.thickness_mm / 4);
-    v.thickness_mm = 4.1 * v.coarse_mm;
+    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and measurements");
+    v.thickness_mm = 5.1 * v.coarse_mm;
     assert_true(isnan(sdm_verdict_fit_spacing(&v)));
+    // and voxels of at most 0.8 times 1.5 times the blur: rounded up
+    v.coarse_mm = 1.4, v.thickness_mm = 10;
+    assert_non_null(strstr(sdm_grade_text(&v, text), " of 1.2 mm or more"));
+    v.coarse_mm = 1.2;
+    assert_non_null(strstr(sdm_grade_text(&v, text), " of 1 mm or more"));
+    v.coarse_mm = 0.25;
+    assert_non_null(strstr(sdm_grade_text(&v, text), " of 0.21 mm or more"));
+    v.coarse_mm = 0.8;
+    // none where no thickness is known
     v.thickness_mm = NAN;
+    assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and measurements");
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "");
     v.thickness_mm = 5, v.surface_volume_error = 0.029;
@@ -743,6 +785,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(grades),
         cmocka_unit_test(few_heldout_shapes),
         cmocka_unit_test(uses_and_spacing),
+        cmocka_unit_test(unfinished_names_one_change),
         cmocka_unit_test(triangles_change),
         cmocka_unit_test(grid_cuts),
         cmocka_unit_test(inside_out_is_the_cause),

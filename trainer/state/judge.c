@@ -372,10 +372,17 @@ void trainer_verdict_unfinished(const char *own, const char *other, bool tried, 
 {
     char rest[sizeof v->sentence];
     if (v->inside_out > 0) return;
-    if (v->limited && v->limit == SDM_CAUSE_FAR) {
-        snprintf(v->sentence, sizeof v->sentence,
-                 "Far from the surface the %s only estimates distances%s.", own,
-                 sdm_verdict_errs_near(v) ? ", and near the surface it errs, too" : "");
+    // the other kind is the change to make: no key of this one, but the grid of both
+    if (v->limited && strncmp(v->key, "grid.", 5)) {
+        const double part = v->part_mm2[v->limit], others = v->at_best_mm * v->at_best_mm;
+        if (v->limit == SDM_CAUSE_FAR)
+            snprintf(v->sentence, sizeof v->sentence,
+                     "Far from the surface the %s only estimates distances%s.", own,
+                     sdm_verdict_errs_near(v) ? ", and near the surface it errs, too" : "");
+        else
+            snprintf(v->sentence, sizeof v->sentence, "Of its error %.0f %% is the %s.",
+                     100 * part / (part + others), sdm_cause_text(v->limit));
+        v->key[0] = '\0', v->minutes = 0;
         if (v->cut > 0) tell_cut(v);
         tell_few(v);
     }

@@ -88,16 +88,36 @@ static const char *poor_text(const sdm_verdict *v, char *text)
     return text;
 }
 
-/* Images show a shape about as finely as their voxels are; coarser maps bias fits to them. */
+/* The unit of the second digit of x > 0. */
+static double second_digit(double x) { return pow(10, floor(log10(x)) - 1); }
+
+/* The spacing, rounded down to two digits. */
+static double rounded_down(double spacing)
+{
+    const double unit = second_digit(spacing);
+    return floor(spacing / unit) * unit;
+}
+
+/* The smallest blur of images, or voxels of labels, for which the voxels of the maps are fine
+ * enough, mm, rounded up to two digits. */
+static double finest_data(const sdm_verdict *v)
+{
+    const double least = v->coarse_mm / (SDM_GRID_FIT_ADVISED * SDM_GRID_FIT_DATA),
+                 unit = second_digit(least);
+    return ceil(least / unit - 1e-9) * unit;
+}
+
+/* Fits need a thinnest part that is known, and data that are no finer than the maps. */
 static void write_good_uses(const sdm_verdict *v, bool measures, char *text)
 {
-    if (!isnan(sdm_verdict_fit_spacing(v)))
+    if (isnan(v->thickness_mm) || !isnan(sdm_verdict_fit_spacing(v)))
         snprintf(text, SDM_GRADE_TEXT, "for level sets%s",
                  measures ? ", surfaces and measurements" : " and surfaces");
     else
         snprintf(text, SDM_GRADE_TEXT,
-                 "for level sets, surfaces%s fits to images with voxels of %.2g mm or more",
-                 measures ? ", measurements and" : " and", v->coarse_mm);
+                 "for level sets, surfaces%s fits to images with a blur (standard deviation), or "
+                 "labels with voxels, of %.2g mm or more",
+                 measures ? ", measurements and" : " and", finest_data(v));
 }
 
 const char *sdm_grade_text(const sdm_verdict *v, char *text)
@@ -114,13 +134,6 @@ const char *sdm_grade_text(const sdm_verdict *v, char *text)
     return text;
 }
 
-/* The spacing, rounded down to two digits. */
-static double rounded_down(double spacing)
-{
-    const double unit = pow(10, floor(log10(spacing)) - 1);
-    return floor(spacing / unit) * unit;
-}
-
 double sdm_spacing_for_volume(double spacing, double off)
 {
     // the volume that edges and thin walls lose is about quadratic in the spacing
@@ -129,8 +142,8 @@ double sdm_spacing_for_volume(double spacing, double off)
 
 double sdm_verdict_fit_spacing(const sdm_verdict *v)
 {
-    const double enough = v->thickness_mm / SDM_GRID_FIT_VOXELS;
-    return enough < v->coarse_mm ? rounded_down(SDM_GRID_FIT_ADVISED * enough) : NAN;
+    const double enough = SDM_GRID_FIT_ADVISED * v->thickness_mm / SDM_GRID_FIT_VOXELS;
+    return enough < v->coarse_mm ? rounded_down(enough) : NAN;
 }
 
 double sdm_verdict_spacing(const sdm_verdict *v)

@@ -67,9 +67,11 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
     if (finer > 0 && !sdm_verdict_lacks_part(v))
         add(l,
             "exact fits by the network alone: its thinnest part, %.2g mm thick in a few held-out "
-            "shapes, has %.2g voxels across, and fits need %d: fit --exact --spacing %.2g, or 1.2 "
-            "times the blur of the image where that is less",
-            v->thickness_mm, v->thickness_mm / v->coarse_mm, SDM_GRID_FIT_VOXELS, finer);
+            "shapes, has %.1f voxels across; fits need %d there, %.2g with a margin: sdmgen fit "
+            "--exact --spacing S (S = %.2g, or %.2g times the blur of the image if that is less)",
+            v->thickness_mm, floor(10 * v->thickness_mm / v->coarse_mm + 1e-9) / 10,
+            SDM_GRID_FIT_VOXELS, SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED, finer,
+            SDM_GRID_FIT_ADVISED * SDM_GRID_FIT_DATA);
 }
 
 void sdm_verdict_unfit(const sdm_verdict *v, char text[SDM_MODEL_UNFIT])

@@ -18,10 +18,6 @@
 #define VOXEL_DIAGONAL 1.4142
 // from this edge on, over the radius of the largest ball inside, voxels miss the shape
 #define VOXEL_OVER_RADIUS_FAR 2
-// larger voxels bias the standard deviations: edge over the sd of the point spread
-#define VOXEL_OVER_BLUR_MAX 1.5
-// labels: edge over that of a voxel of the labels
-#define VOXEL_OVER_LABEL_MAX 1.5
 // sd of the point spread, over the voxels of the image, where the maps are too coarse to show it
 #define BLUR_OVER_IMAGE_VOXEL 0.5
 // the limit by the details is known to this share of it: an edge so little beyond passes
@@ -210,16 +206,16 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
     if (sdm_too_thin(thinnest, voxel))
         coarseness_limit(&c, thinnest / VOXEL_DIAGONAL, "the thinnest part of the shape");
     if (fit_is_labels(p))
-        coarseness_limit(&c, VOXEL_OVER_LABEL_MAX * fit_longest_edge(&p->target->grid),
+        coarseness_limit(&c, SDM_GRID_FIT_DATA * fit_longest_edge(&p->target->grid),
                          "the voxels of the labels");
-    if (blur > 0) coarseness_limit(&c, VOXEL_OVER_BLUR_MAX * blur, "the point spread of the image");
+    if (blur > 0) coarseness_limit(&c, SDM_GRID_FIT_DATA * blur, "the point spread of the image");
     c.blind = voxel > VOXEL_OVER_RADIUS_FAR * radius;
     if (voxel > c.limit) c.advice = SDM_GRID_FIT_ADVISED * c.limit;
     // an estimate of the point spread at its smallest value with these maps is an upper bound:
     // finer maps may show a shorter one
     if (voxel > c.limit && blur > 0 && blur <= p->maps.min_blur * (1 + LIMIT_ERROR))
-        c.advice = fmin(c.advice, SDM_GRID_FIT_ADVISED * VOXEL_OVER_BLUR_MAX *
-                                      BLUR_OVER_IMAGE_VOXEL * fit_longest_edge(&p->target->grid));
+        c.advice = fmin(c.advice, SDM_GRID_FIT_ADVISED * SDM_GRID_FIT_DATA * BLUR_OVER_IMAGE_VOXEL *
+                                      fit_longest_edge(&p->target->grid));
     return c;
 }
 

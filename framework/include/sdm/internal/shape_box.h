@@ -33,9 +33,11 @@ sdm_status sdm_shape_thickness(const sdm_instance *shape, const double (*range)[
 #define SDM_GRID_THIN_VOXELS 3
 
 /* Fits to good data need so many voxels across the thinnest part, or across the largest ball in the
- * shape. A spacing that is advised for them is this part of the largest that passes: the fitted
- * shape may be thinner than those that were measured. */
+ * shape, and voxels of at most SDM_GRID_FIT_DATA times the standard deviation of the blur of an
+ * image, or the voxels of labels. A spacing that is advised or promised for them is this part of
+ * the largest that passes: the fitted shape may be thinner than those that were measured. */
 #define SDM_GRID_FIT_VOXELS 4
+#define SDM_GRID_FIT_DATA 1.5
 #define SDM_GRID_FIT_ADVISED 0.8
 
 /* Returns how far the point x (mm) lies beyond the outer voxel centres of the grid along the axis

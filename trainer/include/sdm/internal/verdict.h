@@ -139,7 +139,7 @@ const char *sdm_grade_few(int64_t heldout, char *text);
 
 /* What such a model is good for, without the uses that its other figures exclude; of a poor one why
    it is not for use. `text` holds SDM_GRADE_TEXT characters. Returns text. [any thread] */
-enum { SDM_GRADE_TEXT = 120 };
+enum { SDM_GRADE_TEXT = 160 };
 const char *sdm_grade_text(const sdm_verdict *v, char *text);
 
 /* text = the uses for which the model is not good, a line each, with a '\n' at the end of each; "":
@@ -165,10 +165,9 @@ bool sdm_verdict_needs_pod(const sdm_verdict *v);
 /* The grid does not show the thinnest part of the shapes (sdm_too_thin()). [any thread] */
 bool sdm_verdict_lacks_part(const sdm_verdict *v);
 
-/* Fits to good data show the thinnest part more exactly than maps that have fewer than
-   SDM_GRID_FIT_VOXELS voxels across it: SDM_GRID_FIT_ADVISED times the spacing for so many, mm,
-   rounded down to two digits; NaN: the maps have enough, or the thickness is not known. [any
-   thread] */
+/* Fits need maps with SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED voxels across the thinnest part:
+   their spacing, mm, rounded down to two digits; NaN: the maps have so many, or the thickness is
+   not known. [any thread] */
 double sdm_verdict_fit_spacing(const sdm_verdict *v);
 
 /* The one spacing that the verdict advises, mm: that of its key, or the spacing that shows the

@@ -54,7 +54,7 @@ void cli_fit_print_next(const cli_fit *f)
 {
     const cli_args *a = f->args;
     const sdm_fit_result *r = &f->result;
-    const sdm_fit_finding *voxels = unpassed(f, SDM_FIT_CHECK_VOXELS);
+    const bool voxels = isfinite(r->advised_voxel_mm);
     // --exact and --polish need the exact shape
     const bool more = cli_fit_is_unfinished(f),
                refused = f->doubt.status && !cli_fit_voxels_refuse(f),

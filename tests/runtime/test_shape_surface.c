@@ -382,6 +382,57 @@ static void test_the_error_of_a_network_is_measured(void **state)
     network_error(0.5, a_half);
 }
 
+/* The remedy for a biased network, and whether r->advised_voxel_mm is set: of labels with voxels of
+ * `edge` mm. */
+static bool finer_maps_are_the_remedy(double edge)
+{
+    const sdm_grid grid = sdm_grid_centred((int64_t[3]){17, 17, 17}, 0.25, (double[3]){0, 0, 0});
+    const int64_t n = (int64_t)ceil(4 / edge) | 1;
+    const sdm_grid g = sdm_grid_centred((int64_t[3]){n, n, n}, edge, (double[3]){0, 0, 0});
+    sdm_instance *ball = instance_of(&ball_shape);
+    sdm_model *model = ball_model("bulge", &grid, a_half);
+    float *v = malloc(sdm_grid_count(&g) * sizeof *v);
+    assert_non_null(v);
+    for (int64_t i = 0; i < n * n * n; i++) {
+        double x[3];
+        sdm_grid_world(&g, (double[3]){(double)(i % n), (double)(i / n % n), (double)(i / n / n)},
+                       x);
+        v[i] = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < 1.35 * 1.35;
+    }
+    const sdm_fit_source source = {.model = model, .shape = ball};
+    const sdm_fit_target target = {.kind = SDM_FIT_LABEL, .grid = g, .values = v};
+    const bool keep[2] = {false, true};
+    sdm_fit_opts o = sdm_fit_defaults_for(1);
+    o.kept = keep, o.keep_pose = true;
+    sdm_fit_result r;
+    sdm_error err = {0};
+    const sdm_status s = sdm_fit(&source, &target, &o, &r, &err);
+    if (s && s != SDM_E_QUALITY) fail_msg("%s", err.text);
+    size_t i = 0, voxels = 0;
+    while (r.verdict.findings[i].kind != SDM_FIT_CHECK_NETWORK_ERROR) i++;
+    while (r.verdict.findings[voxels].kind != SDM_FIT_CHECK_VOXELS) voxels++;
+    assert_int_equal(r.verdict.findings[i].grade, SDM_FIT_DOUBTFUL);
+    assert_int_equal(r.verdict.findings[voxels].grade, SDM_FIT_PASSED);
+    const bool finer = strstr(r.verdict.findings[i].text, "(sdm_fit_source.grid) end it");
+    assert_true(finer == !strstr(r.verdict.findings[i].text, "a polish"));
+    assert_true(finer == isfinite(r.advised_voxel_mm));
+    if (finer) assert_true(fabs(r.advised_voxel_mm - 1.2 * edge) < 1e-9);
+    sdm_fit_dispose(&r);
+    free(v);
+    sdm_model_free(model);
+    sdm_instance_free(ball);
+    return finer;
+}
+
+// A polish stays on the grid of the network, 0.25 mm: it is no remedy where these voxels are within
+// a fifth of the limit, 1.5 voxels of the labels, which the polish may move.
+static void test_remedy_of_a_biased_network(void **state)
+{
+    (void)state;
+    assert_true(finer_maps_are_the_remedy(0.2));
+    assert_false(finer_maps_are_the_remedy(0.3));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -393,6 +444,7 @@ int main(void)
         cmocka_unit_test(test_points_without_errors_pass),
         cmocka_unit_test(test_points_and_a_network),
         cmocka_unit_test(test_the_error_of_a_network_is_measured),
+        cmocka_unit_test(test_remedy_of_a_biased_network),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

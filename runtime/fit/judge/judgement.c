@@ -14,6 +14,7 @@
 #include "finding.h"
 #include "offset.h"
 #include "rival.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/shared.h"
 #include "suffice.h"
 #include "unknowns_cost.h"
@@ -367,9 +368,11 @@ static void check_maps(const fit_problem *p, sdm_fit_verdict *v)
                       q->grade, cuts);
 }
 
-// whether the error of the network moves a parameter by more than the data determine it
-static void check_network_error(const fit_problem *p, const sdm_fit_result *r, sdm_fit_verdict *v)
+// Whether the error of the network moves a parameter by more than the data determine it. A polish
+// is no remedy where its maps, on the grid of the network, may turn out too coarse.
+static void check_network_error(const fit_problem *p, fit_coarseness coarse, sdm_fit_result *r)
 {
+    sdm_fit_verdict *v = &r->verdict;
     if (isnan(r->network_error_sd)) return;
     const size_t k = r->network_error_param;
     const sdm_model_param *param = &sdm_model_get_info(p->source->model)->params[k];
@@ -379,12 +382,19 @@ static void check_network_error(const fit_problem *p, const sdm_fit_result *r, s
         snprintf(by, sizeof by,
                  " by about %.2g%s%s, %.2g times its standard deviation without this",
                  r->network_error, *param->unit ? " " : "", param->unit, r->network_error_sd);
+    char remedy[120] = "a polish with exact maps (sdm_fit_opts.max_polish_iterations) ends it";
+    // a polish of points has exact distances, no maps
+    if (p->target->kind != SDM_FIT_POINTS &&
+        fit_longest_edge(&p->maps.grid) > SDM_GRID_FIT_ADVISED * coarse.limit) {
+        if (!passed) r->advised_voxel_mm = coarse.advice;
+        snprintf(remedy, sizeof remedy,
+                 "exact maps with voxels of %.2g mm (sdm_fit_source.grid) end it", coarse.advice);
+    }
     sdm_fit_judge_add(v, SDM_FIT_CHECK_NETWORK_ERROR, passed, SDM_FIT_DOUBTFUL,
                       known ? r->network_error_sd : NAN, known ? NETWORK_ERROR_MAX : NAN,
                       "exact maps would move '%s'%s: the error of the network limits this fit, "
-                      "and the standard deviations contain an estimate of it; a polish with exact "
-                      "maps (sdm_fit_opts.max_polish_iterations) ends it",
-                      param->name, by);
+                      "and the standard deviations contain an estimate of it; %s",
+                      param->name, by, remedy);
 }
 
 // The finding that explains a refusal: the first one that failed. Points that show too little come
@@ -426,7 +436,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     if (!s && labels) s = sdm_fit_measure_beyond(p, r, &bounds, err);
     check_basics(p, r, v);
     check_maps(p, v);
-    check_network_error(p, r, v);
+    check_network_error(p, coarse, r);
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     if (!s && points) sdm_fit_residuals_use_feet(p, &residuals);
     if (!s && points) s = sdm_fit_misfit(p, &residuals, &feet, err);

@@ -210,10 +210,10 @@ fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
                          "the voxels of the labels");
     if (blur > 0) coarseness_limit(&c, SDM_GRID_FIT_DATA * blur, "the point spread of the image");
     c.blind = voxel > VOXEL_OVER_RADIUS_FAR * radius;
-    if (voxel > c.limit) c.advice = SDM_GRID_FIT_ADVISED * c.limit;
+    c.advice = SDM_GRID_FIT_ADVISED * c.limit;
     // an estimate of the point spread at its smallest value with these maps is an upper bound:
     // finer maps may show a shorter one
-    if (voxel > c.limit && blur > 0 && blur <= p->maps.min_blur * (1 + LIMIT_ERROR))
+    if (voxel > c.advice && blur > 0 && blur <= p->maps.min_blur * (1 + LIMIT_ERROR))
         c.advice = fmin(c.advice, SDM_GRID_FIT_ADVISED * SDM_GRID_FIT_DATA * BLUR_OVER_IMAGE_VOXEL *
                                       fit_longest_edge(&p->target->grid));
     return c;

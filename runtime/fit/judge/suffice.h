@@ -18,8 +18,8 @@ void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v);
 typedef struct fit_coarseness {
     /* longest edge (mm) of voxels that show the shape and the data; INFINITY: any do */
     double limit;
-    /* where the voxels of the maps are longer than that: an edge that clearly shows them, below the
-     * limit; else INFINITY */
+    /* an edge that clearly shows them, below the limit: SDM_GRID_FIT_ADVISED times it or less;
+     * INFINITY: any does */
     double advice;
     /* what limits the edge, "the thickness of the shape" */
     const char *detail;

@@ -536,7 +536,8 @@ typedef struct sdm_fit_result {
     /* wall-clock time of the verdict: standard deviations, checks and rivals */
     double seconds_verdict;
     /* edge of the voxels of exact maps (mm) that would be fine enough, where the check
-       SDM_FIT_CHECK_VOXELS has not passed; else NaN */
+       SDM_FIT_CHECK_VOXELS has not passed, or SDM_FIT_CHECK_NETWORK_ERROR and a polish on the grid
+       of the network may end too coarse; else NaN */
     double advised_voxel_mm;
 } sdm_fit_result;
 

@@ -492,7 +492,7 @@ static sdm_status make_row(job *j, size_t row, sdm_error *err)
     notice_row(j, row, &result);
     warn_cut(j, row);
     j->volume = NAN;
-    if (args->json && !j->band.tile &&
+    if ((args->json || args->measure) && !j->band.tile &&
         (s = sdm_map_volume(&j->grid, j->values, (int)args->threads, &j->volume, err)))
         return s;
     s = write_row(j, row, &result, err);
@@ -547,6 +547,16 @@ static sdm_status print_json(const job *j, sdm_error *err)
     if (j->n_rows == 1) cli_json_params(&json, "parameters", j->params, j->info->n_params, j->rows);
     sdm_json_close(&json, '}');
     return cli_print_json(&json, err);
+}
+
+/* The volume of the map, where it is known, above the measures, which are those of the mesh. */
+static void print_map_volume(const job *j)
+{
+    const double error = j->n_exact ? 0 : j->own ? j->info->quality.volume_error : NAN;
+    if (isnan(j->volume)) return;
+    printf("volume of the map %.5g mm^3", j->volume);
+    if (error > 0) printf(" (root mean square error %.2g %%)", 100 * error);
+    printf("; of the exact mesh:\n");
 }
 
 /* Writes the file of --returnparameterfile: of the last row. */
@@ -723,7 +733,10 @@ static sdm_status measure(job *j, sdm_error *err)
     if (!j->args->measure) return SDM_OK;
     const cli_depths *d = &j->depths;
     const sdm_status s = sdm_shape_measure(j->shape, j->rows, d->mm, d->n, &j->measures, err);
-    if (!s && !j->args->json) cli_print_measures(&j->measures, false);
+    if (!s && !j->args->json && j->args->measure) {
+        print_map_volume(j);
+        cli_print_measures(&j->measures, false);
+    }
     return s;
 }
 

@@ -47,6 +47,7 @@ has '"measures": \[\{"name": "volume", "unit": "mm\^3", "of_depth": false, '
 
 # generate
 expect 0 - sdmgen generate $model -p a=4 --measure
+has '^volume of the map [0-9.e+]+ mm\^3( \(root mean square error [0-9.]+ %\))?; of the exact mesh:$'
 has '^  diameter_a +7\.'
 expect 0 - sdmgen generate $model -p a=4 --measure --depth 5 --json
 expected=$(measure length_wall value)

@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "data/dataset_fill.h"
+#include "look.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
@@ -23,15 +24,30 @@ static const double ENOUGH = 1.0 / 500;
    than this, it is not trained. */
 static const double HOPELESS = 15;
 
-/* The trial of `pod` takes up to about twice as long as that of the template, for its bases. It is
-   left out where both would take more than this part of a budget of time. */
-static const double POD_TRIAL = 2, TRIALS_MOST = 1.0 / 3;
+/* Where there is no time for trials, a shape that bends and has at most so many parameters is
+   trained as `pod`. In the families measured the trained `pod` was as good as a template with a
+   correction, or better, with up to 5 parameters, and much worse with 20 (docs/notes/network.md).
+ */
+static const size_t FEW_PARAMS = 8;
+
+/* A template whose score is this part of a voxel is poor: without a trial, `pod` is trained. */
+static const double POOR = 0.2;
+
+/* Where one of two kinds is to be chosen: training improves the score of `pod` by a factor of 3 in
+   the middle of the families measured. */
+static const double POD_GAIN = 3;
+
+/* Part of a budget of time that a second training has at least. */
+static const double SECOND_SHARE = 2.0 / 3;
+
+/* The measurement of a model takes about as long as so many exact maps. */
+static const double MEASUREMENT = 100;
 
 /* On a busy machine the few maps of a trial are made faster than the many of a training (measured:
    by a factor of 1.2 to 2). */
 static const double BURST = 1.5;
 
-/* Part of the budget for a template that is trained before `pod`. */
+/* Part of a budget of steps for a template that is trained before `pod`. */
 static const double TEMPLATE_SHARE = 1.0 / 3;
 
 /* A kind of network in the race. */
@@ -42,8 +58,6 @@ typedef struct entrant {
     bool ready;          /* it needs no training */
     bool cut;            /* the budget of time ended before all maps of the trial were made */
     turn_figures errors; /* of its trial */
-    double filling;      /* s, when its maps were begun, of the run */
-    double per_map;      /* s a map */
     double seconds;
     char left_out[SDM_ERROR_TEXT_MAX]; /* why the shape does not allow it; "": it does */
     trainer run;                       /* its trial; run.kind is NULL without one */
@@ -102,24 +116,11 @@ static bool trial_enough(void *user)
     return trainer_start_fraction(((entrant *)user)->race) > TRAINER_TRIALS_SHARE;
 }
 
-/* Tells once that the maps which a trial makes in any case take longer than the budget. */
 static void trial_report(void *user, size_t done, size_t all)
 {
-    entrant *e = user;
-    trainer *t = e->race;
-    const dataset *d = &e->run.data;
-    const size_t random = d->n_start < FILL_LEAST_RANDOM ? d->n_start : FILL_LEAST_RANDOM;
-    double seconds;
-    (void)all;
+    trainer *t = ((entrant *)user)->race;
+    (void)done, (void)all;
     trainer_report(t, trainer_start_fraction(t), false);
-    if (t->overrun_told || !trainer_forecast(t, e->filling, done, d->n_holdout + random, &seconds))
-        return;
-    t->overrun_told = true;
-    trainer_message(t,
-                    "the run will take longer than train.minutes (%.4g): a trial of "
-                    "network.kind: auto makes at least %zu maps, which takes about %.0f s (raise "
-                    "train.minutes, or give network.kind)",
-                    t->config->train.minutes, d->n_holdout + random, seconds);
 }
 
 /* *out = the errors of a trial, and the time of a map. */
@@ -132,8 +133,10 @@ static sdm_status measure(const trainer *r, turn_figures *out, sdm_error *err)
     return s;
 }
 
-/* Trains and measures one entrant. Keeps its design and its maps. */
-static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_error *err)
+/* Trains and measures one entrant. Keeps its design and its maps. known: exact maps made
+ * before. */
+static sdm_status trial(trainer *t, const sdm_config *config, const dataset *known, entrant *e,
+                        sdm_error *err)
 {
     sdm_text metrics = {0};
     trainer *r = &e->run;
@@ -160,10 +163,9 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
         s = SDM_OK;
     } else {
         if (s && err) *err = reason;
-        e->filling = trainer_shared_seconds(t);
+        if (known->n_voxels && !r->data.target.make) r->data.known = known;
         if (!s) s = trainer_dataset_fill(&r->data, r->n_threads, &hooks, err);
-        e->per_map = (trainer_shared_seconds(t) - e->filling) /
-                     fmax(1, (double)(r->data.n_holdout + r->data.n_start));
+        r->data.known = NULL;
         if (!s) s = trainer_check_grid(r, err);
         if (!s) s = r->kind->begin(r, err);
         if (!s) {
@@ -182,13 +184,14 @@ static sdm_status trial(trainer *t, const sdm_config *config, entrant *e, sdm_er
 }
 
 /* Runs the trial of an entrant and tells its result. */
-static sdm_status try_kind(trainer *t, sdm_config *config, entrant *e, sdm_error *err)
+static sdm_status try_kind(trainer *t, sdm_config *config, const dataset *known, entrant *e,
+                           sdm_error *err)
 {
     size_t n_params;
     sdm_instance_params(t->shape, &n_params);
     trial_config(t->config, n_params, e->kind, config);
     trainer_report(t, trainer_start_fraction(t), true);
-    const sdm_status s = trial(t, config, e, err);
+    const sdm_status s = trial(t, config, known, e, err);
     if (!s && e->finished)
         trainer_message(t,
                         "auto: %s leaves %.2g mm within a voxel of the surface, %.2g mm everywhere "
@@ -199,72 +202,108 @@ static sdm_status try_kind(trainer *t, sdm_config *config, entrant *e, sdm_error
     return s;
 }
 
-/* Before the trial of pod, with a budget of time: tells how many maps fit into it. Returns the
- * minutes that hold those which the parameters ask for, 0: the budget does. *no_time: it is too
- * short for the trial. */
-static double tell_pace(trainer *t, sdm_config *scratch, const entrant *carried, bool *no_time)
+/* true: the trials take more than their part of a budget of time. */
+static bool lacks_time(const trainer *t, const trial_look *l)
 {
-    const double budget = 60 * t->config->train.minutes, now = trainer_shared_seconds(t);
-    if (!trainer_by_time(t)) return 0;
-    *no_time = (1 + POD_TRIAL) * now > TRIALS_MOST * budget;
+    return trainer_by_time(t) && l->trials > TRAINER_TRIALS_SHARE * 60 * t->config->train.minutes;
+}
+
+/* With a budget of time: looks at the shape, and tells how many maps fit into the budget. *minutes
+ * = those that hold the maps which the parameters ask for, 0: the budget does. */
+static sdm_status look(trainer *t, sdm_config *scratch, trial_look *l, double *minutes,
+                       sdm_error *err)
+{
+    const double budget = 60 * t->config->train.minutes;
+    size_t n_params;
+    if (!trainer_by_time(t)) return SDM_OK;
+    sdm_instance_params(t->shape, &n_params);
+    trial_config(t->config, n_params, SDM_NETWORK_POD, scratch);
+    trainer_report(t, trainer_start_fraction(t), true);
+    const sdm_status s = trainer_look(t, scratch, l, err);
+    if (s) return s;
+    const double spent = trainer_shared_seconds(t) + (lacks_time(t, l) ? 0 : l->trials);
     *scratch = *t->config;
     sdm_config_choose_kind(scratch, SDM_NETWORK_POD);
-    // a template that is ready is measured in about the time of its trial
-    const double first = carried->ready ? now : (budget - now) * TEMPLATE_SHARE,
-                 trial = *no_time ? 0 : POD_TRIAL * now;
-    return trainer_tell_pace(t, scratch, BURST * carried->per_map,
-                             0.5 * (budget - now - trial - first));
+    *minutes = trainer_tell_pace(t, scratch, BURST * l->per_map, 0.5 * budget - spent);
+    if (lacks_time(t, l))
+        trainer_message(t,
+                        "auto: trials of both kinds would take about %.3g s, and a fifth of "
+                        "train.minutes is %.3g s: one kind is chosen without (for trials raise "
+                        "train.minutes to %.4g)",
+                        l->trials, TRAINER_TRIALS_SHARE * budget,
+                        ceil(10 * l->trials / (60 * TRAINER_TRIALS_SHARE)) / 10);
+    return SDM_OK;
 }
 
-/* true: at the pace of its trial, the training of a template that finished it leaves hardly any of
- * a budget of time for another kind. */
-static bool leaves_little(const trainer *t, const entrant *e)
+/* true: the budget of time holds the maps of a template and its measurement, and leaves enough of
+ * it for a training of pod. */
+static bool holds_both(const trainer *t, const trial_look *l, const entrant *carried)
 {
-    const dataset *d = &e->run.data;
-    const double budget = 60 * t->config->train.minutes, now = trainer_shared_seconds(t),
-                 share = e->ready ? 0 : TEMPLATE_SHARE * fmax(0, budget - now),
-                 made = (double)(d->n_holdout + d->n_start),
-                 missing = (double)t->config->data.holdout - (double)d->n_holdout,
-                 // held-out maps and the end of a training take their time whatever its share is
-        needed = e->per_map * missing + fmax(0, e->seconds - e->per_map * made);
-    return trainer_by_time(t) && now + fmax(share, needed) > (1 - TRAINER_ENOUGH_LEFT) * budget;
+    const dataset *d = &carried->run.data;
+    double maps = (double)t->config->data.holdout + MEASUREMENT;
+    double grid = 1;
+    if (!trainer_by_time(t)) return true;
+    for (size_t i = 0; i < d->n_params; i++)
+        grid *= (double)sdm_config_static_count(t->config, d->n_params, i);
+    if (!carried->ready) maps += grid + FILL_LEAST_RANDOM;
+    return trainer_shared_seconds(t) + BURST * l->per_map * maps <
+           (1 - SECOND_SHARE) * 60 * t->config->train.minutes;
 }
 
-/* Decides which kinds are trained; returns the reason. no_time: the budget is too short for a trial
- * of pod. little: hardly any of it will be left for the training of pod. */
-static const char *decide(const entrant *carried, const entrant *pod, bool no_time, bool little,
-                          training_turns *out)
+/* Part of the budget left by the trials for a template before pod. */
+static double first_share(const trainer *t, bool ready)
+{
+    const double budget = 60 * t->config->train.minutes;
+    if (ready) return 1;
+    if (!trainer_by_time(t)) return TEMPLATE_SHARE;
+    return 1 - SECOND_SHARE * budget / (budget - trainer_shared_seconds(t));
+}
+
+/* Decides without a trial of pod, for which the budget is too short. */
+static const char *decide_untried(const trainer *t, const entrant *carried, training_turns *out)
+{
+    if (!carried->run.kind) {
+        out->kind[0] = SDM_NETWORK_POD;
+        return "it suits a shape of few parameters that bends or stretches";
+    }
+    if (trainer_score(&carried->errors) > POOR * t->config->grid.spacing[0]) {
+        out->kind[0] = SDM_NETWORK_POD;
+        return "the trial of template leaves a large error";
+    }
+    out->untried = true;
+    return "it suits parts that only move, and shapes of many parameters";
+}
+
+/* Decides which kinds are trained; returns the reason. */
+static const char *decide(const trainer *t, const trial_look *l, const entrant *carried,
+                          const entrant *pod, bool done, training_turns *out)
 {
     *out = (training_turns){.n = 1, .kind = {SDM_NETWORK_TEMPLATE}, .chosen = true, .share = 1};
-    if (!carried->finished) {
+    if (carried->run.kind && !carried->finished) {
         out->kind[0] = SDM_NETWORK_POD;
         return "the only kind left";
     }
-    if (!pod->finished && !no_time) return "hardly any error is left";
-    const double ratio =
-        no_time ? INFINITY : trainer_score(&pod->errors) / trainer_score(&carried->errors);
-    // a trial with fewer maps than planned, or none, rules nothing out
-    if (ratio > HOPELESS && !pod->cut && !no_time)
-        return "training does not make up for such a difference";
+    if (done) return "hardly any error is left";
+    if (!pod->finished) return decide_untried(t, carried, out);
+    const double ratio = trainer_score(&pod->errors) / trainer_score(&carried->errors);
+    // a trial with fewer maps than planned rules nothing out
+    if (ratio > HOPELESS && !pod->cut) return "training does not make up for such a difference";
     if (ratio <= 1) {
         out->kind[0] = SDM_NETWORK_POD;
         return "its error (at the surface, and a tenth of that everywhere) is the smaller one, and "
                "training improves pod more than template";
     }
+    if (!holds_both(t, l, carried)) {
+        if (ratio > POD_GAIN)
+            return "train.minutes holds one training, which would not make pod the better kind";
+        out->kind[0] = SDM_NETWORK_POD;
+        return "train.minutes holds one training, which improves pod more than template";
+    }
     out->n = 2, out->kind[1] = SDM_NETWORK_POD;
-    out->share = carried->ready ? 1 : TEMPLATE_SHARE;
-    if (little)
-        return "at the measured pace its training leaves hardly any of the budget for pod; more "
-               "train.minutes compare both";
-    if (no_time)
-        return carried->ready
-                   ? "ready, then pod is trained, without a trial, for which "
-                     "train.minutes is short, and the better one is kept"
-                   : "trained with a third of the budget, then pod, without a trial, for "
-                     "which train.minutes is short, and the better one is kept";
-    return carried->ready
-               ? "ready, then pod is trained, and the better one is kept"
-               : "trained with a third of the budget, then pod, and the better one is kept";
+    out->share = first_share(t, carried->ready);
+    return carried->ready ? "it is ready, then pod is trained, and the better one is kept"
+                          : "it is trained with at most a third of the budget, then pod with the "
+                            "rest, and the better one is kept";
 }
 
 /* Hands the design and the maps of the entrant on to the training. */
@@ -275,26 +314,35 @@ static void hand_on(entrant *e, trial_gain *gain)
     e->run.data = (dataset){0};
 }
 
+/* Hands the maps of the look on to a training of pod that had no trial. */
+static void hand_on_look(trial_look *l, trial_gain *gain)
+{
+    gain->maps = l->maps;
+    l->maps = (dataset){0};
+}
+
 sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, trial_gain gain[2],
                         sdm_error *err)
 {
     entrant e[] = {{.kind = SDM_NETWORK_TEMPLATE, .race = t}, {.kind = SDM_NETWORK_POD, .race = t}};
     turn_figures figures[2];
-    size_t n = 0;
+    trial_look l = {0};
+    size_t n = 0, n_params;
+    double pod_minutes = 0;
     t->phase = SDM_PHASE_TRIAL;
-    sdm_status s = try_kind(t, scratch, &e[0], err);
+    sdm_instance_params(t->shape, &n_params);
+    sdm_status s = look(t, scratch, &l, &pod_minutes, err);
+    const bool brief = lacks_time(t, &l);
+    // where a template is likely to be kept, its trial is the beginning of its training
+    if (!s && !(brief && l.bends && n_params <= FEW_PARAMS))
+        s = try_kind(t, scratch, &l.maps, &e[0], err);
     const bool done =
         e[0].finished && trainer_score(&e[0].errors) < ENOUGH * t->config->grid.spacing[0];
-    bool no_time = false;
-    double pod_minutes = 0;
-    if (!s && e[0].finished && !done) {
-        pod_minutes = tell_pace(t, scratch, &e[0], &no_time);
-        if (!no_time) s = try_kind(t, scratch, &e[1], err);
-    }
+    if (!s && e[0].finished && !done && !brief) s = try_kind(t, scratch, &l.maps, &e[1], err);
     if (!s) {
-        const char *reason =
-            decide(&e[0], &e[1], no_time, e[0].finished && leaves_little(t, &e[0]), out);
-        out->pod_minutes = pod_minutes;
+        const char *reason = decide(t, &l, &e[0], &e[1], done, out);
+        // a training of pod tells its own pace
+        out->pod_minutes = out->kind[0] == SDM_NETWORK_POD || done ? 0 : pod_minutes;
         const entrant *other = out->kind[0] == e[0].kind ? &e[1] : &e[0];
         out->tried_other = other->finished;
         if (out->tried_other) out->other = other->errors;
@@ -309,9 +357,13 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
     }
     for (int i = 0; i < out->n && !s; i++) {
         entrant *winner = out->kind[i] == e[0].kind ? &e[0] : &e[1];
-        if (winner->finished) hand_on(winner, &gain[i]);
+        if (winner->finished)
+            hand_on(winner, &gain[i]);
+        else if (winner == &e[1])
+            hand_on_look(&l, &gain[i]);
     }
     for (size_t i = 0; i < 2; i++) entrant_dispose(&e[i]);
+    trainer_dataset_dispose(&l.maps);
     t->phase = SDM_PHASE_DATA;
     return s;
 }

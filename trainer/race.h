@@ -10,8 +10,9 @@ typedef struct trial_gain {
     dataset maps; /* trainer.tried */
 } trial_gain;
 
-/* No more maps are made for the trials once this part of a budget of time is used. */
-#define TRAINER_TRIALS_SHARE 0.25
+/* Part of a budget of time for the trials: one that takes more is left out, as its first maps tell,
+   and no more maps are made for a trial once the part is used. */
+#define TRAINER_TRIALS_SHARE 0.2
 
 /* Numbers of the maps of a trial, for training and held out. */
 size_t trainer_trial_maps(const sdm_config *c, size_t n_params);

@@ -85,6 +85,11 @@ static sdm_status train_turn(run *r, const trainer *common, bool *unfit, sdm_tra
 static void report_trial(const training_turns *r, sdm_train_report *report)
 {
     report->pod_minutes = fmax(report->pod_minutes, r->pod_minutes);
+    if (r->untried) {
+        report->unfinished = true;
+        trainer_verdict_unfinished(trainer_turn_name(SDM_NETWORK_TEMPLATE),
+                                   trainer_turn_name(SDM_NETWORK_POD), false, &report->verdict);
+    }
     if (!r->tried_other) return;
     report->tried = true;
     report->other = (sdm_accuracy){.rmse_mm = r->other.rmse_mm};

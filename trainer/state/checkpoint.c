@@ -346,7 +346,7 @@ static sdm_status turns_read(const trainer *t, const sdm_section *stored, traini
     if (stored->size == sizeof *out) memcpy(out, stored->data, sizeof *out);
     bool sound = stored->size == sizeof *out && out->n == 2 && (out->at == 0 || out->at == 1) &&
                  out->share > 0 && out->share <= 1 && out->tried >= 0 && isfinite(out->tried) &&
-                 is_bool(&out->chosen) && is_bool(&out->tried_other) &&
+                 is_bool(&out->chosen) && is_bool(&out->untried) && is_bool(&out->tried_other) &&
                  report_is_sound(&out->first);
     for (int i = 0; i < 2 && sound; i++)
         sound = out->kind[i] == SDM_NETWORK_POD || out->kind[i] == SDM_NETWORK_TEMPLATE;

@@ -25,6 +25,7 @@ typedef struct training_turns {
     sdm_train_report first;   /* result of the first, while the second trains */
     double pod_minutes; /* train.minutes for a training of pod alone at the pace of the trials; 0:
                            the budget holds its maps */
+    bool untried;       /* pod may be better, but the budget was too short for its trial */
     bool tried_other;   /* the kind that is not trained, or trained later, had a trial: */
     turn_figures other; /* its errors in the trial */
 } training_turns;

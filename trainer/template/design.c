@@ -222,7 +222,7 @@ sdm_status trainer_template_design(template_design *d, sdm_error *err)
 {
     const double h = fmin(fmin(d->grid->spacing[0], d->grid->spacing[1]), d->grid->spacing[2]);
     sdm_status s = trainer_family_create(&d->family, err);
-    if (!s) s = trainer_template_parts(d, 0.02 * h, err);
+    if (!s) s = trainer_template_parts(d, TRAINER_RIGID * h, err);
     if (!s && d->split && d->n_parts == 1) return SDM_OK;
     if (!s) s = design_motion(d, 0.005 * h, err);
     if (!s) s = trainer_template_maps(d, err);

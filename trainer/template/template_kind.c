@@ -13,6 +13,7 @@
 #include "sdm/internal/checksum.h"
 #include "sdm/memory.h"
 #include "state/progress.h"
+#include "template_parts.h"
 
 /* Voxels between two nodes of the correction's grid. */
 static const double CORRECTION_SPACING = 2;
@@ -182,18 +183,29 @@ static sdm_status try_pieces(const trainer *t, template_design *d, design_error 
     return status;
 }
 
+static family family_of(const trainer *t)
+{
+    const dataset *d = &t->data;
+    return (family){.shape = t->shape,
+                    .n_params = d->n_params,
+                    .min = d->min,
+                    .max = d->max,
+                    .distribution = d->distribution,
+                    .seed = t->config->seed,
+                    .n_threads = t->n_threads};
+}
+
+sdm_status trainer_template_look(const trainer *t, bool *bends, sdm_error *err)
+{
+    const family f = family_of(t);
+    return trainer_template_bends(&f, TRAINER_RIGID * trainer_dataset_voxel(&t->data), bends, err);
+}
+
 /* Designs the network: from meshes, with a look at a few exact maps. */
 static sdm_status make_design(const trainer *t, template_state *s, sdm_error *err)
 {
-    const dataset *d = &t->data;
     s->design.grid = &t->config->grid;
-    s->design.family = (family){.shape = t->shape,
-                                .n_params = d->n_params,
-                                .min = d->min,
-                                .max = d->max,
-                                .distribution = d->distribution,
-                                .seed = t->config->seed,
-                                .n_threads = t->n_threads};
+    s->design.family = family_of(t);
     design_error e = {0};
     sdm_status status = trainer_template_design(&s->design, err);
     if (status) return status;

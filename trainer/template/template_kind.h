@@ -3,4 +3,8 @@
 
 #include "state/kind.h"
 
+/* *bends = whether the template needs a warp or a correction, as far as the first meshes tell.
+   t->data has the ranges of the parameters. SDM_E_UNSUPPORTED: the shape allows no template. */
+sdm_status trainer_template_look(const trainer *t, bool *bends, sdm_error *err);
+
 extern const train_kind trainer_kind_template;

@@ -7,7 +7,7 @@
 #include "pieces.h"
 #include "sdm/memory.h"
 
-enum { SAMPLES = 192 };
+enum { SAMPLES = 192, FIRST_SAMPLES = 8 };
 
 /* Pieces that flex overlap their neighbours by this multiple of the tolerance: four voxels. */
 static const double OVERLAP = 200;
@@ -48,13 +48,14 @@ typedef struct residuals {
         affine[SDM_TEMPLATE_MAX_PARTS], angle[SDM_TEMPLATE_MAX_PARTS];
 } residuals;
 
-static sdm_status measure(const template_design *d, residuals *r, sdm_error *err)
+// The residuals of all parts in the first n random meshes.
+static sdm_status measure(const template_design *d, size_t n_meshes, residuals *r, sdm_error *err)
 {
     sdm_mesh mesh = {0};
     double p[SDM_POD_MAX_PARAMS];
     sdm_status s = SDM_OK;
     *r = (residuals){0};
-    for (size_t i = 0; i < SAMPLES && !s; i++) {
+    for (size_t i = 0; i < n_meshes && !s; i++) {
         trainer_family_params(&d->family, i, p);
         s = trainer_family_mesh(&d->family, p, &mesh, err);
         for (size_t c = 0; c < d->n_parts && !s; c++) {
@@ -274,6 +275,12 @@ static bool has_cavity(const family *f)
     return false;
 }
 
+// True if the components are one part in any case.
+static bool is_whole(const family *f)
+{
+    return f->n_components > SDM_TEMPLATE_MAX_PARTS || has_cavity(f);
+}
+
 // Replaces the components that bend by their pieces; those without rigid pieces stay as they are.
 // The list of parts is left empty if there would be too many.
 static sdm_status split_parts(template_design *d, const residuals *r, double tolerance,
@@ -332,23 +339,39 @@ static void choose_frames(template_design *d, const residuals *r, double toleran
     }
 }
 
+sdm_status trainer_template_bends(const family *from, double tolerance, bool *out, sdm_error *err)
+{
+    template_design d = {.family = *from};
+    residuals r;
+    sdm_status s = trainer_family_create(&d.family, err);
+    const bool whole = !s && is_whole(&d.family);
+    if (!s) s = list_vertices(&d, whole, err);
+    if (!s) s = measure(&d, FIRST_SAMPLES, &r, err);
+    *out = false;
+    for (size_t c = 0; c < d.n_parts && !s; c++)
+        *out |= (d.n_parts > 1 ? r.affine[c] : r.rigid[c]) > tolerance;
+    trainer_family_dispose(&d.family);
+    sdm_free(d.vertices);
+    return s;
+}
+
 sdm_status trainer_template_parts(template_design *d, double tolerance, sdm_error *err)
 {
-    bool whole = d->family.n_components > SDM_TEMPLATE_MAX_PARTS || has_cavity(&d->family);
+    const bool whole = is_whole(&d->family);
     residuals r;
     sdm_status s = list_vertices(d, whole, err);
-    if (!s) s = measure(d, &r, err);
+    if (!s) s = measure(d, SAMPLES, &r, err);
     if (s) return s;
     bool bends = false;
     for (size_t c = 0; c < d->n_parts; c++) bends |= r.affine[c] > tolerance;
     if (bends && d->split && !whole) {
         s = split_parts(d, &r, tolerance, err);
-        if (!s && d->n_parts > 1) s = measure(d, &r, err);
+        if (!s && d->n_parts > 1) s = measure(d, SAMPLES, &r, err);
     }
     // a component that bends: the whole shape becomes one part with a warp
     if (!s && bends && d->n_parts != 1 && (!d->split || d->n_parts == 0)) {
         s = list_vertices(d, true, err);
-        if (!s) s = measure(d, &r, err);
+        if (!s) s = measure(d, SAMPLES, &r, err);
     }
     if (s) return s;
     choose_frames(d, &r, tolerance);

@@ -96,7 +96,7 @@ def test_derivatives_and_volumes_that_are_bad_warn_once(model_file, tmp_path):
         if use != "volume":
             name = refused.value.text.split(" % for ")[1].split(",")[0]
             known = any(f"by {name}: off by {told} %" in line for line in model.quality.unfit)
-            assert known or (name == "the worst parameter" and "; the training found" in refused.value.text)
+            assert known or (name == "the worst parameter" and "; in the words of the training: " in refused.value.text)
     if model.quality.grade != "poor":
         model.check_use("surface")
     with pytest.raises(sdmgen.ArgumentError, match="use"):

@@ -5,13 +5,15 @@
 #include "sdm/internal/train.h"
 #include "study/evaluate.h"
 
-/* Prints the line `next` (of a good model `better`, which has a grid for the uses that it leaves
-   out where its error is small), or nothing where the verdict advises nothing. Where a template
-   errs near the surface, the command trains `pod`, with so many minutes (0: the configuration gives
-   another budget), twice as many if `auto` has trained it in a part of them; if it was much worse
-   then, the line says that none helps. kind: that of the model, if network.kind was auto; the
-   command states it, so that it trains the same kind again, and a second line tells what a map
-   costs with it, ms_map; else NULL. */
+/* Prints the command for a better model: the line `next`, or `better` of a good model. Prints
+   nothing where the verdict advises nothing.
+   - A good model with a small error gets a grid for the first use that its lines `not for` leave
+     out.
+   - A template that errs near the surface gets a training of `pod` with `minutes` (0: the
+     configuration gives another budget), with twice as many if `auto` has trained `pod` in a part
+     of them; if `pod` was much worse then, the line says that no training helps.
+   kind: the kind of the model where network.kind was auto, else NULL. The command names it, so that
+   the same kind is trained again, and a second line tells the time of a map, ms_map. */
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
                     double ms_map, double minutes);
 

@@ -202,7 +202,7 @@ static sdm_status try_kind(trainer *t, sdm_config *config, const dataset *known,
     return s;
 }
 
-/* true: the trials take more than their part of a budget of time. */
+/* true: the trials of both kinds would take more than TRAINER_TRIALS_SHARE of train.minutes. */
 static bool lacks_time(const trainer *t, const trial_look *l)
 {
     return trainer_by_time(t) && l->trials > TRAINER_TRIALS_SHARE * 60 * t->config->train.minutes;
@@ -341,7 +341,7 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
     if (!s && e[0].finished && !done && !brief) s = try_kind(t, scratch, &l.maps, &e[1], err);
     if (!s) {
         const char *reason = decide(t, &l, &e[0], &e[1], done, out);
-        // a training of pod tells its own pace
+        // minutes for a later training of pod; where pod is trained now, its report has them
         out->pod_minutes = out->kind[0] == SDM_NETWORK_POD || done ? 0 : pod_minutes;
         const entrant *other = out->kind[0] == e[0].kind ? &e[1] : &e[0];
         out->tried_other = other->finished;

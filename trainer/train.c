@@ -17,6 +17,9 @@
 #include "train_folder.h"
 #include "training.h"
 
+/* Less than this part of the budget is no use for a second kind. */
+static const double ENOUGH_LEFT = 0.25;
+
 typedef struct run {
     const sdm_config *asked;
     sdm_config *settled; /* of the present training */
@@ -105,7 +108,7 @@ static sdm_status begin_second(run *r, const trainer *t, sdm_train_report *repor
     const double left = trainer_turns_left(&r->turns, r->asked);
     const char *first = trainer_turn_name(r->turns.kind[0]),
                *second = trainer_turn_name(r->turns.kind[1]);
-    if (left < TRAINER_ENOUGH_LEFT) {
+    if (left < ENOUGH_LEFT) {
         trainer_message(t, "auto: %s is kept: hardly any of the budget is left for %s", first,
                         second);
         report->unfinished = true;

@@ -5,6 +5,7 @@
 
 #include "fit_command.h"
 #include "measure/median.h"
+#include "sdm/internal/fit_finding.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
@@ -127,10 +128,8 @@ static sdm_status fit_turned(const cli_fit *f, const double start[3], bool *pass
         x[i] = i % 3 < 2 ? 2 * start[i % 3] - f->target.points[i] : f->target.points[i];
     turned.points = x;
     if (!s) s = sdm_fit(&f->source, &turned, &opts, &r, err);
-    *passes = !s;
-    for (size_t i = 0; i < r.verdict.n_findings; i++)
-        if (r.verdict.findings[i].kind == SDM_FIT_CHECK_RESIDUALS)
-            *passes = *passes && r.verdict.findings[i].grade == SDM_FIT_PASSED;
+    const sdm_fit_finding *residuals = sdm_fit_finding_of(&r.verdict, SDM_FIT_CHECK_RESIDUALS);
+    *passes = !s && !(residuals && residuals->grade != SDM_FIT_PASSED);
     sdm_fit_dispose(&r);
     sdm_free(x);
     return s == SDM_E_NOMEM || s == SDM_E_CANCELLED ? s : SDM_OK;

@@ -26,16 +26,6 @@ static bool is_left_out(const char *name, bool same_maps)
     return false;
 }
 
-/* The finding of this kind where it did not pass, else NULL. */
-static const sdm_fit_finding *unpassed(const cli_fit *f, sdm_fit_check_kind kind)
-{
-    for (size_t i = 0; i < f->result.verdict.n_findings; i++) {
-        const sdm_fit_finding *x = &f->result.verdict.findings[i];
-        if (x->kind == kind && x->grade != SDM_FIT_PASSED) return x;
-    }
-    return NULL;
-}
-
 /* Appends --name=value; a value may begin with a minus. */
 static void add_option(sdm_text *t, const char *name, const char *value)
 {
@@ -60,7 +50,9 @@ void cli_fit_print_next(const cli_fit *f)
                refused = f->doubt.status && !cli_fit_voxels_refuse(f),
                exact = !f->source.model || f->shape || f->judge_shape;
     if ((!exact && !more) || (refused && !more) || f->other_side || f->n_candidates ||
-        a->cohort.cases || (!voxels && !more && !unpassed(f, SDM_FIT_CHECK_NETWORK_ERROR)))
+        a->cohort.cases ||
+        (!voxels && !more &&
+         !cli_fit_found(f, SDM_FIT_CHECK_NETWORK_ERROR, SDM_FIT_DOUBTFUL, -INFINITY)))
         return;
     sdm_text t = {0};
     char text[96], price[80] = "";

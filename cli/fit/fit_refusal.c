@@ -3,14 +3,12 @@
 #include <string.h>
 
 #include "fit_command.h"
+#include "sdm/internal/fit_finding.h"
 
 bool cli_fit_found(const cli_fit *f, sdm_fit_check_kind kind, sdm_fit_grade grade, double figure)
 {
-    for (size_t i = 0; i < f->result.verdict.n_findings; i++) {
-        const sdm_fit_finding *x = &f->result.verdict.findings[i];
-        if (x->kind == kind && x->grade >= grade && !(x->figure < figure)) return true;
-    }
-    return false;
+    const sdm_fit_finding *x = sdm_fit_finding_of(&f->result.verdict, kind);
+    return x && x->grade >= grade && !(x->figure < figure);
 }
 
 bool cli_fit_is_unfinished(const cli_fit *f)
@@ -26,12 +24,8 @@ bool cli_fit_is_unfinished(const cli_fit *f)
 
 bool cli_fit_lacks_data(const cli_fit *f)
 {
-    const sdm_fit_verdict *v = &f->result.verdict;
-    for (size_t i = 0; i < v->n_findings; i++)
-        if (v->findings[i].kind == SDM_FIT_CHECK_CONVERGED)
-            return cli_fit_is_unfinished(f) &&
-                   strstr(v->findings[i].text, "the data hardly determine");
-    return false;
+    const sdm_fit_finding *x = sdm_fit_finding_of(&f->result.verdict, SDM_FIT_CHECK_CONVERGED);
+    return x && cli_fit_is_unfinished(f) && strstr(x->text, "the data hardly determine");
 }
 
 bool cli_fit_voxels_refuse(const cli_fit *f)

@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "fit_command.h"
+#include "sdm/internal/fit_finding.h"
 
 static const char *const GRADES[] = {
     [SDM_FIT_PASSED] = "passed", [SDM_FIT_DOUBTFUL] = "doubtful", [SDM_FIT_FAILED] = "FAILED"};
@@ -120,26 +121,17 @@ static bool only(const sdm_fit_verdict *v, sdm_fit_grade grade, const sdm_fit_ch
     return true;
 }
 
-/* Is this check among those that did not pass? */
-static bool doubts(const sdm_fit_verdict *v, sdm_fit_check_kind kind)
-{
-    for (size_t i = 0; i < v->n_findings; i++)
-        if (v->findings[i].kind == kind) return v->findings[i].grade != SDM_FIT_PASSED;
-    return false;
-}
-
 /* Are the points too few to test the fit? Then the check has no bound. */
 static bool untested(const sdm_fit_verdict *v)
 {
-    for (size_t i = 0; i < v->n_findings; i++)
-        if (v->findings[i].kind == SDM_FIT_CHECK_RESIDUALS)
-            return v->findings[i].grade == SDM_FIT_DOUBTFUL && isnan(v->findings[i].limit);
-    return false;
+    const sdm_fit_finding *x = sdm_fit_finding_of(v, SDM_FIT_CHECK_RESIDUALS);
+    return x && x->grade == SDM_FIT_DOUBTFUL && isnan(x->limit);
 }
 
 /* What a verdict that is not `passed` means for the user of the values. */
-static const char *in_short(const sdm_fit_verdict *v)
+static const char *in_short(const cli_fit *f)
 {
+    const sdm_fit_verdict *v = &f->result.verdict;
     static const sdm_fit_check_kind end[] = {SDM_FIT_CHECK_CONVERGED},
                                     part[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA},
                                     few[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA,
@@ -157,13 +149,13 @@ static const char *in_short(const sdm_fit_verdict *v)
         return "the data show a part of the shape: do not use what the lines below name, nor what "
                "is `not determined`";
     if (untested(v) && only(v, SDM_FIT_DOUBTFUL, few, sizeof few / sizeof *few))
-        return doubts(v, SDM_FIT_CHECK_COVERED)
+        return cli_fit_found(f, SDM_FIT_CHECK_COVERED, SDM_FIT_DOUBTFUL, -INFINITY)
                    ? "the data show a part of the shape, and too few points to test the fit: do "
                      "not use what the lines below name, nor what is `not determined`"
                    : "the points are too few to test the fit: its values may be right or wrong";
     if (only(v, SDM_FIT_DOUBTFUL, maps, sizeof maps / sizeof *maps))
         return "the maps limit the fit: the values are near, but their +- may be too small";
-    if (doubts(v, SDM_FIT_CHECK_VOXELS) &&
+    if (cli_fit_found(f, SDM_FIT_CHECK_VOXELS, SDM_FIT_DOUBTFUL, -INFINITY) &&
         only(v, SDM_FIT_DOUBTFUL, coarse, sizeof coarse / sizeof *coarse))
         return "the maps are too coarse for these data: fit with finer ones before you judge the "
                "values";
@@ -191,7 +183,7 @@ void cli_fit_print_verdict(const cli_fit *f)
     const sdm_fit_verdict *v = &f->result.verdict;
     if (!v->n_findings) return;
     printf("verdict: %s\n", cli_fit_grade_name(v->grade));
-    if (v->grade != SDM_FIT_PASSED) printf("  %-12s %s\n", "in short", in_short(v));
+    if (v->grade != SDM_FIT_PASSED) printf("  %-12s %s\n", "in short", in_short(f));
     if (f->source.model && !f->shape && !f->judge_shape && !f->shape_changed)
         printf("  %-12s not tested: the exact shape '%s' is not known here, so the error of "
                "the network is not measured, and the standard deviations may be too "

@@ -26,10 +26,11 @@ void teller_tell(teller *t, sdm_status weight, sdm_text *text);
 /* The same, for a finding that follows from no other. */
 void teller_tell_cause(teller *t, sdm_status weight, sdm_text *text);
 
-/* Tells "WHAT in 3 of 145 shapes, up to 12 at a=1 b=2": where there is no audit to say more. */
+/* Tells a finding by its count alone, "WHAT in 3 of 145 shapes, up to 12 at a=1 b=2", where the
+ * audit of the worst shape was not made. */
 void teller_tell_count(teller *t, sdm_status weight, const sdm_survey_count *c, const char *what);
 
-/* The end of a cause. */
+/* The last words of a finding from which other findings may follow. */
 #define TELLER_MEND_FIRST "; mend this first: findings that may follow from it are left out"
 
 /* Parameters that a line names at most. */
@@ -61,7 +62,7 @@ void teller_add_share(const cli_survey *s, const sdm_survey_count *c, sdm_text *
 void teller_add_count(const cli_survey *s, const sdm_survey_count *c, const char *what,
                       sdm_text *text);
 
-/* The tellers of SDM_SURVEY_MESHES, */
+/* Each of these functions tells some findings of one stage of the survey: of SDM_SURVEY_MESHES, */
 void tell_causes(teller *t);
 void tell_sizes(teller *t);
 void tell_params(teller *t);

@@ -594,25 +594,13 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     return s;
 }
 
-// tells that the steps are over, and the judgement begins
-static void announce_judgement(const fit_problem *p)
-{
-    if (!p->opts->progress) return;
-    sdm_fit_progress g = {
-        .phase = SDM_FIT_JUDGE, .iteration = p->n_steps, .params = p->state.params};
-    g.objective = sdm_fit_objective(p);
-    sdm_rotation_vector(p->state.rotation, g.pose.rotation);
-    memcpy(g.pose.translation, p->state.translation, sizeof g.pose.translation);
-    p->opts->progress(p->opts->user, &g);
-}
-
 /* From the state of *p to a verdict. *fitted: the state that the result reports. */
 static sdm_status attempt(fit_problem *p, sdm_fit_result *out, fit_state *fitted, sdm_error *err)
 {
     // 5. maximise the posterior; 6. covariance
     sdm_status s = maximise(p, out, err);
     const double from = sdm_clock();
-    if (!s) announce_judgement(p);
+    if (!s) sdm_fit_tell_progress(p, SDM_FIT_JUDGE, 0);
     if (!s) s = assess(p, out, err);
     if (!s) sdm_fit_accept_small_steps(p, out);
     // 7. report the result, also of a fit that failed with SDM_E_QUALITY; 8. judge it

@@ -48,7 +48,7 @@ check() {
         own("shape", "callback conformance isolation mesh_measures registry shape_box shape_repeat shape_sums shape_survey skipped")
         own("shapes", "builtin_shapes")
         own("runtime", "check field fit phantom runtime vdb")
-        own("runtime", "hardly_known model_mesh vdb_memory")
+        own("runtime", "fit_finding hardly_known model_mesh vdb_memory")
          own("all", "sdmgen") # the header that includes all public ones
          own("trainer", "comm map_store ssm_build train train_file train_plan verdict")
         parts("core", "core")

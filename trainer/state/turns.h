@@ -4,9 +4,6 @@
 
 #include "sdm/internal/train.h"
 
-/* Less than this part of the budget is no use for the second kind. */
-#define TRAINER_ENOUGH_LEFT 0.25
-
 /* The errors of one of the kinds that are compared, root mean squares in mm. */
 typedef struct turn_figures {
     sdm_network_kind kind;

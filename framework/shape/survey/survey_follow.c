@@ -62,7 +62,8 @@ static sdm_status find_folds(survey *v, int n_threads, sdm_error *err)
     return status;
 }
 
-/* Line number i follows parameter i % n_params from a sample. */
+/* Looks for jumps of the mesh while parameter i % n_params goes through its range and the other
+ * parameters keep the values of a sample. */
 static sdm_status follow_one(void *user, size_t i, sdm_mesh *mesh, sdm_error *err)
 {
     (void)mesh;

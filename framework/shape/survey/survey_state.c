@@ -1,4 +1,5 @@
-/* When a survey stops, and its loops over shapes. */
+/* Tells when a survey has to stop, counts findings, and runs a function for every shape on several
+ * threads. */
 #include "survey_state.h"
 
 #include <math.h>

@@ -14,6 +14,7 @@
 #include "finding.h"
 #include "offset.h"
 #include "rival.h"
+#include "sdm/internal/fit_finding.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/shared.h"
 #include "suffice.h"
@@ -120,9 +121,8 @@ static void check_basics(const fit_problem *p, const sdm_fit_result *r, sdm_fit_
 
 static bool has_passed(const sdm_fit_verdict *v, sdm_fit_check_kind kind)
 {
-    for (size_t i = 0; i < v->n_findings; i++)
-        if (v->findings[i].kind == kind) return v->findings[i].grade == SDM_FIT_PASSED;
-    return true;
+    const sdm_fit_finding *x = sdm_fit_finding_of(v, kind);
+    return !x || x->grade == SDM_FIT_PASSED;
 }
 
 // Parameters at an end of their range. Where the data want more and do not match the shape as it

@@ -6,6 +6,7 @@
 
 #include "finding.h"
 #include "noise.h"
+#include "sdm/internal/fit_finding.h"
 #include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/vec3.h"
@@ -268,9 +269,8 @@ void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm
     if (known && 2 * open >= counted && open) {
         // the finding on the number of points stays the first reason
         char before[sizeof v->findings->text + 2] = "";
-        for (size_t i = 0; i < v->n_findings; i++)
-            if (v->findings[i].kind == SDM_FIT_CHECK_DATA && *v->findings[i].text)
-                snprintf(before, sizeof before, "%s; ", v->findings[i].text);
+        const sdm_fit_finding *points = sdm_fit_finding_of(v, SDM_FIT_CHECK_DATA);
+        if (points && *points->text) snprintf(before, sizeof before, "%s; ", points->text);
         sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_DOUBTFUL, (double)(counted - open),
                           (double)counted,
                           "%s%zu of %zu parameters are not determined by the data: their standard "

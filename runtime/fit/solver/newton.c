@@ -351,26 +351,29 @@ double sdm_fit_unrest(const fit_problem *p, size_t i)
     return fmax(0.5 * (high - low), fabs(mean));
 }
 
+void sdm_fit_tell_progress(const fit_problem *p, sdm_fit_phase phase, double step)
+{
+    if (!p->opts->progress) return;
+    sdm_fit_progress g = {.phase = phase,
+                          .iteration = p->n_steps,
+                          .objective = sdm_fit_objective(p),
+                          .step = step,
+                          .params = p->state.params,
+                          .round = p->search_round,
+                          .start = p->search_start,
+                          .n_starts = p->search_starts,
+                          .best_params = p->search_best};
+    sdm_rotation_vector(p->state.rotation, g.pose.rotation);
+    memcpy(g.pose.translation, p->state.translation, sizeof g.pose.translation);
+    p->opts->progress(p->opts->user, &g);
+}
+
 // reports an iteration and, except in the search, stores its objective
 static sdm_status iteration_record(fit_problem *p, const fit_newton_opts *opts, double step,
                                    sdm_error *err)
 {
-    const double objective = sdm_fit_objective(p);
     p->n_steps++;
-    if (p->opts->progress) {
-        sdm_fit_progress g = {.phase = opts->phase,
-                              .iteration = p->n_steps,
-                              .objective = objective,
-                              .step = step,
-                              .params = p->state.params,
-                              .round = p->search_round,
-                              .start = p->search_start,
-                              .n_starts = p->search_starts,
-                              .best_params = p->search_best};
-        sdm_rotation_vector(p->state.rotation, g.pose.rotation);
-        memcpy(g.pose.translation, p->state.translation, sizeof g.pose.translation);
-        p->opts->progress(p->opts->user, &g);
-    }
+    sdm_fit_tell_progress(p, opts->phase, step);
     if (opts->phase == SDM_FIT_SEARCH) return SDM_OK;
     if (p->n_iterations == p->objective_capacity) {
         const size_t now = 2 * p->objective_capacity + 16;
@@ -379,7 +382,7 @@ static sdm_status iteration_record(fit_problem *p, const fit_newton_opts *opts, 
         if (s) return s;
         p->objective_capacity = now;
     }
-    p->objective[p->n_iterations++] = objective;
+    p->objective[p->n_iterations++] = sdm_fit_objective(p);
     return SDM_OK;
 }
 

@@ -48,6 +48,10 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
    there were fewer iterations, or if damping hid the steps. In the unit of the covariance. */
 double sdm_fit_unrest(const fit_problem *p, size_t i);
 
+/* Calls sdm_fit_opts.progress, if there is one, with the state of *p. step: as in sdm_fit_progress.
+ */
+void sdm_fit_tell_progress(const fit_problem *p, sdm_fit_phase phase, double step);
+
 /* *to = *from moved by step[information.n_unknowns]: parameters are clamped to their bounds; the
    rotation step (rad) is a rotation vector about the world's axes, applied after the pose. */
 void sdm_fit_state_move(const fit_problem *p, const fit_state *from, const double *step,

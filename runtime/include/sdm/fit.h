@@ -444,9 +444,10 @@ typedef struct sdm_fit_result {
     char reason[256];
     /* number of iterations of the main phase and the polish */
     size_t n_iterations;
-    /* [n_iterations] log-posterior density after each iteration, up to a constant. Compare two
-       values only if they have the same voxels (the region follows the shape), weights of the
-       priors, sd of the tissues and tissue weights in space */
+    /* [n_iterations] log-posterior density after each iteration, up to a constant. It may jump
+       from one iteration to the next where the fit has chosen other voxels (they follow the shape),
+       other weights of the priors or other standard deviations of the tissues: values on both sides
+       of a jump cannot be compared */
     double *objective;
     /* log-likelihood of the target at the estimate */
     double log_likelihood;

@@ -201,8 +201,9 @@ typedef struct sdm_shape_survey {
      * parts; not looked at where meshes are broken */
     bool *still;
     size_t fold_tested;   /* number of shapes that were compared with shape 0 */
-    size_t fold_untested; /* shapes left out there for want of time */
-    /* left out for want of time: the search that widens the box, velocities, `still` */
+    size_t fold_untested; /* shapes that were not followed, for want of time */
+    /* not tested, for want of time: the largest extent of the shapes, velocity() at some shapes,
+     * parameters that move no surface */
     bool box_untested, velocity_untested, still_untested;
     double folded_at;      /* where on the way to the worst of them: 0 at shape 0, 1 at the worst */
     sdm_survey_jump *jump; /* [n_params] the worst break along each parameter */

@@ -9,14 +9,18 @@
 #include <unistd.h>
 
 #include "args/options.h"
+#include "sdm/internal/clock.h"
 #include "sdm/internal/utf8.h"
+
+#define REPEAT_S 0.5
 
 static bool quiet_wanted;
 static cli_form form;
 static bool incomplete;
 static size_t warnings;
 static volatile sig_atomic_t interrupts;
-static bool unprinted; // by cli_print()
+static volatile double first_interrupt; // seconds of sdm_clock(); only the handler uses it
+static bool unprinted;                  // by cli_print()
 
 static int exit_code_of(sdm_status status)
 {
@@ -221,10 +225,15 @@ void cli_warn(const char *fmt, ...)
 
 size_t cli_warnings(void) { return warnings; }
 
+/* The first interrupt asks the work to stop, and a later one ends the program at once. timeout and
+ * job schedulers send the same signal to the process and to its group: within REPEAT_S that is one
+ * interrupt. */
 static void on_interrupt(int number)
 {
     (void)number;
-    if (interrupts) _exit(CLI_EXIT_INTERRUPTED);
+    const double now = sdm_clock(); // clock_gettime(): safe in a signal handler
+    if (interrupts && now > first_interrupt + REPEAT_S) _exit(CLI_EXIT_INTERRUPTED);
+    if (!interrupts) first_interrupt = now;
     interrupts = 1;
 }
 

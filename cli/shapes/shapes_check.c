@@ -125,7 +125,9 @@ static void print_stage(void *user, sdm_survey_stage stage)
     if (stage == SDM_SURVEY_MESHES) {
         printf("%s: the default shape, %zu corners of the ranges, %zu random shapes\n",
                sdm_instance_shape(c->survey.shape)->name, f->n_corners, f->n_samples);
-        printf("mesh     %zu vertices, %zu triangles, %.3g ms\n", f->n_vert, f->n_tri, f->ms_mesh);
+        if (f->n_vert)
+            printf("mesh     %zu vertices, %zu triangles, %.3g ms\n", f->n_vert, f->n_tri,
+                   f->ms_mesh);
     }
     if (!c->printed) c->printed = cli_survey_tell(&c->survey, stage, print_line, NULL, &c->why);
     c->told |= stage;

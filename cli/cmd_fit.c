@@ -107,6 +107,7 @@ static sdm_status fit_shape(cli_fit *f, sdm_error *err)
     cli_progress_start(&w.bar);
     if (f->args->fit.find) cli_progress_show(&w.bar, "search", 0, "the whole image");
     sdm_status s = f->args->fit.find ? cli_fit_find(f, err) : cli_fit_run(f, err);
+    if (!s && !f->args->fit.find) s = cli_fit_go_finer(f, err);
     cli_progress_end(&w.bar, !s && (!f->doubt.status || f->doubt.status == SDM_E_QUALITY));
     f->found = f->result.objective && f->result.params;
     cli_fit_doubt_changed_shape(f);

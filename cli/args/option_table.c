@@ -262,7 +262,8 @@ const cli_option cli_options[] = {
     /* the method */
     {"spacing", 0, CLI_REAL13, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(spacing),
      "voxel edge of exact maps, in the shape's frame (default: 64 voxels along the longest edge, "
-     "for a thin part up to 128; or the grid of the model)"},
+     "for a thin part up to 128, and finer at the end where the data need it; or the grid of the "
+     "model)"},
     {"policy", 0, CLI_CHOICE, NULL, "refuse|clamp|exact", 0, 0, ON(CLI_GENERATE) | ON(CLI_FIT),
      AT(policy),
      "parameters outside the trained range: refuse (default), clamp to the nearest allowed value, "

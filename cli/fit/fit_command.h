@@ -56,6 +56,11 @@ typedef struct cli_fit {
      * finer; 0: it was not */
     double thinnest;
 
+    /* fit_finer.c: voxels (mm) of the maps of the first fit, after which one with finer maps
+     * followed, and beside which part of the shape or the data they are coarse; 0: none followed */
+    double coarse_mm;
+    char coarse_beside[64];
+
     /* fit_target.c: the image, labels or points to fit to */
     sdm_volume image;
     float *mask;    /* [nz][ny][nx] labels, 1 inside, 0 outside; NULL: the target is no label map */
@@ -115,6 +120,18 @@ sdm_status cli_fit_open_source(cli_fit *f, sdm_error *err);
  * its longest edge and, for volumes, up to 128 where the thinnest part of the start shape would
  * have less than three voxels across it. SDM_E_ARG; errors of making the shape. */
 sdm_status cli_fit_make_grid(cli_fit *f, sdm_error *err);
+
+/* *out = the grid of exact maps with voxels of `spacing` mm that holds the shape at the parameters,
+ * and with any of them at an end of its range. SDM_E_ARG; errors of making the shape. */
+sdm_status cli_fit_finer_grid(const cli_fit *f, const double *params, double spacing, sdm_grid *out,
+                              sdm_error *err);
+
+/* After cli_fit_run(): where the command line leaves the voxels of exact maps open and nothing but
+ * them leaves the fit in doubt, goes on from its result with the voxels that its verdict advises,
+ * and f->result is that of the second fit. Nothing where these are too many, or a prior of the pose
+ * is given. Where the second fit ends with an error other than SDM_E_QUALITY, the first result
+ * stays, and a warning tells why. SDM_E_CANCELLED. */
+sdm_status cli_fit_go_finer(cli_fit *f, sdm_error *err);
 
 /* After cli_fit_open_source(): reads --depth. With --measure it measures the shape at the start, so
  * that a mistake ends the command before the fit. SDM_E_ARG, SDM_E_PLUGIN. */

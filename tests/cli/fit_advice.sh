@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: a refused fit names its likely cause: a start away from the data, points in another frame, exchanged values.
-# Tests: fit_astray.c fit_correlated.c cause.c
+# Tests: fit_astray.c fit_correlated.c fit_finer.c cause.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 negate() { awk -F, 'NR == 1 { print; next } { printf "%g,%g,%s\n", -$1, -$2, $3 }' "$1"; }
@@ -56,6 +56,21 @@ grep -q 'a wrong start' err && bad 'a wrong start is named beside coarse maps'
 has '^finer maps from here; [0-9.]+ times as many voxels, up to [0-9.e+]+ (s|minutes):$'
 eval "$(sed -n 's/^  sdmgen fit/expect 0 - sdmgen fit/p' out)"
 has '^verdict: (passed|doubtful)$'
+
+# Without --spacing the fit goes on by itself: labels pass with maps of up to 1.5 times their voxels, and the true radius lies within three deviations.
+expect 0 - sdmgen phantom --shape capsule -p radius=0.6 -p length=1 --spacing 0.11 -o small.nii --label small-label.nii --truth small.json --quiet
+small='sdmgen fit --shape capsule -p radius=0.7 -p length=1.2 --label 1 --rotation 0,0,0 --quiet'
+expect 0 - $small small-label.nii --margin 0.5 --truth small.json
+has '^verdict: passed$'
+has '^  maps .*, voxels of 0\.13[0-9]* mm, because those of 0\.1[78][0-9]* mm at first were coarse beside the voxels of the labels$'
+has '^  radius .* truth 0\.6, off by [0-2]\.[0-9] sd$'
+grep -q 'finer maps from here' out && bad 'the command of a fit that went on by itself'
+# Maps that would be too large are left to the user.
+expect 0 - sdmgen phantom --shape capsule -p radius=0.6 -p length=1 --spacing 0.05 -o fine.nii --label fine-label.nii --quiet
+expect 0 - $small fine-label.nii --margin 0.3
+has '^  map voxels   doubtful .* coarse beside the voxels of the labels'
+has '^finer maps from here; '
+has '^  maps .*, voxels of 0\.1[78][0-9]* mm$'
 
 # Exchanged values of a thin shape beside its place: as much of both tissues lies within the start as around it.
 expect 0 - sdmgen phantom --shape torus -O edge=0.5 --spacing 0.4 -o torus.nii --quiet

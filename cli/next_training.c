@@ -239,6 +239,25 @@ static void print_finish(const char *begin, const cli_args *args, const sdm_trai
     printf(")\n");
 }
 
+/* *use = the first use in `not for` that a finer grid gives back, NULL: none. Returns the spacing
+ * of this grid. */
+static double finer_use(const sdm_verdict *v, const char **use)
+{
+    const double volumes = sdm_verdict_spacing(v), fits = sdm_verdict_fit_spacing(v);
+    *use = isfinite(volumes) ? "volumes of surfaces"
+           : isfinite(fits)  ? "fits by the network alone"
+           : v->volume_derivatives_bad[0] && v->volume_derivative_voxels > SDM_DERIVATIVE_BAD
+               ? "derivatives of the volume"
+               : NULL;
+    return isfinite(volumes) ? volumes : isfinite(fits) ? fits : 0.5 * v->coarse_mm;
+}
+
+/* The key that the sentence of the verdict names, without a number too; "": none. */
+static const char *named_key(const sdm_verdict *v)
+{
+    return !v->key[0] && v->limited && v->limit == SDM_CAUSE_ROUNDING ? "network.weights" : v->key;
+}
+
 /* The line `better` of a good model whose error at the surface is small: a grid for the first use
  * that it leaves out for its voxels, or that nothing needs to change. Returns whether it is
  * printed.
@@ -247,21 +266,21 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
                          double minutes)
 {
     const sdm_verdict *v = &r->verdict;
-    const double volumes = sdm_verdict_spacing(v), voxels = v->rmse_voxel_mm / v->voxel_mm,
-                 spacing = isfinite(volumes) ? volumes : sdm_verdict_fit_spacing(v),
+    const char *use, *named = named_key(v);
+    const double voxels = v->rmse_voxel_mm / v->voxel_mm, spacing = finer_use(v, &use),
                  factor = pow(v->coarse_mm / spacing, 3);
     char unfit[SDM_MODEL_UNFIT], wait[80] = "nothing else needs to change";
     sdm_verdict_unfit(v, unfit);
     if (v->grade != SDM_GRADE_GOOD || !(voxels < SMALL) || !strncmp(v->key, "grid.", 5))
         return false;
-    if (v->key[0]) snprintf(wait, sizeof wait, "%s, named by the verdict, can wait", v->key);
+    if (*named) snprintf(wait, sizeof wait, "%s, named by the verdict, can wait", named);
     if (!unfit[0]) {
         printf(
             "  better      %s: the error at the surface is %.2g voxels, and no use is left out\n",
-            v->key[0] ? wait : "nothing needs to change", voxels);
+            *named ? wait : "nothing needs to change", voxels);
         return true;
     }
-    if (!(factor > 1 && factor <= FINER) || !args->files.n || args->dataset) return false;
+    if (!use || !(factor > 1 && factor <= FINER) || !args->files.n || args->dataset) return false;
     sdm_verdict finer = {.to = spacing,
                          .minutes = r->steps > 0 ? ceil(2 * factor * minutes) / 2 : 0};
     strcpy(finer.key, "grid.spacing");
@@ -269,8 +288,7 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
     printf(
         "              (for %s, which `not for` leaves out: %.2g times the voxels; %s: the error "
         "at the surface is %.2g voxels)\n",
-        isfinite(volumes) ? "volumes of surfaces" : "fits by the network alone", factor, wait,
-        voxels);
+        use, factor, wait, voxels);
     return true;
 }
 

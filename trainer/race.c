@@ -208,6 +208,13 @@ static bool lacks_time(const trainer *t, const trial_look *l)
     return trainer_by_time(t) && l->trials > TRAINER_TRIALS_SHARE * 60 * t->config->train.minutes;
 }
 
+/* true: there is no time for trials, and pod is taken without one: a template is not likely to be
+ * kept. */
+static bool takes_pod(const trainer *t, const trial_look *l, size_t n_params)
+{
+    return lacks_time(t, l) && l->bends && n_params <= FEW_PARAMS;
+}
+
 /* With a budget of time: looks at the shape, and tells how many maps fit into the budget. *minutes
  * = those that hold the maps which the parameters ask for, 0: the budget does. */
 static sdm_status look(trainer *t, sdm_config *scratch, trial_look *l, double *minutes,
@@ -228,9 +235,10 @@ static sdm_status look(trainer *t, sdm_config *scratch, trial_look *l, double *m
     if (lacks_time(t, l))
         trainer_message(t,
                         "auto: trials of both kinds would take about %.3g s, and a fifth of "
-                        "train.minutes is %.3g s: one kind is chosen without (for trials raise "
-                        "train.minutes to %.4g)",
+                        "train.minutes is %.3g s: %s (for both raise train.minutes to %.4g)",
                         l->trials, TRAINER_TRIALS_SHARE * budget,
+                        takes_pod(t, l, n_params) ? "pod is taken without trials"
+                                                  : "template alone has one",
                         ceil(10 * l->trials / (60 * TRAINER_TRIALS_SHARE)) / 10);
     return SDM_OK;
 }
@@ -334,8 +342,7 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
     sdm_status s = look(t, scratch, &l, &pod_minutes, err);
     const bool brief = lacks_time(t, &l);
     // where a template is likely to be kept, its trial is the beginning of its training
-    if (!s && !(brief && l.bends && n_params <= FEW_PARAMS))
-        s = try_kind(t, scratch, &l.maps, &e[0], err);
+    if (!s && !takes_pod(t, &l, n_params)) s = try_kind(t, scratch, &l.maps, &e[0], err);
     const bool done =
         e[0].finished && trainer_score(&e[0].errors) < ENOUGH * t->config->grid.spacing[0];
     if (!s && e[0].finished && !done && !brief) s = try_kind(t, scratch, &l.maps, &e[1], err);

@@ -1,5 +1,5 @@
-/* The line `next` of a template that errs near the surface: pod, with more minutes where auto has
- * given it a part of them, or none where it was much worse. Tests: next_training.c */
+/* The lines `next`, `better` and `faster` below the verdict on a training. Tests: next_training.c
+ */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,8 +12,14 @@
 
 #include "next_training.h"
 
-/* text, second = the first two lines that cli_print_next() prints; "": nothing. */
-static void next_lines(const sdm_train_report *r, double minutes, char text[512], char second[512])
+typedef struct printer {
+    const sdm_train_report *r;
+    double minutes;
+    const cli_timing *times; /* of cli_print_pod(); NULL: cli_print_next() */
+} printer;
+
+/* text, second = the first two lines that the function prints; "": nothing. */
+static void lines_of(printer p, char text[512], char second[512])
 {
     const char *words[] = {"can.yaml", "train.minutes=1"};
     const cli_args args = {.files = {.items = words, .n = 2}};
@@ -21,7 +27,10 @@ static void next_lines(const sdm_train_report *r, double minutes, char text[512]
     fflush(stdout);
     const int before = dup(STDOUT_FILENO);
     assert_true(file && before >= 0 && dup2(fileno(file), STDOUT_FILENO) >= 0);
-    cli_print_next(&args, r, "template", 1, minutes);
+    if (p.times)
+        cli_print_pod(&args, p.r, p.times, p.minutes);
+    else
+        cli_print_next(&args, p.r, "template", 1, p.minutes);
     fflush(stdout);
     dup2(before, STDOUT_FILENO);
     close(before);
@@ -29,6 +38,11 @@ static void next_lines(const sdm_train_report *r, double minutes, char text[512]
     if (!fgets(text, 512, file)) text[0] = '\0';
     if (!fgets(second, 512, file)) second[0] = '\0';
     fclose(file);
+}
+
+static void next_lines(const sdm_train_report *r, double minutes, char text[512], char second[512])
+{
+    lines_of((printer){.r = r, .minutes = minutes}, text, second);
 }
 
 static void template_that_errs_near_the_surface(void **state)
@@ -113,9 +127,77 @@ static void grid_or_key(void **state)
                         "              (template again; network.kind=auto would choose anew)\n");
 }
 
+// Without another fault a good model needs nothing but the grid for the use that it leaves out; a
+// verdict that names weights, and so no number, is not contradicted.
+static void finer_grid_alone(void **state)
+{
+    (void)state;
+    char text[512], second[512];
+    sdm_train_report r = {.model_path = "run/model.sdm",
+                          .steps = 1000,
+                          .verdict = {.grade = SDM_GRADE_GOOD,
+                                      .voxel_mm = 3,
+                                      .coarse_mm = 3,
+                                      .rmse_voxel_mm = 0.03,
+                                      .dice = 0.99,
+                                      .thickness_mm = 30}};
+    next_lines(&r, 1, text, second);
+    assert_string_equal(text, "  better      nothing needs to change: the error at the surface is "
+                              "0.01 voxels, and no use is left out\n");
+    r.verdict.limited = true, r.verdict.limit = SDM_CAUSE_ROUNDING;
+    next_lines(&r, 1, text, second);
+    assert_string_equal(text, "  better      network.weights, named by the verdict, can wait: the "
+                              "error at the surface is 0.01 voxels, and no use is left out\n");
+    // derivatives of the volume, to which voxels leave no other way
+    r.verdict.limited = false;
+    strcpy(r.verdict.volume_derivatives_bad, "height: off by 28 %");
+    r.verdict.volume_derivative_voxels = 0.25;
+    next_lines(&r, 1, text, second);
+    assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.5 "
+                              "train.minutes=8 network.kind=template --out run-2\n");
+    assert_string_equal(second, "              (for derivatives of the volume, which `not for` "
+                                "leaves out: 8 times the voxels; nothing else needs to change: "
+                                "the error at the surface is 0.01 voxels)\n");
+    // a network that errs needs no finer grid
+    r.verdict.volume_derivative_voxels = 0.04;
+    next_lines(&r, 1, text, second);
+    assert_string_equal(text, "");
+}
+
+// A pod that auto has trained, too, and that takes less than a fifth of the template's time is
+// named with its errors and its file; one that takes more, or is poor, is not.
+static void faster_pod(void **state)
+{
+    (void)state;
+    char text[512], second[512];
+    const cli_timing times = {.ms_network = 5, .ms_exact = 50};
+    sdm_train_report r = {.model_path = "run/model.sdm",
+                          .kind = SDM_NETWORK_TEMPLATE,
+                          .compared = true,
+                          .other = {.rmse_mm = 0.03},
+                          .other_voxel_mm = 0.05,
+                          .other_ms = 0.5,
+                          .other_grade = SDM_GRADE_GOOD,
+                          .other_path = "run/model-pod.sdm",
+                          .verdict = {.grade = SDM_GRADE_GOOD, .voxel_mm = 3, .dice = 0.99}};
+    const printer p = {.r = &r, .minutes = 1, .times = &times};
+    lines_of(p, text, second);
+    assert_string_equal(text, "  faster      a map of pod takes 0.5 ms, 10 times less than one of "
+                              "this template, with RMSE 0.03 mm, within a voxel of the surface "
+                              "0.05 mm\n");
+    assert_string_equal(second, "              pod is run/model-pod.sdm (good)\n");
+    r.other_ms = 1.1;
+    lines_of(p, text, second);
+    assert_string_equal(text, "");
+    r.other_ms = 0.5, r.other_grade = SDM_GRADE_POOR;
+    lines_of(p, text, second);
+    assert_string_equal(text, "");
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(template_that_errs_near_the_surface),
-                                       cmocka_unit_test(grid_or_key)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(template_that_errs_near_the_surface), cmocka_unit_test(grid_or_key),
+        cmocka_unit_test(finer_grid_alone), cmocka_unit_test(faster_pod)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -533,7 +533,30 @@ static void uses_and_spacing(void **state)
                                "its thinnest part and volumes of surfaces (.stl): it is 1 mm "
                                "thick in a few held-out shapes, too thin for voxels of 0.8 mm, "
                                "and will be missing or broken; grid.spacing 0.5 shows it\n"
-                               "derivatives of maps by r: off by 32 %\n");
+                               "derivatives of maps by r: off by 32 %; the network errs, exact "
+                               "--jacobian does not\n");
+    // what mends derivatives of the volume: what exact maps on the same voxels lack
+    static const struct {
+        double voxels;
+        const char *end;
+    } causes[] = {
+        {NAN, "by r: off by 50 %\n"},
+        {0.25, "by r: off by 50 %; exact maps on voxels of 0.8 mm err by 25 %: take a finer "
+               "grid.spacing, or differences of meshes\n"},
+        {0.15, "by r: off by 50 %; exact maps on voxels of 0.8 mm err by 15 %: train longer on a "
+               "finer grid.spacing, or take differences of meshes\n"},
+        {0.04, "by r: off by 50 %; exact maps on voxels of 0.8 mm err by 4 %: the network errs, "
+               "train it as `verdict` says, or take differences of meshes\n"}};
+    v.derivatives_bad[0] = '\0';
+    strcpy(v.volume_derivatives_bad, "r: off by 50 %");
+    for (size_t i = 0; i < sizeof causes / sizeof *causes; i++) {
+        v.volume_derivative_voxels = causes[i].voxels;
+        sdm_verdict_unfit(&v, lines);
+        const char *at = strstr(lines, "derivatives of the volume by ");
+        if (!at || strcmp(at + strlen("derivatives of the volume "), causes[i].end))
+            fail_msg("%s", lines);
+    }
+    v.volume_derivatives_bad[0] = '\0';
     v.volume_error = NAN;
     v.grade = SDM_GRADE_USABLE, v.thickness_mm = 1;
     assert_string_equal(sdm_grade_text(&v, text), "for pictures, segmentations and first fits");

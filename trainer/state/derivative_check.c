@@ -14,6 +14,7 @@
 #include "sdm/map.h"
 #include "sdm/memory.h"
 #include "sdm/model.h"
+#include "volume_check.h"
 
 /* Of those that hardly change the volume so many are named. */
 enum { SMALL_NAMED = 4 };
@@ -248,7 +249,21 @@ static void take_largest(const dataset *d, const slope_sums *sums, derivative_ch
 
 void trainer_derivatives_unknown(derivative_check *out)
 {
-    *out = (derivative_check){.slope = NAN, .volume_slope = NAN};
+    *out = (derivative_check){.slope = NAN, .volume_slope = NAN, .voxels_slope = NAN};
+}
+
+/* Sets out->voxels_slope: whether voxels or the network cause the largest error of the volume. */
+static sdm_status find_voxels_slope(const trainer *t, derivative_check *out, sdm_error *err)
+{
+    const dataset *d = &t->data;
+    size_t worst = d->n_params;
+    for (size_t k = 0; k < d->n_params; k++)
+        if (!out->volume_small[k] && out->volume_own[k] > SDM_DERIVATIVE_BAD &&
+            (worst == d->n_params || out->volume_own[k] > out->volume_own[worst]))
+            worst = k;
+    if (worst == d->n_params) return SDM_OK;
+    return trainer_derivative_of_voxels(t, worst, STEP * (d->max[worst] - d->min[worst]),
+                                        &out->voxels_slope, err);
 }
 
 static size_t shapes_wanted(size_t n_params)
@@ -287,8 +302,9 @@ sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, deriva
         s = check_slopes(t, m, p, &c, sums, &out->shapes, err);
     }
     memory_dispose(&c);
-    if (!s && out->shapes) take_largest(d, sums, out);
-    return s;
+    if (s || !out->shapes) return s;
+    take_largest(d, sums, out);
+    return find_voxels_slope(t, out, err);
 }
 
 /* true: parameter a comes before b in the list. */

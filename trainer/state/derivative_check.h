@@ -22,6 +22,10 @@ typedef struct derivative_check {
        the parameter does not change the volume: infinite if the figure above exceeds
        SDM_DERIVATIVE_BAD, else NaN. */
     double volume_own[SDM_POD_MAX_PARAMS];
+    /* The error of volume_own that exact maps on the same voxels have, of the parameter with the
+       largest one that changes the volume by at least 5 %; NaN: no such error exceeds
+       SDM_DERIVATIVE_BAD. */
+    double voxels_slope;
     bool still[SDM_POD_MAX_PARAMS];        /* it moves no part of the surface over its range */
     bool volume_small[SDM_POD_MAX_PARAMS]; /* it changes it by less than 5 % over its range */
 } derivative_check;

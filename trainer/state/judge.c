@@ -429,6 +429,7 @@ static void set_derivatives(const trainer *t, const derivative_check *c, sdm_ver
     v->derivative_shapes = (int64_t)c->shapes;
     v->derivative_error = c->slope;
     v->volume_derivative_error = c->volume_slope;
+    v->volume_derivative_voxels = c->voxels_slope;
     if (c->shapes) trainer_list_still(p, c->still, n, v->still_params);
     if (isfinite(c->slope)) trainer_list_derivatives(p, c->slopes, n, v->derivatives_bad);
     if (isfinite(c->volume_slope)) {

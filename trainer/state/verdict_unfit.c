@@ -74,16 +74,43 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
             SDM_GRID_FIT_ADVISED * SDM_GRID_FIT_DATA);
 }
 
+/* text[160] = what causes the error of derivatives of the volume, and what mends it; "": not
+ * measured. */
+static void write_cause(const sdm_verdict *v, char text[160])
+{
+    char error[16];
+    const double voxels = v->volume_derivative_voxels;
+    *text = '\0';
+    if (!(voxels > 0)) return;
+    snprintf(text, 160, "; exact maps on voxels of %.3g mm err by %s %%: %s", v->coarse_mm,
+             percent(voxels, error),
+             voxels > SDM_DERIVATIVE_BAD ? "take a finer grid.spacing, or differences of meshes"
+             : voxels > 0.5 * SDM_DERIVATIVE_BAD
+                 ? "train longer on a finer grid.spacing, or take differences of meshes"
+                 : "the network errs, train it as `verdict` says, or take differences of meshes");
+}
+
+/* Of the distances at the voxels themselves the network has all of the error. */
+static void add_derivatives(const sdm_verdict *v, unfit_lines *l)
+{
+    char cause[160];
+    write_cause(v, cause);
+    if (v->derivatives_bad[0])
+        add(l, "derivatives of maps by %s; the network errs, exact --jacobian does not",
+            v->derivatives_bad);
+    if (v->volume_derivatives_bad[0])
+        add(l, "derivatives of the volume by %s%s", v->volume_derivatives_bad, cause);
+    if (v->volume_derivatives_small[0])
+        add(l, "derivatives of the volume by %s; take differences of meshes",
+            v->volume_derivatives_small);
+}
+
 void sdm_verdict_unfit(const sdm_verdict *v, char text[SDM_MODEL_UNFIT])
 {
     unfit_lines l = {.text = text};
     *text = '\0';
     add_parts(v, &l);
-    if (v->derivatives_bad[0]) add(&l, "derivatives of maps by %s", v->derivatives_bad);
-    if (v->volume_derivatives_bad[0])
-        add(&l, "derivatives of the volume by %s", v->volume_derivatives_bad);
-    if (v->volume_derivatives_small[0])
-        add(&l, "derivatives of the volume by %s", v->volume_derivatives_small);
+    add_derivatives(v, &l);
     if (v->triangles_by[0])
         add(&l,
             "derivatives of exact maps (exact --jacobian, fit --exact or --polish) where the "

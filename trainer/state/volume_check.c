@@ -1,7 +1,8 @@
-/* Compares volumes of the model's maps and of their surfaces with those of the meshes. */
+/* Compares volumes of maps and of their surfaces with those of the meshes. */
 #include "volume_check.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "data/surface_check.h"
 #include "sdm/internal/model_threads.h"
@@ -10,8 +11,8 @@
 #include "sdm/map.h"
 #include "sdm/memory.h"
 
-/* Shapes whose volumes are compared. */
-enum { SHAPES = 20 };
+/* Shapes whose volumes are compared, and differences of whose volumes. */
+enum { SHAPES = 20, SLOPE_SHAPES = 8 };
 
 /* Relative errors of one kind of volume. */
 typedef struct volume_sums {
@@ -87,5 +88,64 @@ sdm_status trainer_volume_check(const trainer *t, const sdm_model *m, volume_che
     if (!s && n)
         *out = (volume_check){sqrt(map.square / (double)n), map.largest,
                               sqrt(surface.square / (double)n), surface.largest};
+    return s;
+}
+
+/* *map, *mesh = the volumes of the exact map and of the mesh at p, mm^3; *cut: the grid cuts it. */
+static sdm_status volumes_at(const trainer *t, const double *p, float *values, double *map,
+                             double *mesh, bool *cut, sdm_error *err)
+{
+    const dataset *d = &t->data;
+    sdm_exact *e = NULL;
+    double area;
+    sdm_status s = trainer_exact_within(d, p, t->n_threads, &e, err);
+    *cut = !e;
+    if (!s && e) {
+        sdm_mesh_sums(sdm_exact_surface(e), mesh, &area);
+        s = sdm_exact_map(e, d->grid, values, err);
+        if (!s) s = sdm_map_volume(d->grid, values, t->n_threads, map, err);
+    }
+    sdm_exact_free(e);
+    return s;
+}
+
+/* Differences of both volumes over `step` to either side of held-out shape i along parameter k.
+ * *cut: the grid cuts one of these shapes. */
+static sdm_status differences(const trainer *t, size_t i, size_t k, double step, float *values,
+                              double *map, double *mesh, bool *cut, sdm_error *err)
+{
+    const dataset *d = &t->data;
+    double p[SDM_POD_MAX_PARAMS], maps[2], meshes[2];
+    sdm_status s = SDM_OK;
+    memcpy(p, d->holdout_params + i * d->n_params, d->n_params * sizeof *p);
+    const double at = fmin(fmax(p[k], d->min[k] + step), d->max[k] - step);
+    *cut = false;
+    for (int side = 0; side < 2 && !s && !*cut; side++) {
+        p[k] = fmin(fmax(at + (side ? step : -step), d->min[k]), d->max[k]);
+        s = volumes_at(t, p, values, &maps[side], &meshes[side], cut, err);
+    }
+    if (s || *cut) return s;
+    *map = maps[1] - maps[0], *mesh = meshes[1] - meshes[0];
+    return SDM_OK;
+}
+
+sdm_status trainer_derivative_of_voxels(const trainer *t, size_t k, double step, double *error,
+                                        sdm_error *err)
+{
+    const dataset *d = &t->data;
+    double off = 0, size = 0;
+    float *values = NULL;
+    size_t n = 0;
+    *error = NAN;
+    sdm_status s = SDM_ALLOC(&values, sdm_grid_count(d->grid), "derivatives", err);
+    for (size_t i = 0; i < d->n_holdout && i < 4 * SLOPE_SHAPES && n < SLOPE_SHAPES && !s; i++) {
+        double map, mesh;
+        bool cut;
+        s = differences(t, i, k, step, values, &map, &mesh, &cut, err);
+        if (s || cut) continue;
+        off += (map - mesh) * (map - mesh), size += mesh * mesh, n++;
+    }
+    sdm_free(values);
+    if (!s && size > 0) *error = sqrt(off / size);
     return s;
 }

@@ -95,6 +95,9 @@ typedef struct sdm_verdict {
        over the size of their derivatives, however small. */
     char derivatives_bad[SDM_VERDICT_LIST], volume_derivatives_bad[SDM_VERDICT_LIST],
         volume_derivatives_small[SDM_VERDICT_LIST];
+    /* the error of derivatives of the volume that exact maps on these voxels have, of the first
+       parameter of volume_derivatives_bad; NaN: not measured */
+    double volume_derivative_voxels;
     /* the parameters that move no part of the surface, "a, b"; "": none was found */
     char still_params[SDM_VERDICT_LIST];
     /* a parameter that changes the numbers of vertices or the triangles of the mesh, so that

@@ -18,6 +18,9 @@ enum { DEFAULT_SAMPLES = 20 };
 /* Largest allowed ratio of measured to stated RMSE. */
 #define TOLERANCE 1.25
 
+/* What separates two facts about a file: of several files each has one line. */
+static const char *next_fact(const cli_args *args) { return args->files.n > 1 ? "; " : "\n"; }
+
 static sdm_status verify_vdb(const cli_args *args, const char *path, sdm_error *err)
 {
 #ifdef SDM_HAVE_VDB
@@ -61,12 +64,13 @@ static sdm_status verify_image(const cli_args *args, const char *path, sdm_error
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else if (!s) {
-        cli_print("%s: complete: %lld x %lld x %lld %s voxels, %s\n", path, (long long)v.grid.n[0],
+        cli_print("%s: complete: %lld x %lld x %lld %s voxels, %s", path, (long long)v.grid.n[0],
                   (long long)v.grid.n[1], (long long)v.grid.n[2], sdm_voxel_name(v.stored),
                   v.checked ? "the checksum of the compressed data is right"
                             : "no checksum: changed voxels cannot be detected");
         if (v.n_nan > 0 || v.n_inf > 0)
-            cli_print("%zu values are NaN, %zu infinite\n", v.n_nan, v.n_inf);
+            cli_print("%s%zu values are NaN, %zu infinite", next_fact(args), v.n_nan, v.n_inf);
+        cli_print("\n");
     }
     sdm_volume_dispose(&v);
     return s;
@@ -114,16 +118,17 @@ static sdm_status report_model(const cli_args *args, const char *path, const sdm
         sdm_json_close(&j, '}');
         s = cli_print_json(&j, err);
     } else {
-        cli_print("%s: every checksum is right\n", path);
-        if (e->n > 0) {
-            cli_print("RMSE %.5f mm on %zu random shapes, stated %.5f mm\n", e->rmse_mm, e->n,
+        const char *next = next_fact(args);
+        cli_print("%s: every checksum is right", path);
+        if (e->n > 0)
+            cli_print("%sRMSE %.5f mm on %zu random shapes, stated %.5f mm", next, e->rmse_mm, e->n,
                       stated);
-            if (good && is_worse(e, stated, 0))
-                cli_print("it is more than 25 %% worse, which may be due to the choice of these "
-                          "shapes: --samples %zu tells\n",
-                          10 * e->n);
-            cli_print_two("", times);
-        }
+        if (e->n > 0 && good && is_worse(e, stated, 0))
+            cli_print("%sit is more than 25 %% worse, which may be due to the choice of these "
+                      "shapes: --samples %zu tells",
+                      next, 10 * e->n);
+        cli_print("\n");
+        if (e->n > 0 && args->files.n == 1) cli_print_two("", times);
     }
     if (!s && !good)
         s = sdm_fail(err, SDM_E_QUALITY,
@@ -163,17 +168,59 @@ static sdm_status verify_model(const cli_args *args, const char *path, sdm_error
     return s;
 }
 
-sdm_status cmd_verify(const cli_args *args, sdm_error *err)
+static bool is_model(const char *path)
+{
+    return !cli_ends_with(path, ".vdb") && !sdm_volume_knows(path);
+}
+
+static sdm_status verify_file(const cli_args *args, const char *path, sdm_error *err)
+{
+    if (is_model(path)) return verify_model(args, path, err);
+    return cli_ends_with(path, ".vdb") ? verify_vdb(args, path, err)
+                                       : verify_image(args, path, err);
+}
+
+/* Options that are for models alone: one of the files must be a model. */
+static sdm_status check_options(const cli_args *args, sdm_error *err)
 {
     const char *path = args->files.items[0];
-    const bool vdb = cli_ends_with(path, ".vdb"), image = sdm_volume_knows(path);
-    if ((vdb || image) && (args->samples >= 0 || args->seed >= 0))
+    for (size_t i = 0; i < args->files.n; i++)
+        if (is_model(args->files.items[i])) return SDM_OK;
+    if (args->samples >= 0 || args->seed >= 0)
         return sdm_fail(err, SDM_E_ARG,
                         "verify: --%s does nothing for %s: it is for the random shapes of a model",
                         args->samples >= 0 ? "samples" : "seed", path);
-    sdm_status s = vdb || image ? cli_expect_model(args, err) : SDM_OK;
-    if (!s && (vdb || image)) s = cli_refuse_plugins(args, path, err);
+    const sdm_status s = cli_expect_model(args, err);
+    return s ? s : cli_refuse_plugins(args, path, err);
+}
+
+/* Checks one file after the other and tells each failure. Fails as the file with the highest exit
+ * code did. */
+static sdm_status verify_several(const cli_args *args, sdm_error *err)
+{
+    sdm_status worst = SDM_OK;
+    int highest = CLI_EXIT_DONE;
+    size_t failed = 0;
+    for (size_t i = 0; i < args->files.n; i++) {
+        sdm_error own = {0};
+        const sdm_status s = verify_file(args, args->files.items[i], &own);
+        if (s == SDM_E_CANCELLED) {
+            *err = own;
+            return s;
+        }
+        const int code = s ? cli_report(&own) : CLI_EXIT_DONE;
+        failed += s != SDM_OK;
+        if (code > highest) highest = code, worst = s;
+    }
+    return failed ? sdm_fail(err, worst, "verify: %zu of %zu files are not right", failed,
+                             args->files.n)
+                  : SDM_OK;
+}
+
+sdm_status cmd_verify(const cli_args *args, sdm_error *err)
+{
+    const sdm_status s = check_options(args, err);
     if (s) return s;
-    if (vdb) return verify_vdb(args, path, err);
-    return image ? verify_image(args, path, err) : verify_model(args, path, err);
+    return args->files.n > 1 ? verify_several(args, err)
+                             : verify_file(args, args->files.items[0], err);
 }

@@ -101,14 +101,16 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      "sdmgen shapes check cochlea -o cochlea.png", 0, SIZE_MAX},
     {"info", "FILE", "describe the content of a model, level set, image, mesh file or shape model",
      NULL, "sdmgen info runs/cochlea/model.sdm", 1, 1},
-    {"verify", "FILE", "check a model, level set or image file",
+    {"verify", "FILE ...", "check model, level set or image files",
      "A model: checks all checksums and, if the shape is known, measures the accuracy again\n"
      "on random shapes; exit code 4 if the RMSE is more than 25 % above the stated one, and\n"
      "by more than the scatter between the shapes (two standard errors of the mean square).\n"
      "A .vdb: checks the hash of its values and runs OpenVDB's checkLevelSet.\n"
      "An image (.nii .nrrd .mha ...): checks that it is complete and, if it is compressed,\n"
-     "the checksum of gzip or zlib.",
-     "sdmgen verify runs/cochlea/model.sdm --samples 50", 1, 1},
+     "the checksum of gzip or zlib.\n"
+     "Of several files each has one line (--json: one object), a failure its error, and the\n"
+     "exit code is the highest of all.",
+     "sdmgen verify runs/cochlea/model.sdm --samples 50", 1, SIZE_MAX},
     {"config", "[CONFIG] [key=value ...]", "check, print or explain a configuration",
      "Checks the configuration, the options of the shape and the ranges. --dump prints the\n"
      "configuration with every key resolved; --keys lists every key with type, range,\n"

@@ -44,6 +44,15 @@ expect 3 'cut\.nii\.gz' sdmgen verify cut.nii.gz --json
 sed 's/LOCAL/..\/m.raw/' m.mha >away.mha
 expect 1 'another folder' sdmgen info away.mha
 expect 1 'none\.nrrd: cannot open' sdmgen verify none.nrrd
+# several files: a line each, each failure with its error, the highest exit code
+expect 0 - sdmgen verify m.nrrd m.mha
+[ "$(grep -c '^m\.\(nrrd\|mha\): complete: ' out)" -eq 2 ] || bad "not a line for each of two files: $(cat out)"
+sdmgen verify none.nrrd m.nrrd cut.nii.gz none.nrrd >out 2>err
+code=$?
+[ $code -eq 3 ] || bad "exit code $code instead of the highest of 1, 0, 3 and 1: $(cat err)"
+has '^m\.nrrd: complete: '
+[ "$(wc -l <out) $(grep -c 'none\.nrrd: cannot open' err) $(grep -c 'cut\.nii\.gz' err)" = '1 2 1' ] || bad "files and failures: $(cat out err)"
+grep -q '^sdmgen: error: verify: 3 of 4 files are not right$' err || bad "no sum of the failures: $(cat err)"
 expect 0 - sdmgen exact --shape torus -o map.npy
 for command in info verify; do
     expect 3 'map\.npy: not a model file .*; its name is neither that of a level set \(\.vdb\) nor of an image \(\.nii ' sdmgen $command map.npy

@@ -157,15 +157,15 @@ static bool network_errs(const cli_map *map, double more)
 static void warn_network_volume(const char *path, const cli_map *map, const double volume[2])
 {
     const double more = volume[0] / volume[1] - 1, error = map->quality->surface_volume_error;
-    char measured[96] = "";
+    char measured[96] = "", own[32], right[32];
     if (!isnan(error))
         snprintf(measured, sizeof measured,
                  ": its training found volumes of surfaces off by %.2g %% (root mean square)",
                  100 * error);
-    cli_warn(
-        "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3, because the "
-        "network errs%s; exact maps (sdmgen exact) have no such error",
-        path, volume[0], 100 * fabs(more), more < 0 ? "less" : "more", volume[1], measured);
+    cli_warn("%s: the surface encloses %s mm^3, %.2g %% %s than the shape, %s mm^3, because the "
+             "network errs%s; exact maps (sdmgen exact) have no such error",
+             path, cli_number(volume[0], own), 100 * fabs(more), more < 0 ? "less" : "more",
+             cli_number(volume[1], right), measured);
 }
 
 /* Warns of a surface that cannot be compared with its shape, if the training found volumes of such
@@ -197,17 +197,17 @@ static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *s
         warn_network_volume(path, map, (const double[]){fabs(audit.volume), map->volume});
     } else if (fabs(more) > VOLUME_OFF_MAX) {
         const double cuts = trained ? map->trained_mm : voxel;
-        char advice[96] = "";
+        char advice[96] = "", own[32], right[32];
         if (trained || !map->thin)
             snprintf(advice, sizeof advice, "; about %.0f %% for this shape with %s%.2g",
                      100 * SDM_VOLUME_AIM, trained ? "a training with grid.spacing " : "--spacing ",
                      sdm_spacing_for_volume(cuts, fabs(more)));
-        cli_warn(
-            "%s: the surface encloses %.4g mm^3, %.2g %% %s than the shape, %.4g mm^3: voxels of "
-            "%.3g %s%s",
-            path, fabs(audit.volume), 100 * fabs(more), more < 0 ? "less" : "more", map->volume,
-            cuts, more < 0 ? "mm cut its edges and thin parts" : "mm fill its gaps and inner edges",
-            advice);
+        cli_warn("%s: the surface encloses %s mm^3, %.2g %% %s than the shape, %s mm^3: voxels of "
+                 "%.3g %s%s",
+                 path, cli_number(fabs(audit.volume), own), 100 * fabs(more),
+                 more < 0 ? "less" : "more", cli_number(map->volume, right), cuts,
+                 more < 0 ? "mm cut its edges and thin parts" : "mm fill its gaps and inner edges",
+                 advice);
     }
 }
 

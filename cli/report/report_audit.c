@@ -46,13 +46,13 @@ static void print_parts(const sdm_part_audit *a)
            "vertices", "state", "turned", "overlaps", "volume mm^3", "box mm");
     for (size_t i = 0; i < a->n && i < ROWS; i++) {
         const sdm_part *p = &a->part[i];
-        char range[48];
+        char range[48], volume[32];
         snprintf(range, sizeof range, "%zu .. %zu", p->first_vert, p->last_vert);
-        printf("  %-6zu  %-9zu  %-18s  %-10s  %-6s  %-8s  %-12.6g  %.6g %.6g %.6g .. %.6g %.6g "
+        printf("  %-6zu  %-9zu  %-18s  %-10s  %-6s  %-8s  %-12s  %.6g %.6g %.6g .. %.6g %.6g "
                "%.6g\n",
                i + 1, p->n_tri, range, state_name(a, i), p->turned ? "yes" : "no",
-               p->met ? "yes" : "no", p->volume, p->min[0], p->min[1], p->min[2], p->max[0],
-               p->max[1], p->max[2]);
+               p->met ? "yes" : "no", cli_number(p->volume, volume), p->min[0], p->min[1],
+               p->min[2], p->max[0], p->max[1], p->max[2]);
     }
     if (a->n > ROWS) printf("  and %zu more\n", a->n - ROWS);
 }
@@ -77,12 +77,13 @@ void cli_print_audit(const sdm_part_audit *audit)
     printf("degenerate triangles %zu\n", a->degenerate);
     printf("duplicate triangles  %zu\n", a->duplicate);
     printf("self-intersections   %zu\n", a->self_intersections);
-    printf("volume               %.6g mm^3, the sum over all triangles: overlaps count twice\n",
-           a->volume);
-    printf("area                 %.6g mm^2\n", a->area);
+    char number[32];
+    printf("volume               %s mm^3, the sum over all triangles: overlaps count twice\n",
+           cli_number(a->volume, number));
+    printf("area                 %s mm^2\n", cli_number(a->area, number));
     if (isfinite(audit->union_volume)) {
-        printf("volume of the union  %.6g mm^3\n", audit->union_volume);
-        printf("area of the union    %.6g mm^2\n", audit->union_area);
+        printf("volume of the union  %s mm^3\n", cli_number(audit->union_volume, number));
+        printf("area of the union    %s mm^2\n", cli_number(audit->union_area, number));
     }
     printf("box                  %.6g %.6g %.6g .. %.6g %.6g %.6g mm\n", a->min[0], a->min[1],
            a->min[2], a->max[0], a->max[1], a->max[2]);

@@ -59,8 +59,10 @@ void cli_print_volume(const char *path, const sdm_volume *v)
         cli_print(
             "             the file states no frame: axes and origin are defaults of its format\n");
     cli_print("values       %.9g .. %.9g\n", (double)v->min, (double)v->max);
+    char number[32];
     const double volume = map_volume(v);
-    if (isfinite(volume)) cli_print("volume       %.6g mm^3 inside the surface\n", volume);
+    if (isfinite(volume))
+        cli_print("volume       %s mm^3 inside the surface\n", cli_number(volume, number));
     if (v->n_nan > 0 || v->n_inf > 0)
         cli_print("             %zu are NaN, %zu infinite\n", v->n_nan, v->n_inf);
     for (size_t i = 0; i < v->n_segments; i++) {
@@ -68,7 +70,8 @@ void cli_print_volume(const char *path, const sdm_volume *v)
         const double mm3 = segment_volume(v, s);
         cli_print("%s '%s' (%s): value %lld in layer %zu", i ? "            " : "segments    ",
                   s->name, s->id, (long long)s->value, s->layer);
-        cli_print(isfinite(mm3) ? ", its voxels have %.6g mm^3\n" : "\n", mm3);
+        if (isfinite(mm3)) cli_print(", its voxels have %s mm^3", cli_number(mm3, number));
+        cli_print("\n");
     }
     if (v->text[0]) cli_print("description  %s\n", v->text);
 }

@@ -1,6 +1,7 @@
 /* Messages, exit codes, interrupts and the clock of the command line. */
 #include "terminal.h"
 
+#include <math.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -201,6 +202,14 @@ void cli_print(const char *fmt, ...)
         fputs(shown.data, stdout);
     if (text != start) free(text);
     sdm_text_dispose(&shown);
+}
+
+const char *cli_number(double x, char text[32])
+{
+    // six digits end before the point here
+    const bool long_whole = fabs(x) >= 999999.5 && fabs(x) < 1e9;
+    snprintf(text, 32, long_whole ? "%.0f" : "%.6g", x);
+    return text;
 }
 
 bool cli_is_unprinted(void) { return unprinted; }

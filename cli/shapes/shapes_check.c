@@ -141,8 +141,10 @@ static sdm_status print_rest(const check *c, sdm_error *err)
         *err = c->why;
         return c->printed;
     }
+    char low[32], high[32];
     if (f->volume[0] <= f->volume[1])
-        printf("volume   %.6g .. %.6g mm^3, of the union\n", f->volume[0], f->volume[1]);
+        printf("volume   %s .. %s mm^3, of the union\n", cli_number(f->volume[0], low),
+               cli_number(f->volume[1], high));
     if (!(f->low[0] <= f->high[0]))
         printf("box      not known: no mesh was made\n");
     else

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "report/report_audit.h"
+#include "report/terminal.h"
 
 /* Parts that pass through themselves. */
 static void tell_crossing(teller *t)
@@ -94,12 +95,14 @@ static void tell_wound(teller *t)
         teller_tell_count(t, weight, c, "parts that wind around their inside more than once");
         return;
     }
+    char number[32];
     sdm_text text = {0};
     cli_name_part(audit, most, &text);
     sdm_text_add(&text,
-                 "winds around its inside more than once: it encloses %.3g mm^3, %.3g times "
+                 "winds around its inside more than once: it encloses %s mm^3, %.3g times "
                  "the volume that it fills, and %zu pairs of its triangles meet (at ",
-                 fabs(audit->part[most].volume), c->amount, audit->part[most].crossed);
+                 cli_number(fabs(audit->part[most].volume), number), c->amount,
+                 audit->part[most].crossed);
     teller_add_params(t->s, c->worst, SIZE_MAX, &text);
     sdm_text_add(&text, "; parts wind more than once ");
     teller_add_share(t->s, c, &text);

@@ -36,6 +36,20 @@ has '^origin +-5 -6 7 '
 has "'second' \(b\): value 1 in layer 1"
 has '^values +1 \.\. 4$'
 
+# Large volumes have digits, no exponent: a cube of 200 mm.
+{
+    printf 'OFF\n8 12 0\n'
+    for z in 0 200; do for y in 0 200; do for x in 0 200; do echo $x $y $z; done; done; done
+    printf '3 %s\n' '0 2 3' '0 3 1' '4 5 7' '4 7 6' '0 1 5' '0 5 4' '2 6 7' '2 7 3' '0 4 6' '0 6 2' '1 3 7' '1 7 5'
+} >large.off
+expect 0 - sdmgen mesh --mesh large.off --audit
+has '^volume +8000000 mm\^3, '
+has '^area +240000 mm\^2$'
+has '^  1 .* 8000000 +0 0 0 \.\. 200 200 200$'
+expect 0 - sdmgen exact --mesh large.off --spacing 8 --size 32,32,32 --origin -26,-26,-26 -o large.nrrd
+expect 0 - sdmgen info large.nrrd
+has '^volume +[78][0-9]{6} mm\^3 inside the surface$'
+
 # Damaged, unsupported and missing files.
 head -c 300 m.nii.gz >cut.nii.gz
 expect 3 'cut\.nii\.gz: the compressed data are cut off' sdmgen info cut.nii.gz

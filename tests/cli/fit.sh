@@ -82,21 +82,20 @@ expect 0 - sdmgen fit $fit --exact ct.nii.gz $near_truth --reference label.nrrd 
 strip() { sed -E 's/"command": "[^"]*"//; s/"(seconds[a-z_]*|threads)": [^,}]*//g' "$1"; }
 [ "$(strip out)" = "$(strip first.json)" ] || bad 'two threads must give the same result'
 
-# The report as text.
-expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --reference label.nrrd
+# The report as text, with the truth of the test image beside the estimate.
+expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --reference label.nrrd --truth truth.json
 has '^ellipsoid fitted to ct.nii.gz$'
 has 'rx +3\.[0-9]+ \+- 0\.0'
 has 'reference: Dice 0.9'
 has 'converged after'
+has '^  rx .* \+- .* mm +truth 3\.5, off by [0-9.]+ sd$'
+has '^  pose         off the truth by 0\.[01][0-9]* mm at the centre of the shape and [0-9](\.[0-9]+)? degrees, [0-2](\.[0-9]+)? sd$'
 has '^  map voxels   doubtful  0.35, need at most 0.2.*coarse beside the point spread of the image: .*with voxels of 0.2[0-9]* mm \(--exact --spacing\)'
 # the command that goes on from here with finer maps
 has '^finer maps from here; [0-9.]+ times as many voxels, up to [0-9.e+]+ (s|minutes):$'
 eval "$(sed -n 's/^  sdmgen fit ct/expect 0 - sdmgen fit ct/p' out)"
 has '^  map voxels   passed '
-# the truth of the test image beside the estimate; that of another shape, and a file without parameters, are refused
-expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --truth truth.json
-has '^  rx .* \+- .* mm +truth 3\.5, off by [0-9.]+ sd$'
-has '^  pose         off the truth by 0\.[01][0-9]* mm at the centre of the shape and [0-9](\.[0-9]+)? degrees, [0-2](\.[0-9]+)? sd$'
+# another truth; the truth of another shape, and a file without parameters, are refused
 printf '{"parameters": {"rx": 3.5}, "pose": {"rotation_rad": [0.1, -0.2, 0.3], "translation_mm": [20, -30, 11]}}' >shifted.json
 expect 0 - sdmgen fit $fit ct.nii.gz $near_truth --truth shifted.json --json
 near "$(json centre_mm)" 1 0.15
@@ -126,8 +125,9 @@ expect 0 - sdmgen fit $fit ct.nii.gz --start-points pairs.csv --spacing 0.5 --js
 within rx 3.5 4
 # A shape much smaller than the default, in a random pose: the right turn is found, although another one fits better while the size is still
 # wrong.
-expect 0 - sdmgen phantom --shape cochlea --random-params --random-pose 20,1 --spacing 0.3 --seed 111 -o small.nii --label small-label.nii --quiet
-expect 0 - sdmgen fit --shape cochlea small.nii --spacing 0.4 --start-centre 0.6,1,1.3 --start-axis 0,0,1 --eps 1e-3 --reference small-label.nii --json
+expect 0 - sdmgen phantom --shape cochlea -O edge=0.6 --random-params --random-pose 20,1 --spacing 0.4 --seed 111 -o small.nii --label small-label.nii --quiet
+expect 0 - sdmgen fit --shape cochlea -O edge=0.6 small.nii --spacing 0.5 --start-centre 0.6,1,1.3 --start-axis 0,0,1 --eps 1e-3 --mirror no \
+    --reference small-label.nii --json
 awk -v d="$(json dice)" 'BEGIN { exit !(d > 0.95) }' || bad "another turn was found: Dice $(json dice)"
 expect 0 'no start centre is given.*20.*-30.*10' sdmgen fit $fit ct.nii.gz --turns-sphere 3 --spacing 0.5 --json
 awk -v d="$(json evidence)" 'BEGIN { exit !(d > 0) }' || bad "evidence $(json evidence)"

@@ -208,7 +208,7 @@ static void test_wrong_shapes_are_refused(void **state)
     sdm_instance *torus = shape_of("torus"), *round = shape_of("ellipsoid"),
                  *capsule = shape_of("capsule");
     const sdm_instance *const pairs[][2] = {{round, torus}, {torus, capsule}, {capsule, torus}};
-    const sdm_grid g = cube(5.5, 0.35);
+    const sdm_grid g = cube(5.5, 0.5);
     for (size_t k = 0; k < 3; k++)
         for (int labels = 0; labels < 2; labels++) {
             float *v = image_of_shape(pairs[k][1], &g, 1, labels, 7 + k);

@@ -185,7 +185,7 @@ static void time_budget_works(void **state)
     for (size_t k = 0; k < KINDS; k++) {
         sdm_config c;
         read_config(&c, &kinds[k],
-                    (const char *const[]){"train.minutes=0.05", "train.evaluate_seconds=0.1"}, 2);
+                    (const char *const[]){"train.minutes=0.02", "train.evaluate_seconds=0.1"}, 2);
         const sdm_train_report r = train(&c);
         sdm_model *m;
         assert_int_equal(sdm_model_open(r.model_path, &m, NULL), SDM_OK);

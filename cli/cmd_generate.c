@@ -555,7 +555,7 @@ static void print_map_volume(const job *j)
     const double error = j->n_exact ? 0 : j->own ? j->info->quality.volume_error : NAN;
     if (isnan(j->volume)) return;
     char number[32];
-    printf("volume of the map %s mm^3", cli_number(j->volume, number));
+    printf("volume of the map %s mm^3", cli_number(j->volume, 5, number));
     if (error > 0) printf(" (root mean square error %.2g %%)", 100 * error);
     printf("; of the exact mesh:\n");
 }

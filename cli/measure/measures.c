@@ -39,15 +39,9 @@ sdm_status cli_read_depths(const cli_args *args, const sdm_instance *shape, cli_
 static void print_measure(const sdm_measured *m, bool with_sd)
 {
     char number[32], sd[32];
-    // no exponent below 1e9
-    if (fabs(m->value) >= 99999.5)
-        cli_number(m->value, number);
-    else
-        snprintf(number, sizeof number, isnan(m->value) ? "none" : "%.5g", m->value);
-    snprintf(sd, sizeof sd, m->sd >= 99.5 && m->sd < 1e9 ? "%.0f" : "%.2g", m->sd);
-    printf("  %-15s %10s", m->name, number);
+    printf("  %-15s %10s", m->name, isnan(m->value) ? "none" : cli_number(m->value, 5, number));
     if (with_sd && isnan(m->sd) && !isnan(m->value)) printf(" +- %-9s", "unknown");
-    if (with_sd && m->sd > 0) printf(" +- %-9s", sd);
+    if (with_sd && m->sd > 0) printf(" +- %-9s", cli_number(m->sd, 2, sd));
     if (*m->unit) printf(" %s", m->unit);
     if (!isnan(m->depth)) printf(" at %g mm", m->depth);
     if (isnan(m->value)) printf("   (%s)", isnan(m->depth) ? "the mesh is open" : "beyond the end");

@@ -164,8 +164,8 @@ static void warn_network_volume(const char *path, const cli_map *map, const doub
                  100 * error);
     cli_warn("%s: the surface encloses %s mm^3, %.2g %% %s than the shape, %s mm^3, because the "
              "network errs%s; exact maps (sdmgen exact) have no such error",
-             path, cli_number(volume[0], own), 100 * fabs(more), more < 0 ? "less" : "more",
-             cli_number(volume[1], right), measured);
+             path, cli_number(volume[0], 4, own), 100 * fabs(more), more < 0 ? "less" : "more",
+             cli_number(volume[1], 4, right), measured);
 }
 
 /* Warns of a surface that cannot be compared with its shape, if the training found volumes of such
@@ -204,8 +204,8 @@ static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *s
                      sdm_spacing_for_volume(cuts, fabs(more)));
         cli_warn("%s: the surface encloses %s mm^3, %.2g %% %s than the shape, %s mm^3: voxels of "
                  "%.3g %s%s",
-                 path, cli_number(fabs(audit.volume), own), 100 * fabs(more),
-                 more < 0 ? "less" : "more", cli_number(map->volume, right), cuts,
+                 path, cli_number(fabs(audit.volume), 4, own), 100 * fabs(more),
+                 more < 0 ? "less" : "more", cli_number(map->volume, 4, right), cuts,
                  more < 0 ? "mm cut its edges and thin parts" : "mm fill its gaps and inner edges",
                  advice);
     }

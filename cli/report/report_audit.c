@@ -51,7 +51,7 @@ static void print_parts(const sdm_part_audit *a)
         printf("  %-6zu  %-9zu  %-18s  %-10s  %-6s  %-8s  %-12s  %.6g %.6g %.6g .. %.6g %.6g "
                "%.6g\n",
                i + 1, p->n_tri, range, state_name(a, i), p->turned ? "yes" : "no",
-               p->met ? "yes" : "no", cli_number(p->volume, volume), p->min[0], p->min[1],
+               p->met ? "yes" : "no", cli_number(p->volume, 6, volume), p->min[0], p->min[1],
                p->min[2], p->max[0], p->max[1], p->max[2]);
     }
     if (a->n > ROWS) printf("  and %zu more\n", a->n - ROWS);
@@ -79,11 +79,11 @@ void cli_print_audit(const sdm_part_audit *audit)
     printf("self-intersections   %zu\n", a->self_intersections);
     char number[32];
     printf("volume               %s mm^3, the sum over all triangles: overlaps count twice\n",
-           cli_number(a->volume, number));
-    printf("area                 %s mm^2\n", cli_number(a->area, number));
+           cli_number(a->volume, 6, number));
+    printf("area                 %s mm^2\n", cli_number(a->area, 6, number));
     if (isfinite(audit->union_volume)) {
-        printf("volume of the union  %s mm^3\n", cli_number(audit->union_volume, number));
-        printf("area of the union    %s mm^2\n", cli_number(audit->union_area, number));
+        printf("volume of the union  %s mm^3\n", cli_number(audit->union_volume, 6, number));
+        printf("area of the union    %s mm^2\n", cli_number(audit->union_area, 6, number));
     }
     printf("box                  %.6g %.6g %.6g .. %.6g %.6g %.6g mm\n", a->min[0], a->min[1],
            a->min[2], a->max[0], a->max[1], a->max[2]);

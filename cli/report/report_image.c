@@ -62,7 +62,7 @@ void cli_print_volume(const char *path, const sdm_volume *v)
     char number[32];
     const double volume = map_volume(v);
     if (isfinite(volume))
-        cli_print("volume       %s mm^3 inside the surface\n", cli_number(volume, number));
+        cli_print("volume       %s mm^3 inside the surface\n", cli_number(volume, 6, number));
     if (v->n_nan > 0 || v->n_inf > 0)
         cli_print("             %zu are NaN, %zu infinite\n", v->n_nan, v->n_inf);
     for (size_t i = 0; i < v->n_segments; i++) {
@@ -70,7 +70,7 @@ void cli_print_volume(const char *path, const sdm_volume *v)
         const double mm3 = segment_volume(v, s);
         cli_print("%s '%s' (%s): value %lld in layer %zu", i ? "            " : "segments    ",
                   s->name, s->id, (long long)s->value, s->layer);
-        if (isfinite(mm3)) cli_print(", its voxels have %s mm^3", cli_number(mm3, number));
+        if (isfinite(mm3)) cli_print(", its voxels have %s mm^3", cli_number(mm3, 6, number));
         cli_print("\n");
     }
     if (v->text[0]) cli_print("description  %s\n", v->text);

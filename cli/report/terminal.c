@@ -204,11 +204,11 @@ void cli_print(const char *fmt, ...)
     sdm_text_dispose(&shown);
 }
 
-const char *cli_number(double x, char text[32])
+const char *cli_number(double x, int digits, char text[32])
 {
-    // six digits end before the point here
-    const bool long_whole = fabs(x) >= 999999.5 && fabs(x) < 1e9;
-    snprintf(text, 32, long_whole ? "%.0f" : "%.6g", x);
+    // all of the digits stand before the point
+    const bool long_whole = fabs(x) >= pow(10, digits) - 0.5 && fabs(x) < 1e9;
+    snprintf(text, 32, long_whole ? "%.*f" : "%.*g", long_whole ? 0 : digits, x);
     return text;
 }
 

@@ -61,8 +61,9 @@ size_t cli_warnings(void);
  * they are in all messages on stderr. */
 void cli_print(const char *fmt, ...) SDM_PRINTF(1, 2);
 
-/* text[32] = x with six digits, below 1e9 without an exponent. Returns text. */
-const char *cli_number(double x, char text[32]);
+/* text[32] = x with `digits` digits, or below 1e9 with all of those before the point, so that there
+ * is no exponent. Returns text. */
+const char *cli_number(double x, int digits, char text[32]);
 
 /* True when memory was too short for a text of cli_print(), which is then missing. */
 bool cli_is_unprinted(void);

@@ -143,8 +143,8 @@ static sdm_status print_rest(const check *c, sdm_error *err)
     }
     char low[32], high[32];
     if (f->volume[0] <= f->volume[1])
-        printf("volume   %s .. %s mm^3, of the union\n", cli_number(f->volume[0], low),
-               cli_number(f->volume[1], high));
+        printf("volume   %s .. %s mm^3, of the union\n", cli_number(f->volume[0], 6, low),
+               cli_number(f->volume[1], 6, high));
     if (!(f->low[0] <= f->high[0]))
         printf("box      not known: no mesh was made\n");
     else

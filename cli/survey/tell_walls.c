@@ -101,7 +101,7 @@ static void tell_wound(teller *t)
     sdm_text_add(&text,
                  "winds around its inside more than once: it encloses %s mm^3, %.3g times "
                  "the volume that it fills, and %zu pairs of its triangles meet (at ",
-                 cli_number(fabs(audit->part[most].volume), number), c->amount,
+                 cli_number(fabs(audit->part[most].volume), 3, number), c->amount,
                  audit->part[most].crossed);
     teller_add_params(t->s, c->worst, SIZE_MAX, &text);
     sdm_text_add(&text, "; parts wind more than once ");

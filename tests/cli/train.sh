@@ -126,13 +126,13 @@ cat >far.yaml <<'YAML'
 shape: {name: linkage, options: {links: 2, length: 1, radius: 1, tip: 1, joint: 1, base: 1}}
 grid: {spacing: 0.2}
 data: {static: 2, start: 64, online: 0, holdout: 12}
-train: {minutes: 0.5}
+train: {minutes: 4}
 YAML
 pod='^  far away    where distances far from the surface matter: pod; '
 expect 0 - sdmgen train far.yaml --out far --quiet
 has '^  verdict     Far from the surface .*: nothing to change for surfaces, level sets and fits near the surface; where distances far away matter, set network.kind to pod'
 has "${pod}auto has tried it, too: within a voxel of the surface [0-9.]+ mm, [0-9.e+]+ times worse; everywhere [0-9.]+ mm, .* \(a trial, which training improves\)\$"
-has '^              sdmgen train far\.yaml train\.minutes=0\.5 network\.kind=pod --out far-2$'
+has '^              sdmgen train far\.yaml train\.minutes=4 network\.kind=pod --out far-2$'
 expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 --out named --quiet
 has "${pod}this run has not measured it: near the surface it may be worse\$"
 has '^              sdmgen train far\.yaml train\.minutes=0\.02 network\.kind=pod --out named-2$'

@@ -128,6 +128,14 @@ static void tell_slow(teller *t)
                 "of other parts alone",
                 params[k].name);
             teller_tell(t, SDM_E_QUALITY, &slow);
+        } else if (sdm_survey_is_faint(f, t->s->shape, k) && !f->scale.odd_speed && !jumps) {
+            sdm_text_add(&slow,
+                         "the parameter '%s' ranges from %g to %g rad, which moves no vertex of a "
+                         "shape of %.3g mm by more than %.2g mm: does mesh() multiply it by "
+                         "0.017453, as if it were in degrees?",
+                         params[k].name, params[k].min, params[k].max, f->scale.size,
+                         f->speed[k] * (params[k].max - params[k].min));
+            teller_tell(t, SDM_E_QUALITY, &slow);
         } else if (sdm_survey_is_slow(f, t->s->shape, k) && !f->scale.odd_speed && !jumps) {
             sdm_text_add(&slow,
                          "1 mm of the parameter '%s' moves no vertex by more than %.2g mm: are the "

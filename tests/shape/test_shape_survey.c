@@ -484,6 +484,24 @@ static sdm_shape_survey survey_swinging(sdm_param param, const char *function, c
 
 static const char *const ANGLE_UNITS[] = {"deg", "rad", ""};
 
+// An angle in rad that mesh() converts as if it were in degrees moves the shape of 6 mm by 0.017 mm
+// per rad; without that, by 1 mm.
+static void rad_that_are_converted(void **state)
+{
+    (void)state;
+    for (int converted = 0; converted < 2; converted++) {
+        sdm_shape_survey s = survey_swinging((sdm_param){"angle", "rad", 0.1, 0.7, 0.3, "x"}, "sin",
+                                             converted ? "0.017453" : "1");
+        assert_int_equal(s.slow, converted);
+        assert_int_equal(sdm_shape_survey_verdict(&s), converted ? SDM_E_QUALITY : SDM_OK);
+        sdm_shape_survey_dispose(&s);
+        // a parameter without a unit may be one that hardly counts
+        s = survey_swinging((sdm_param){"share", "", 0.1, 0.7, 0.3, "x"}, "sin", "0.017453");
+        assert_int_equal(s.slow, 0);
+        sdm_shape_survey_dispose(&s);
+    }
+}
+
 // An angle in degrees that goes to sin() as it is, and one that is converted.
 static void degrees_that_go_to_sin(void **state)
 {
@@ -700,6 +718,7 @@ int main(void)
         cmocka_unit_test(time_is_short),
         cmocka_unit_test(a_cancelled_survey),
         cmocka_unit_test(the_first_to_mend),
+        cmocka_unit_test(rad_that_are_converted),
         cmocka_unit_test(degrees_that_go_to_sin),
         cmocka_unit_test(degrees_that_go_to_tan),
         cmocka_unit_test(callbacks),

@@ -175,6 +175,11 @@ static void tell_units(tests *t)
         else if (f->speed[k] == 0)
             sdm_text_add(&text, "%sthe parameter '%s' moves no vertex: does mesh() use it?",
                          text.data ? "; " : "", params[k].name);
+        else if (sdm_survey_is_faint(f, t->instance, k))
+            sdm_text_add(&text,
+                         "%s'%s' moves a shape of %.3g mm by %.2g mm per rad: does mesh() convert "
+                         "it from degrees?",
+                         text.data ? "; " : "", params[k].name, c->size, f->speed[k]);
         else if (sdm_survey_is_narrow(f, t->instance, k))
             sdm_text_add(
                 &text, "%s'%s' ranges from %g to %g mm in a shape of %.3g mm: are these m?",

@@ -24,9 +24,17 @@ static bool is_length(const sdm_instance *shape, size_t k)
     return !strcmp(shape->params[k].unit, "mm");
 }
 
+bool sdm_survey_is_faint(const sdm_shape_survey *s, const sdm_instance *shape, size_t k)
+{
+    const sdm_param *p = &shape->params[k];
+    return !strcmp(p->unit, "rad") && s->speed[k] > 0 &&
+           s->speed[k] * fmax(1, p->max - p->min) < SDM_SURVEY_FAINT * s->scale.size;
+}
+
 bool sdm_survey_is_slow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k)
 {
-    return s->speed[k] == 0 || (is_length(shape, k) && s->speed[k] < SDM_SURVEY_SPEED_SLOW);
+    return s->speed[k] == 0 || (is_length(shape, k) && s->speed[k] < SDM_SURVEY_SPEED_SLOW) ||
+           sdm_survey_is_faint(s, shape, k);
 }
 
 bool sdm_survey_is_narrow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k)

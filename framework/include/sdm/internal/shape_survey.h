@@ -296,9 +296,15 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
  * this, even where other parameters move them far. */
 #define SDM_SURVEY_SPEED_SLOW 0.02
 
-/* Is parameter k of the survey odd by itself: it moves no vertex, or its unit is mm and it is slow?
- * false if its speed is not known. */
+/* Is parameter k of the survey odd by itself: it moves no vertex, or its unit is mm and it is slow,
+ * or sdm_survey_is_faint()? false if its speed is not known. */
 bool sdm_survey_is_slow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k);
+
+/* Is parameter k an angle in rad that moves no vertex by SDM_SURVEY_FAINT times the size of the
+ * shapes, per rad and over the range in the table of the shape? mesh() is likely to convert it from
+ * degrees. */
+bool sdm_survey_is_faint(const sdm_shape_survey *s, const sdm_instance *shape, size_t k);
+#define SDM_SURVEY_FAINT 6e-3
 
 /* Does parameter k, whose unit is mm, do nothing that a grid shows over the range in the table of
  * the shape? It moves no vertex by SDM_SURVEY_NARROW times the size of the shapes, and its values

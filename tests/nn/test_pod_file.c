@@ -67,6 +67,7 @@ static void file_keeps_everything(void **state)
     assert_int_equal(sdm_model_param_index(m, "p2"), 2);
     assert_int_equal(sdm_model_param_index(m, "p"), -1);
     assert_int_equal(sdm_model_param_index(m, NULL), -1);
+    assert_int_equal(sdm_model_param_index(NULL, "p2"), -1);
     assert_true(i->params[2].min == -3 && i->params[2].max == 4 && i->params[2].def == 0.5);
     assert_int_equal(i->n_options, 2);
     assert_string_equal(i->option_names[1], "ear");

@@ -152,8 +152,8 @@ SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
    ask. [any thread] */
 SDM_API sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error *err);
 
-/* Index of a parameter in the parameter vectors of the model; -1 if there is none of this name.
-   [any thread] */
+/* Index of a parameter in the parameter vectors of the model; -1 if there is none of this name, or
+   if the model or the name is NULL. [any thread] */
 SDM_API int sdm_model_param_index(const sdm_model *m, const char *name);
 
 /* The functions below evaluate the network in the calling thread, without allocation. `scratch` is

@@ -57,7 +57,7 @@ const sdm_model_info *sdm_model_get_info(const sdm_model *m) { return &m->info; 
 
 int sdm_model_param_index(const sdm_model *m, const char *name)
 {
-    for (size_t i = 0; name && i < m->info.n_params; i++)
+    for (size_t i = 0; m && name && i < m->info.n_params; i++)
         if (!strcmp(m->info.params[i].name, name)) return (int)i;
     return -1;
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "layers/layers.h"
+#include "layers/point_slopes.h"
 #include "map/grid_blocks.h"
 #include "map/grid_distance.h"
 #include "points/at_points.h"
@@ -283,6 +284,39 @@ sdm_status sdm_exact_certify(const sdm_exact *e, const sdm_grid *grid, const flo
                             values, out, err);
 }
 
+/* The sheets of the surface, with the frames of the solid's triangles. */
+static sdm_sheets sheets_with(const sdm_exact *e, const sdm_frame *frames)
+{
+    const double seam = e->report.unioned ? 2 * e->report.union_error_mm : 0;
+    return (sdm_sheets){&e->nearest, &e->solid, frames, e->source, seam};
+}
+
+sdm_status sdm_exact_slopes_create(const sdm_exact *e, const double *velocity, size_t n,
+                                   sdm_exact_slopes **out, sdm_error *err)
+{
+    const size_t limit = opts_beside(e, 0).memory_limit, need = e->solid.n_tri * sizeof(sdm_frame);
+    *out = NULL;
+    if (limit && need > limit)
+        return sdm_fail(err, SDM_E_NOMEM,
+                        "derivatives at points need %zu bytes, memory_limit leaves %zu", need,
+                        limit);
+    sdm_exact_slopes *s;
+    sdm_status status = SDM_ALLOC(&s, 1, "derivatives at points", err);
+    if (status) return status;
+    status = SDM_ALLOC(&s->frames, e->solid.n_tri, "frames of triangles", err);
+    if (status) {
+        sdm_exact_slopes_free(s);
+        return status;
+    }
+    sdm_sheets_frames(&e->solid, sdm_threads(e->opts.n_threads), s->frames);
+    s->sheets = sheets_with(e, s->frames);
+    s->surface = &e->surface;
+    s->velocity = velocity;
+    s->n = n;
+    *out = s;
+    return SDM_OK;
+}
+
 /* Fills the layers and derivatives of *job. The map itself is always computed, because the layers
  * need its signs; it is written to a temporary array if the caller has none. */
 static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_layers_job *job,
@@ -315,8 +349,7 @@ static sdm_status map_with_layers(const sdm_exact *e, const sdm_grid *grid, sdm_
         s = fill_map(e, grid, band > 0 ? band : INFINITY, need, values, layers ? slot : NULL, err);
     if (!s && n_frame) sdm_sheets_frames(&e->solid, sdm_threads(e->opts.n_threads), frames);
     // the layers from the map
-    const double seam = e->report.unioned ? 2 * e->report.union_error_mm : 0;
-    job->sheets = (sdm_sheets){&e->nearest, &e->solid, frames, e->source, seam};
+    job->sheets = sheets_with(e, frames);
     job->rounding = e->rounding;
     job->opts = &e->opts;
     job->values = values;

@@ -59,9 +59,9 @@ sdm_status sdm_field_create(const sdm_model *m, const sdm_generate_opts *opts, b
 
 static void free_exact(sdm_field *f)
 {
-    sdm_exact_free(f->engine);
-    sdm_mesh_dispose(&f->mesh);
-    f->engine = NULL;
+    sdm_exact_slopes_free(f->slopes);
+    f->slopes = NULL;
+    sdm_shape_surface_dispose(&f->surface);
 }
 
 void sdm_field_free(sdm_field *f)
@@ -76,12 +76,23 @@ void sdm_field_free(sdm_field *f)
     sdm_free(f);
 }
 
-/* The exact engine at the parameters of the field. */
-static sdm_status open_exact(sdm_field *f, sdm_error *err)
+/* The exact engine at the parameters of the field, and with `derivatives` what slopes need. */
+static sdm_status open_exact(sdm_field *f, bool derivatives, sdm_error *err)
 {
     const sdm_exact_opts exact = {.n_threads = f->opts.n_threads};
-    sdm_status s = sdm_instance_mesh(f->opts.exact_shape, f->params, &f->mesh, err);
-    return s ? s : sdm_exact_create(&f->mesh, &exact, &f->engine, err);
+    sdm_status s = sdm_shape_surface_make(f->opts.exact_shape, f->params, derivatives, &exact,
+                                          &f->surface, err);
+    if (!s && derivatives)
+        s = sdm_exact_slopes_create(f->surface.engine, f->surface.velocity, f->surface.n_params,
+                                    &f->slopes, err);
+    return s;
+}
+
+/* The same; a shape whose vertices have no velocities still has distances outside of the box. */
+static sdm_status open_exact_outside(sdm_field *f, sdm_error *err)
+{
+    const sdm_status s = open_exact(f, f->derivatives, err);
+    return s == SDM_E_PLUGIN && f->derivatives ? open_exact(f, false, err) : s;
 }
 
 /* maps[1 + n_params or 1][voxels of the model's grid] = the map by the network, and its
@@ -136,7 +147,10 @@ sdm_status sdm_field_set_params(sdm_field *f, const double *params, sdm_result *
         memcpy(f->params, f->used, f->info->n_params * sizeof *params);
         s = fill_maps(f, err);
     }
-    if (!s && (field_is_exact(f) || f->opts.outside == SDM_OUTSIDE_EXACT)) s = open_exact(f, err);
+    if (!s && field_is_exact(f))
+        s = open_exact(f, f->derivatives, err);
+    else if (!s && f->opts.outside == SDM_OUTSIDE_EXACT)
+        s = open_exact_outside(f, err);
     f->ready = !s;
     if (!s && result) *result = f->result;
     return s;

@@ -332,7 +332,7 @@ static bool settle_outside(const job *j, const int64_t at[3], float *value)
         double world[3];
         sdm_grid_world(j->grid, (const double[]){(double)at[0], (double)at[1], (double)at[2]},
                        world);
-        *value = (float)sdm_exact_point(j->f->engine, world, NULL, NULL, NULL);
+        *value = (float)sdm_exact_point(j->f->surface.engine, world, NULL, NULL, NULL);
     }
     return true;
 }
@@ -579,7 +579,7 @@ sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, double width
     if (!(width >= edge) || !(width <= 1e100))
         return sdm_fail(err, SDM_E_ARG, "band of %g mm, need at least the edge of a voxel, %g mm",
                         width, edge);
-    if (field_is_exact(f)) return sdm_exact_map_blocks(f->engine, grid, width, out, err);
+    if (field_is_exact(f)) return sdm_exact_map_blocks(f->surface.engine, grid, width, out, err);
     job j = {.f = f, .grid = grid, .width = (double)(float)width, .out = out};
     s = make_band(&j, err);
     sdm_free(j.candidate);

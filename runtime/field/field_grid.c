@@ -176,7 +176,7 @@ static sdm_status exact_outside(const sdm_field *f, const sdm_grid *grid, float 
     float *exact = NULL;
     sdm_status s = sdm_alloc_unset((void **)&exact, sdm_grid_count(grid), sizeof *exact,
                                    "exact distances outside of the box", err);
-    if (!s) s = sdm_exact_map(f->engine, grid, exact, err);
+    if (!s) s = sdm_exact_map(f->surface.engine, grid, exact, err);
 #pragma omp parallel for schedule(static) num_threads(f->n_threads) if (f->n_threads > 1)
     for (int64_t r = 0; r < (s ? 0 : rows); r++)
         for (int64_t i = 0; i < nx; i++)
@@ -193,18 +193,20 @@ sdm_status sdm_field_grid(const sdm_field *f, const sdm_grid *grid, float *value
     sdm_status s = sdm_field_check(f, slopes, err);
     if (!s) s = sdm_grid_check(grid, err);
     if (s) return s;
-    const sdm_exact_opts exact = {.n_threads = f->opts.n_threads};
+    const shape_surface *exact = &f->surface;
     if (field_is_exact(f))
-        return slopes ? sdm_exact_shape_jacobian(f->opts.exact_shape, f->params, &exact, grid,
-                                                 values, slopes, NULL, err)
-                      : sdm_exact_map(f->engine, grid, values, err);
+        return slopes
+                   ? sdm_exact_map_derivative(exact->engine, grid, exact->velocity, exact->n_params,
+                                              &(sdm_exact_layers){.values = values}, slopes, err)
+                   : sdm_exact_map(f->surface.engine, grid, values, err);
     const bool leaves = sdm_field_leaves(f, grid);
     if (leaves && f->opts.outside == SDM_OUTSIDE_REFUSE)
         return sdm_field_refuse(f, "the grid leaves", err);
     if (leaves && f->opts.outside == SDM_OUTSIDE_EXACT && slopes)
         return sdm_fail(err, SDM_E_UNSUPPORTED,
-                        "the grid leaves the box of the network: exact distances outside of it "
-                        "have no derivatives by the parameters; use a grid in the box");
+                        "the grid leaves the box of the network: derivatives of a map by the "
+                        "parameters are known in the box alone; use a grid in the box, or "
+                        "points");
     if (sdm_spline_is_parallel(&f->frame, grid))
         s = parallel_map(f, grid, values, slopes, err);
     else

@@ -3,7 +3,9 @@
 
 #include <math.h>
 
+#include "maps/shape_surface.h"
 #include "sdm/field.h"
+#include "sdm/internal/exact_slopes.h"
 #include "spline_grid.h"
 #include "spline_kernels.h"
 
@@ -26,8 +28,8 @@ struct sdm_field {
     bool ready;
     double *params, *used; /* [n_params] as given; as the network takes them */
     sdm_result result;
-    sdm_mesh mesh;
-    sdm_exact *engine; /* NULL: not needed at these parameters */
+    shape_surface surface;    /* without an engine if these parameters do not need it */
+    sdm_exact_slopes *slopes; /* derivatives of exact distances; NULL: not known */
 };
 
 /* A point in the splines of a field. */

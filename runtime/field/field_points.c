@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "field_parts.h"
+#include "sdm/internal/pod.h"
 
 /* Points that a thread takes at once. */
 enum { PIECE = 256 };
@@ -42,32 +43,34 @@ static void slopes_at(const sdm_field *f, const field_place *p, float *slopes)
     for (size_t i = 0; i < f->info->n_params; i++) slopes[i] = factor * field_inside(f, p, i + 1);
 }
 
-static void exact_at(const sdm_field *f, const double x[3], float *value, float *gradient)
-{
-    double normal[3];
-    *value = (float)sdm_exact_point(f->engine, x, NULL, normal, NULL);
-    for (int a = 0; a < 3 && gradient; a++) gradient[a] = (float)normal[a];
-}
-
 /* The outcome of a point. */
 typedef enum outcome { DONE = 0, NOT_FINITE, OUTSIDE, NO_SLOPES } outcome;
+
+static outcome exact_at(const sdm_field *f, const double x[3], float *value, float *gradient,
+                        float *slopes)
+{
+    double distance, normal[3], closest[3], by[SDM_POD_MAX_PARAMS];
+    uint32_t triangle;
+    if (slopes && !f->slopes) return NO_SLOPES;
+    distance = sdm_exact_point(f->surface.engine, x, closest, normal, &triangle);
+    *value = (float)distance;
+    for (int a = 0; a < 3 && gradient; a++) gradient[a] = (float)normal[a];
+    if (!slopes) return DONE;
+    const sdm_exact_at at = {&distance, normal, closest, &triangle};
+    sdm_exact_slopes_at(f->slopes, x, &at, 0, by);
+    for (size_t i = 0; i < f->surface.n_params; i++) slopes[i] = (float)by[i];
+    return DONE;
+}
 
 static outcome point(const sdm_field *f, const double x[3], float *value, float *gradient,
                      float *slopes)
 {
     if (!isfinite(x[0]) || !isfinite(x[1]) || !isfinite(x[2])) return NOT_FINITE;
-    if (field_is_exact(f)) {
-        if (slopes) return NO_SLOPES;
-        exact_at(f, x, value, gradient);
-        return DONE;
-    }
+    if (field_is_exact(f)) return exact_at(f, x, value, gradient, slopes);
     const field_place p = field_find(f, x);
     if (p.outside && f->opts.outside == SDM_OUTSIDE_REFUSE) return OUTSIDE;
-    if (p.outside && f->opts.outside == SDM_OUTSIDE_EXACT) {
-        if (slopes) return NO_SLOPES;
-        exact_at(f, x, value, gradient);
-        return DONE;
-    }
+    if (p.outside && f->opts.outside == SDM_OUTSIDE_EXACT)
+        return exact_at(f, x, value, gradient, slopes);
     *value = field_value(f, &p);
     if (gradient) gradient_at(f, &p, gradient);
     if (slopes) slopes_at(f, &p, slopes);
@@ -83,8 +86,9 @@ static sdm_status report(const sdm_field *f, outcome o, const double x[3], const
                         x[1], x[2]);
     if (o == NO_SLOPES)
         return sdm_fail(err, SDM_E_UNSUPPORTED,
-                        "%s (%g, %g, %g): exact distances at points have no derivatives by the "
-                        "parameters",
+                        "%s (%g, %g, %g) lies outside of the box of the network, and the "
+                        "vertices of the exact shape have no derivatives by the parameters: leave "
+                        "out the slopes or this point",
                         name, x[0], x[1], x[2]);
     snprintf(text, sizeof text, "%s (%g, %g, %g) mm lies outside of", name, x[0], x[1], x[2]);
     return sdm_field_refuse(f, text, err);

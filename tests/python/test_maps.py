@@ -205,6 +205,11 @@ def test_points(run, model, model_file, tmp_path):
     assert np.array_equal(table[:, 0], samples.distance) and np.array_equal(table[:, 1:], samples.gradient)
     same(samples.slopes, tmp_path / "slopes.npy")
     assert model.sample(x, P).gradient is None
+    # outside of the box, slopes are those of exact distances, as central differences have them
+    beyond = [[9, 1, 0.5], [-2, 8, -6]]
+    slopes = model.sample(beyond, P, outside="exact", slopes=True).slopes
+    low, high = (sdmgen.exact_points(model.shape.mesh(a=a, alpha=0.5), beyond).distance for a in (4.0999, 4.1001))
+    assert np.allclose(slopes[:, 0], (high - low) / 2e-4, atol=1e-3) and np.abs(slopes[:, 0]).max() > 0.1
 
 
 def test_the_description_of_a_model(model, model_file):

@@ -1,6 +1,6 @@
 /* Derivatives of exact maps with respect to shape parameters: against closed forms and differences
- * of exact distances.
- * Tests: exact_shape.c */
+ * of exact distances, on grids and at points.
+ * Tests: exact_shape.c point_slopes.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -13,6 +13,7 @@
 
 #include "oracle/exact_tools.h"
 #include "oracle/shape_registry.h"
+#include "sdm/internal/exact_slopes.h"
 #include "sdm/internal/heap.h"
 #include "sdm/runtime.h"
 
@@ -49,6 +50,38 @@ static float *jacobian_at(const sdm_instance *s, const double *p, const sdm_exac
     return j;
 }
 
+/* slopes[n][n_params] = derivatives at the voxel centres of the grid, as points; NaN at a point
+ * that has no answer, which is checked here. */
+static double *slopes_at_points(const sdm_instance *s, const double *p, const sdm_exact *e,
+                                const sdm_grid *g)
+{
+    sdm_error err = {0};
+    size_t n_params;
+    (void)sdm_instance_params(s, &n_params);
+    const size_t n = sdm_grid_count(g) + 1;
+    sdm_mesh mesh = {0};
+    if (sdm_instance_mesh(s, p, &mesh, &err)) fail_msg("%s", err.text);
+    double *velocity = room(3 * mesh.n_vert * n_params, sizeof *velocity),
+           *x = room(10 * n, sizeof *x), *slopes = room(n * n_params, sizeof *slopes);
+    uint32_t *triangle = room(n, sizeof *triangle);
+    if (sdm_instance_velocity(s, p, mesh.n_vert, velocity, &err)) fail_msg("%s", err.text);
+    const sdm_exact_at at = {x + 3 * n, x + 4 * n, x + 7 * n, triangle};
+    for (size_t i = 0; i + 1 < n; i++) position(g, i, x + 3 * i);
+    x[3 * n - 3] = NAN, x[3 * n - 2] = 0, x[3 * n - 1] = 0;
+    sdm_exact_slopes *of = NULL;
+    if (sdm_exact_points(e, x, n, &at, &err)) fail_msg("%s", err.text);
+    if (sdm_exact_slopes_create(e, velocity, n_params, &of, &err)) fail_msg("%s", err.text);
+    for (size_t i = 0; i < n; i++)
+        sdm_exact_slopes_at(of, x + 3 * i, &at, i, slopes + i * n_params);
+    for (size_t k = 0; k < n_params; k++) assert_true(isnan(slopes[(n - 1) * n_params + k]));
+    sdm_exact_slopes_free(of);
+    sdm_mesh_dispose(&mesh);
+    free(triangle);
+    free(x);
+    free(velocity);
+    return slopes;
+}
+
 /* Where forward and backward differences agree, the distance is smooth and the derivative must
  * lie between them. At least a share `wanted` of the voxels must be smooth. */
 static void check_differences(const sdm_instance *s, const double *p, const sdm_exact_opts *o,
@@ -59,6 +92,7 @@ static void check_differences(const sdm_instance *s, const double *p, const sdm_
     const size_t n = sdm_grid_count(g);
     float *values = room(n, sizeof *values), *j = jacobian_at(s, p, o, g, values);
     sdm_exact *here = engine_at(s, p, o);
+    double *at_points = slopes_at_points(s, p, here, g);
     for (size_t k = 0; k < n_params; k++) {
         const double range = params[k].max - params[k].min, h = 2e-6 * range;
         double q[8];
@@ -80,12 +114,17 @@ static void check_differences(const sdm_instance *s, const double *p, const sdm_
                 fail_msg("%s, voxel %zu at (%g %g %g), distance %g: %g, differences %g and %g",
                          params[k].name, i, x[0], x[1], x[2], d, (double)j[k * n + i], backward,
                          forward);
+            const double slope = at_points[i * n_params + k];
+            if (!(fabs(slope - 0.5 * (forward + backward)) * range < 3e-3))
+                fail_msg("%s, point (%g %g %g), distance %g: %g, differences %g and %g",
+                         params[k].name, x[0], x[1], x[2], d, slope, backward, forward);
         }
         sdm_exact_free(before);
         sdm_exact_free(behind);
     }
     assert_true((double)smooth > wanted * (double)(n * n_params));
     sdm_exact_free(here);
+    free(at_points);
     free(values);
     free(j);
 }

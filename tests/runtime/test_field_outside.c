@@ -168,19 +168,64 @@ static void test_exact_outside(void **state)
     const double r = sqrt(14);
     assert_true(fabs((double)value - (r - ball_radius(params))) < 5e-3);
     for (int a = 0; a < 3; a++) assert_true(fabs((double)gradient[a] - x[a] / r) < 0.05);
-    assert_int_equal(sdm_field_point(e, x, &value, NULL, slopes, &err), SDM_E_UNSUPPORTED);
+    assert_false(sdm_field_point(e, x, &value, NULL, slopes, &err));
+    assert_true(fabs((double)slopes[0] + 1) < 5e-3 && fabs((double)slopes[1] + 0.1) < 5e-4);
     assert_int_equal(sdm_field_grid(e, &g, values, exact, &err), SDM_E_UNSUPPORTED);
     check_band(e, &g, 1.5);
     sdm_field_free(e);
     sdm_field_free(f);
 }
 
+/* A ball with one more vertex, which no triangle uses, above the radius of the test. */
+static int mesh_growing(const void *self, const sdm_host *host, const sdm_option_value *options,
+                        const double *p, sdm_mesh_out *out)
+{
+    const size_t n_vert = 2 + (RINGS - 1) * SECTORS;
+    if (mesh_ball(self, host, options, p, out)) return 1;
+    if (!(p[0] > params[0])) return 0;
+    static double vert[3 * (3 + (RINGS - 1) * SECTORS)];
+    static uint32_t tri[6 * (RINGS - 1) * SECTORS];
+    memcpy(vert, out->vert, 3 * n_vert * sizeof *vert);
+    memcpy(tri, out->tri, sizeof tri);
+    if (host->reserve(host, out, n_vert + 1, 2 * (RINGS - 1) * SECTORS)) return 1;
+    memcpy(out->vert, vert, sizeof vert);
+    memcpy(out->tri, tri, sizeof tri);
+    return 0;
+}
+
+/* Vertices whose number depends on a parameter have no velocities: slopes are known in the box
+   alone, and distances everywhere. */
+static void test_exact_outside_without_velocities(void **state)
+{
+    const scene *s = *state;
+    sdm_shape growing = ball_shape;
+    growing.mesh = mesh_growing;
+    sdm_error err;
+    sdm_instance *shape;
+    assert_false(sdm_instance_create(&growing, NULL, 0, NULL, &shape, &err));
+    const sdm_generate_opts o = {.outside = SDM_OUTSIDE_EXACT, .exact_shape = shape};
+    sdm_field *f = open_field(s->model[0], &o, true);
+    const double in[3] = {1, 0.5, 0.2}, out[3] = {3, 1, -2};
+    float value, slopes[2];
+    assert_false(sdm_field_point(f, in, &value, NULL, slopes, &err));
+    assert_true((double)slopes[0] < -0.3);
+    assert_false(sdm_field_point(f, out, &value, NULL, NULL, &err));
+    assert_true(fabs((double)value - (sqrt(14) - ball_radius(params))) < 5e-3);
+    assert_int_equal(sdm_field_point(f, out, &value, NULL, slopes, &err), SDM_E_UNSUPPORTED);
+    assert_non_null(strstr(err.text, "the vertices of the exact shape have no derivatives"));
+    sdm_field_free(f);
+    sdm_instance_free(shape);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_bound_outside),   cmocka_unit_test(test_bound_is_below_the_distance),
-        cmocka_unit_test(test_refused_outside), cmocka_unit_test(test_band_with_bound),
+        cmocka_unit_test(test_bound_outside),
+        cmocka_unit_test(test_bound_is_below_the_distance),
+        cmocka_unit_test(test_refused_outside),
+        cmocka_unit_test(test_band_with_bound),
         cmocka_unit_test(test_exact_outside),
+        cmocka_unit_test(test_exact_outside_without_velocities),
     };
     return cmocka_run_group_tests(tests, open_scene, close_scene);
 }

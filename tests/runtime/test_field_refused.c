@@ -21,7 +21,7 @@ static void test_policies_out_of_range(void **state)
     const double p[2] = {1.7, 0.5}, edge[2] = {1.5, 0.5};
     const sdm_grid m = model_grid(false), g = case_grid(&m, &cases[1]);
     const size_t n = sdm_grid_count(&g);
-    float *values = malloc(2 * n * sizeof *values), *wanted = values + n;
+    float *values = malloc(2 * n * sizeof *values), *wanted = values + n, slopes[2];
     sdm_result r;
     sdm_error err;
     assert_int_equal(sdm_generate_grid(s->model[0], p, NULL, &g, values, NULL, &r, &err),
@@ -37,7 +37,9 @@ static void test_policies_out_of_range(void **state)
     assert_false(sdm_exact_shape_map(s->shape, p, NULL, &g, wanted, NULL, &err));
     assert_true(r.source == SDM_SOURCE_EXACT && same(values, wanted, n));
     const double x[3] = {5, 0, 0};
-    assert_false(sdm_generate_points(s->model[0], p, &exact, x, 1, values, wanted, NULL, &r, &err));
+    assert_false(
+        sdm_generate_points(s->model[0], p, &exact, x, 1, values, wanted, slopes, &r, &err));
+    assert_true(fabs((double)slopes[0] + 1) < 5e-3 && fabs((double)slopes[1] + 0.1) < 5e-4);
     assert_true(r.source == SDM_SOURCE_EXACT);
     assert_true(fabs((double)values[0] - 3.25) < 5e-3 && fabs((double)wanted[0] - 1) < 0.05);
     sdm_blocks band;

@@ -21,12 +21,9 @@ static void voxel_fill_derivative(const sdm_layers_job *job, const sdm_vertex_gr
                                   size_t voxel, size_t n_voxel)
 {
     const size_t n_vert = job->sheets.mesh->n_vert;
-    for (size_t k = 0; k < job->n_velocity; k++) {
-        const double *velocity = job->velocity + 3 * n_vert * k;
-        double sum = 0;
-        for (int i = 0; i < g->n; i++) sum += v3_dot(g->d[i], velocity + 3 * (size_t)g->vertex[i]);
-        job->derivative[n_voxel * k + voxel] = (float)sum;
-    }
+    for (size_t k = 0; k < job->n_velocity; k++)
+        job->derivative[n_voxel * k + voxel] =
+            (float)sdm_vertex_gradient_along(g, job->velocity + 3 * n_vert * k);
 }
 
 static void voxel_fill(const sdm_layers_job *job, const double x[3], size_t voxel, size_t n_voxel)
@@ -49,7 +46,8 @@ static void voxel_fill(const sdm_layers_job *job, const double x[3], size_t voxe
     }
     if (!job->derivative) return;
     sdm_vertex_gradient g = {.n = 0};
-    if (slot != SDM_NONE) sdm_vertex_gradient_find(&job->sheets, slot, feature, q, n, d < 0, &g);
+    if (slot != SDM_NONE)
+        sdm_vertex_gradient_find(&job->sheets, surface->tree.order[slot], feature, q, n, d < 0, &g);
     voxel_fill_derivative(job, &g, voxel, n_voxel);
 }
 

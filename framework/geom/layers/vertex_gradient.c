@@ -156,10 +156,11 @@ static split split_find(const crossing *c, const double normal[3])
     return best;
 }
 
-void sdm_vertex_gradient_find(const sdm_sheets *s, uint32_t slot, int feature, const double q[3],
-                              const double normal[3], bool inside, sdm_vertex_gradient *out)
+void sdm_vertex_gradient_find(const sdm_sheets *s, uint32_t triangle, int feature,
+                              const double q[3], const double normal[3], bool inside,
+                              sdm_vertex_gradient *out)
 {
-    const uint32_t t = s->source[s->surface->tree.order[slot]];
+    const uint32_t t = s->source[triangle];
     double rest[3] = {normal[0], normal[1], normal[2]};
     out->n = 0;
     // only inside: seen from outside, crossing sheets form a concave corner, which is never the
@@ -176,4 +177,11 @@ void sdm_vertex_gradient_find(const sdm_sheets *s, uint32_t slot, int feature, c
         }
     }
     gradient_add(s, t, q, rest, out);
+}
+
+double sdm_vertex_gradient_along(const sdm_vertex_gradient *g, const double *velocity)
+{
+    double sum = 0;
+    for (int i = 0; i < g->n; i++) sum += v3_dot(g->d[i], velocity + 3 * (size_t)g->vertex[i]);
+    return sum;
 }

@@ -29,9 +29,13 @@ typedef struct sdm_vertex_gradient {
 /* Writes frames[m->n_tri], the frames of the triangles of a mesh. */
 void sdm_sheets_frames(const sdm_mesh *m, int n_threads, sdm_frame *frames);
 
-/* Computes the derivatives of the signed distance at a point x. slot, feature, q: nearest triangle
- * of the surface, where on it the nearest point lies (point_triangle.h), and the nearest point;
+/* Computes the derivatives of the signed distance at a point x. triangle, feature, q: nearest
+ * triangle of the surface, where on it the nearest point lies (point_triangle.h), and that point;
  * normal: gradient of the signed distance with respect to x; inside: the distance is negative. [any
  * thread] */
-void sdm_vertex_gradient_find(const sdm_sheets *s, uint32_t slot, int feature, const double q[3],
-                              const double normal[3], bool inside, sdm_vertex_gradient *out);
+void sdm_vertex_gradient_find(const sdm_sheets *s, uint32_t triangle, int feature,
+                              const double q[3], const double normal[3], bool inside,
+                              sdm_vertex_gradient *out);
+
+/* The derivative of the distance when the vertices of the mesh move with velocity[n_vert][3]. */
+double sdm_vertex_gradient_along(const sdm_vertex_gradient *g, const double *velocity);

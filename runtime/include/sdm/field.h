@@ -57,9 +57,11 @@ SDM_API sdm_status sdm_field_set_params(sdm_field *f, const double *params, sdm_
    the world coordinates, mm per mm; slopes are the derivatives by the parameters, mm per unit of
    the parameter, as right as sdm_model_check_use(SDM_USE_DERIVATIVE) tells. Outside of the box the
    option `outside` decides; gradients there are those of the bound or of the exact distance, slopes
-   those of the bound. SDM_E_RANGE: a point lies outside of the box and the option is
+   those of the bound or, at points, of the exact distance (sdm_exact_map_derivative() defines
+   them). SDM_E_RANGE: a point lies outside of the box and the option is
    SDM_OUTSIDE_REFUSE. SDM_E_ARG: a coordinate is not finite; slopes without `derivatives`.
-   SDM_E_UNSUPPORTED: slopes of exact distances at points. */
+   SDM_E_UNSUPPORTED: slopes of exact distances outside of the box, on a grid, or at points if the
+   vertices of the shape have no derivatives (sdm_instance_velocity()). */
 
 /* *value = the distance at x (LPS, mm); gradient[3] and slopes[n_params] may be NULL. Allocates
    nothing. */

@@ -23,6 +23,7 @@
 #include "sdm/internal/block_border.h"
 #include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
+#include "sdm/internal/exact_slopes.h"
 #include "sdm/internal/mesh_box.h"
 #include "sdm/internal/methods.h"
 #include "sdm/internal/shape_box.h"
@@ -72,8 +73,8 @@ static sdm_status make_shape_mesh(job *j, sdm_error *err)
     if (!s) s = sdm_instance_mesh(shape->instance, shape->values, &j->mesh, err);
     j->ms_mesh = 1e3 * (sdm_clock() - start);
     if (!s)
-        s = cli_layers_velocity(&j->layers, j->args, shape->instance, shape->values, j->mesh.n_vert,
-                                err);
+        s = cli_layers_velocity(&j->layers, j->args->jacobian || j->points.wants_slopes,
+                                shape->instance, shape->values, j->mesh.n_vert, err);
     if (!s) cli_add_params(shape->params, shape->n_params, shape->values, &j->params);
     if (!s && j->params.failed) s = sdm_fail(err, SDM_E_NOMEM, "out of memory for the metadata");
     return s;
@@ -187,6 +188,19 @@ static sdm_status run_engine(job *j, sdm_error *err)
     return s;
 }
 
+/* The derivatives by the parameters at the points x[n][3], whose answers are known. */
+static sdm_status compute_slopes(job *j, const sdm_exact *engine, const double *x, sdm_error *err)
+{
+    cli_points_table *t = &j->points;
+    sdm_exact_slopes *slopes = NULL;
+    const sdm_status s =
+        sdm_exact_slopes_create(engine, j->layers.velocity, t->n_params, &slopes, err);
+    for (size_t i = 0; i < t->n && !s; i++)
+        sdm_exact_slopes_at(slopes, x + 3 * i, &t->at, i, t->slopes + i * t->n_params);
+    sdm_exact_slopes_free(slopes);
+    return s;
+}
+
 /* Does the work of --points. */
 static sdm_status run_points(job *j, sdm_error *err)
 {
@@ -195,6 +209,7 @@ static sdm_status run_points(job *j, sdm_error *err)
                                  .n_threads = (int)j->args->threads,
                                  .cancelled = cli_interrupted};
     sdm_exact *engine = NULL;
+    size_t n_params = 0;
     double *x = NULL;
     size_t n = 0;
     sdm_status s = cli_read_points(j->args->points, &x, NULL, &n, err);
@@ -203,10 +218,13 @@ static sdm_status run_points(job *j, sdm_error *err)
         sdm_box_add_mesh(&shape, &j->mesh);
         cli_warn_points_unit(j->args->points, x, n, &shape, "the shape");
     }
-    if (!s) s = cli_points_allocate(&j->points, n, err);
+    const sdm_param *params =
+        j->shape.instance ? sdm_instance_params(j->shape.instance, &n_params) : NULL;
+    if (!s) s = cli_points_allocate(&j->points, params, n_params, n, err);
     if (!s) s = sdm_exact_create(&j->mesh, &opts, &engine, err);
     if (!s) j->report = *sdm_exact_get_report(engine);
     if (!s) s = sdm_exact_points(engine, x, n, &j->points.at, err);
+    if (!s && j->points.wants_slopes) s = compute_slopes(j, engine, x, err);
     if (!s) s = cli_points_write(&j->points, x, j->args, err);
     sdm_exact_free(engine);
     sdm_free(x);

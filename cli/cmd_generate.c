@@ -218,6 +218,16 @@ static void warn_far(const job *j)
         cli_warn("%s: %s", j->args->files.items[0], why.text);
 }
 
+/* Warns of the network, once parameters and options are known to be right. */
+static void warn_model(job *j)
+{
+    const char *path = j->args->files.items[0];
+    cli_warn_quality(path, j->info);
+    if (!j->args->points) j->thin = cli_warn_thin_model(path, j->info, &j->grid);
+    warn_label_volumes(j);
+    warn_far(j);
+}
+
 /* Chooses the grid. On another grid than the model's, level sets alone need no whole maps. */
 static sdm_status choose_grid(job *j, sdm_error *err)
 {
@@ -247,7 +257,6 @@ static sdm_status open_model(job *j, sdm_error *err)
     const sdm_status s = cli_open_model(j->args, j->args->files.items[0], &j->model, err);
     if (s) return s;
     j->info = sdm_model_get_info(j->model);
-    cli_warn_quality(j->args->files.items[0], j->info);
     return cli_model_params(j->info, &j->params, err);
 }
 
@@ -283,9 +292,6 @@ static sdm_status prepare_job(job *j, sdm_error *err)
                         "--measure or --json");
     sdm_status s = open_model(j, err);
     if (!s) s = choose_grid(j, err);
-    if (!s) j->thin = cli_warn_thin_model(args->files.items[0], j->info, &j->grid);
-    if (!s) warn_label_volumes(j);
-    if (!s) warn_far(j);
     if (!s) s = read_rows(j, err);
     if (!s && !args->rows) s = cli_row_files_check(args, 1, err);
     if (!s) s = open_shape(j, err);
@@ -293,6 +299,7 @@ static sdm_status prepare_job(job *j, sdm_error *err)
     if (!s) s = check_rows(j, err);
     // with --params: check the names of the files of the last row, which are the longest
     if (!s && args->rows) s = cli_row_files_check(args, j->n_rows, err);
+    if (!s) warn_model(j);
     return s ? s : allocate_maps(j, err);
 }
 
@@ -582,7 +589,8 @@ typedef struct point_answers {
     float *values, *gradient, *slopes; /* [n], [n][3], [n][n_params]; NULL: not wanted */
 } point_answers;
 
-static sdm_status compute_points(job *j, point_answers *a, sdm_result *result, sdm_error *err)
+static sdm_status compute_points(job *j, bool slopes, point_answers *a, sdm_result *result,
+                                 sdm_error *err)
 {
     const sdm_generate_opts opts = {.policy = cli_policy(j->args),
                                     .exact_shape = j->shape,
@@ -591,7 +599,7 @@ static sdm_status compute_points(job *j, point_answers *a, sdm_result *result, s
     size_t count;
     sdm_status s = SDM_ALLOC(&a->values, a->n, "distances", err);
     if (!s) s = SDM_ALLOC(&a->gradient, 3 * a->n, "gradients", err);
-    if (!s && j->args->jacobian) {
+    if (!s && slopes) {
         s = sdm_mul(a->n, j->info->n_params, &count, err);
         if (!s) s = SDM_ALLOC(&a->slopes, count, "derivatives", err);
     }
@@ -620,16 +628,14 @@ static sdm_status fail_point(const job *j, const point_answers *a, sdm_status s,
 static sdm_status write_points(const job *j, const point_answers *a, cli_points_table *t,
                                sdm_error *err)
 {
-    sdm_status s = cli_points_allocate(t, a->n, err);
+    sdm_status s = cli_points_allocate(t, j->params, j->info->n_params, a->n, err);
     for (size_t i = 0; i < a->n && !s && t->at.distance; i++)
         t->at.distance[i] = (double)a->values[i];
     for (size_t i = 0; i < 3 * a->n && !s && t->at.gradient; i++)
         t->at.gradient[i] = (double)a->gradient[i];
-    if (!s) s = cli_points_write(t, a->x, j->args, err);
-    if (!s && a->slopes)
-        s = sdm_npy_write(j->args->jacobian, a->slopes, (const size_t[]){a->n, j->info->n_params},
-                          2, err);
-    return s;
+    for (size_t i = 0; i < a->n * t->n_params && !s && t->slopes; i++)
+        t->slopes[i] = (double)a->slopes[i];
+    return s ? s : cli_points_write(t, a->x, j->args, err);
 }
 
 /* Longest edge of a voxel of the model's own grid, mm. */
@@ -696,6 +702,15 @@ static void notice_bounds(const job *j, const point_answers *a)
                    n, a->n);
 }
 
+/* The limits of answers by the network. */
+static void tell_network(const job *j, const point_answers *a)
+{
+    if (a->slopes) cli_warn_derivatives(j->args->files.items[0], j->model);
+    notice_ridges(j, a);
+    notice_bounds(j, a);
+    notice_between(j, "sdmgen exact --points computes exact distances");
+}
+
 /* Does the work of --points. */
 static sdm_status run_points(job *j, sdm_error *err)
 {
@@ -705,20 +720,17 @@ static sdm_status run_points(job *j, sdm_error *err)
     sdm_status s = cli_points_check_model(j->args, &table, err);
     if (!s) s = open_model(j, err);
     if (!s) s = cli_read_points(j->args->points, &a.x, &a.lines, &a.n, err);
-    if (!s) warn_far(j);
     if (!s) s = read_rows(j, err);
     if (!s) s = open_shape(j, err);
     if (!s) s = check_rows(j, err);
+    if (!s) warn_model(j);
     if (!s) warn_unit(j, &a);
-    if (!s) s = compute_points(j, &a, &result, err);
+    if (!s) s = compute_points(j, table.wants_slopes, &a, &result, err);
     if (s == SDM_E_RANGE && a.lines) s = fail_point(j, &a, s, err);
     if (!s && result.clamped) notice_clamped(j, 0);
     if (!s) notice_row(j, 0, &result);
     if (!s) s = write_points(j, &a, &table, err);
-    if (!s && result.source != SDM_SOURCE_EXACT) notice_ridges(j, &a);
-    if (!s && result.source != SDM_SOURCE_EXACT) notice_bounds(j, &a);
-    if (!s && result.source != SDM_SOURCE_EXACT)
-        notice_between(j, "sdmgen exact --points computes exact distances");
+    if (!s && result.source != SDM_SOURCE_EXACT) tell_network(j, &a);
     cli_points_dispose(&table);
     sdm_free(a.slopes);
     sdm_free(a.gradient);

@@ -289,11 +289,13 @@ const cli_option cli_options[] = {
      "vertices of .ply .stl .obj .off .vtk .vtp, LPS mm; -o FILE.csv (x,y,z and the columns) or "
      "FILE.npy (float64, the columns alone), one row a point"},
     {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_EXACT), AT(columns),
-     "columns for --points: distance,gradient,closest,triangle (default distance). Where several "
-     "points of the surface are equally near, as on a ridge, gradient, closest and triangle are "
-     "those of one of them"},
+     "columns for --points: distance,gradient,closest,triangle,slopes (default distance); slopes: "
+     "the derivatives by the parameters of --shape, one column d_NAME each. Where several points "
+     "of the surface are equally near, as on a ridge, all but the distance are those of one of "
+     "them"},
     {"columns", 0, CLI_TEXT, "LIST", NULL, 0, 0, ON(CLI_GENERATE), AT(columns),
-     "columns for --points: distance,gradient (default distance)"},
+     "columns for --points: distance,gradient,slopes (default distance); slopes: the derivatives "
+     "by the parameters, one column d_NAME each"},
     {"narrow", 0, CLI_REAL, "N", NULL, 0.5, 1e6, ON(CLI_EXACT), AT(narrow),
      "narrow band: clamp distances to N voxels (of the smallest edge), which is faster"},
     {"tolerance", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_EXACT), AT(tolerance),
@@ -368,7 +370,7 @@ const cli_option cli_options[] = {
     {"jacobian", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT),
      AT(jacobian),
      "also write the derivatives by the shape's parameters: float32 [parameter][z][y][x], mm per "
-     "unit (generate --points: [point][parameter]; exact --points: none)"},
+     "unit (--points: [point][parameter])"},
     {"audit", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH), AT(audit),
      "check the mesh and print its properties, defects and parts"},
     {"turn-parts", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH) | ON(CLI_EXACT), AT(turn_parts),

@@ -62,10 +62,10 @@ sdm_status cli_layers_check(const cli_args *args, sdm_error *err)
     return s ? s : cli_check_files(args, NULL, err);
 }
 
-sdm_status cli_layers_velocity(cli_layers *l, const cli_args *args, const sdm_instance *shape,
+sdm_status cli_layers_velocity(cli_layers *l, bool wanted, const sdm_instance *shape,
                                const double *params, size_t n_vert, sdm_error *err)
 {
-    if (!args->jacobian) return SDM_OK;
+    if (!wanted) return SDM_OK;
     (void)sdm_instance_params(shape, &l->n_params);
     size_t count;
     sdm_status s = sdm_mul(3 * n_vert, l->n_params, &count, err);

@@ -24,9 +24,9 @@ double cli_layers_bytes(const cli_layers *l, const cli_args *args);
  * options that they require. SDM_E_ARG, SDM_E_IO. */
 sdm_status cli_layers_check(const cli_args *args, sdm_error *err);
 
-/* With --jacobian: fills l->velocity for the mesh of the shape at params[n_params]; the mesh has
- * n_vert vertices. */
-sdm_status cli_layers_velocity(cli_layers *l, const cli_args *args, const sdm_instance *shape,
+/* If derivatives are wanted: fills l->velocity for the mesh of the shape at params[n_params]; the
+ * mesh has n_vert vertices. */
+sdm_status cli_layers_velocity(cli_layers *l, bool wanted, const sdm_instance *shape,
                                const double *params, size_t n_vert, sdm_error *err);
 
 /* Computes the distances into values[nz][ny][nx] and the requested layers. Triangle indices refer

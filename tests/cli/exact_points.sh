@@ -68,6 +68,37 @@ sed 1d on.csv | awk -F, '{ if ($4 > 1e-15 || $4 < -1e-15) exit 1 }' || bad "vert
 # An array that is not [n][3].
 expect 3 'd.npy: array with 2 dimensions, the second of 8; need \[n\]\[3\]' sdmgen exact --mesh cube.off --points d.npy -o no.csv
 
+# Slopes: the derivatives by the parameters, as central differences of distances have them, inside and outside.
+printf 'x,y,z\n3,2,2.5\n1,0.5,0.25\n-0.3,-2,4\n' >at.csv
+# differences SHAPE PARAMETER=VALUE...: compares the columns of slopes.csv behind the distance
+differences() {
+    local shape=$1 column=4 word other side moved
+    shift
+    for word in "$@"; do
+        column=$((column + 1))
+        for side in - +; do
+            moved=("-p ${word%=*}=$(awk -v v="${word#*=}" "BEGIN { printf \"%.9f\", v $side 1e-5 }")")
+            for other in "$@"; do [ "$other" = "$word" ] || moved+=("-p $other"); done
+            # shellcheck disable=SC2068 # two words each
+            expect 0 - sdmgen exact --shape $shape --points at.csv -o side$side.csv --quiet ${moved[@]}
+        done
+        [ "$(head -n 1 slopes.csv | cut -d, -f $column)" = "d_${word%=*}" ] || bad "$shape: header $(head -n 1 slopes.csv)"
+        paste -d, slopes.csv side-.csv side+.csv | sed 1d | awk -F, -v c=$column -v n="$(head -n 1 slopes.csv | tr , '\n' | wc -l)" '
+            { d = ($(n + 8) - $(n + 4)) / 2e-5 - $c; largest = $c * $c > largest ? $c * $c : largest }
+            d > 1e-4 || d < -1e-4 { exit 1 } END { if (NR != 3 || largest < 0.04) exit 1 }' ||
+            bad "$shape: column $column of $(xargs <slopes.csv), distances $(xargs <side-.csv), $(xargs <side+.csv)"
+    done
+}
+expect 0 - sdmgen exact --shape capsule -p radius=1.5 -p length=4 --points at.csv -o slopes.csv --columns distance,slopes --jacobian slopes.npy --quiet
+differences capsule radius=1.5 length=4
+head -c 128 slopes.npy | tr -d '\0' | grep -a -q "'<f4', 'fortran_order': False, 'shape': (3, 2)" || bad 'header of slopes.npy'
+[ "$(od -An -v -t f4 -w8 -j $(($(wc -c <slopes.npy) - 24)) slopes.npy | awk '{ printf "%.5f,%.5f ", $1, $2 }')" = \
+    "$(sed 1d slopes.csv | awk -F, '{ printf "%.5f,%.5f ", $5, $6 }')" ] || bad 'values of slopes.npy'
+expect 0 - sdmgen exact --shape ellipsoid -p rx=2.5 -p ry=2 -p rz=1.5 --points at.csv -o slopes.csv --columns distance,slopes --quiet
+differences ellipsoid rx=2.5 ry=2 rz=1.5
+expect 0 - sdmgen exact --shape ellipsoid --points at.csv --jacobian alone.npy --quiet
+present alone.npy
+
 # Mistakes.
 printf 'x,y,z\n1,2,3\n1,2\n' >bad.csv
 expect 3 'bad.csv:3: 2 values, a line needs three' sdmgen exact --mesh cube.off --points bad.csv -o no.csv
@@ -96,7 +127,9 @@ expect 2 'an output is needed' sdmgen exact --mesh cube.off --points p.csv
 expect 2 "unknown column 'normal', known are" sdmgen exact --mesh cube.off --points p.csv -o no.csv --columns distance,normal
 expect 2 "'distance' is given twice" sdmgen exact --mesh cube.off --points p.csv -o no.csv --columns distance,distance
 expect 2 'exact --points: --size is an option of maps$' sdmgen exact --mesh cube.off --points p.csv -o no.csv --size 4,4,4
-expect 2 'exact --points: --jacobian is an option of maps; .*sdmgen generate MODEL --points' sdmgen exact --mesh cube.off --points p.csv -o no.csv --jacobian j.npy
+expect 2 '^sdmgen: error: --jacobian needs --shape: a mesh file has no parameters' sdmgen exact --mesh cube.off --points p.csv -o no.csv --jacobian no.npy
+expect 2 '^sdmgen: error: --columns slopes needs --shape: a mesh file' sdmgen exact --mesh cube.off --points p.csv -o no.csv --columns slopes
+expect 2 "'no.csv': its name must end in .npy" sdmgen exact --shape capsule --points p.csv --jacobian no.csv
 expect 2 'exact --points: --closest is an option of maps; --columns' sdmgen exact --mesh cube.off --points p.csv -o no.csv --closest c.npy
 expect 2 '--columns belongs to --points' sdmgen exact --mesh cube.off -o no.npy --columns distance
 expect 2 'would overwrite the input' sdmgen exact --mesh cube.off --points p.csv -o p.csv

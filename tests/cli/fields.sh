@@ -44,9 +44,25 @@ expect 0 - sdmgen generate $model --size 20,17,14 --spacing 0.71052 -q -o cubes.
 
 # Points: the values of the grid, gradients, derivatives.
 printf 'x,y,z\n-6,-5.2,-4.4\n0.1,0.2,0.3\n' >points.csv
-expect 0 'stated error, RMSE .*sdmgen exact --points computes exact distances' sdmgen generate $model -p a=4.2 --points points.csv --columns distance,gradient -o at.csv -o at.npy --jacobian slopes.npy
+expect 0 'stated error, RMSE .*sdmgen exact --points computes exact distances' sdmgen generate $model -p a=4.2 --points points.csv --columns distance,gradient -o at.csv -o at.npy
 [ "$(head -n 1 at.csv)" = x,y,z,distance,gradient_x,gradient_y,gradient_z ] || bad 'points: wrong header'
 [ "$(wc -l <at.csv)" -eq 3 ] || bad 'points: wrong number of rows'
+# the derivatives of this network are poor: points say so as maps do
+sdmgen generate $model -p a=4.2 --points points.csv -o distances.csv --jacobian slopes.npy 2>err || bad "points with derivatives: $(cat err)"
+grep '^sdmgen: warning: .*derivatives of its maps are off' err >of_points
+sdmgen generate $model -p a=4.2 -o j.npy --jacobian j.npy.npy 2>err || bad 'a map with derivatives'
+grep '^sdmgen: warning: .*derivatives of its maps are off' err >of_maps && cmp of_points of_maps || bad 'derivatives at points: no warning, or another one than that of maps'
+sdmgen generate $model -p a=4.2 --points points.csv --columns slopes,distance -o by.csv 2>err || bad "slopes: $(cat err)"
+grep -q '^sdmgen: warning: .*derivatives of its maps are off' err || bad "slopes: no warning: $(cat err)"
+[ "$(head -n 1 by.csv)" = x,y,z,d_a,d_alpha,d_b,d_phi,distance ] || bad "slopes: header $(head -n 1 by.csv)"
+[ "$(od -An -v -t f4 -w16 -j $(($(wc -c <slopes.npy) - 32)) slopes.npy | awk '{ printf "%.5f,%.5f,%.5f,%.5f ", $1, $2, $3, $4 }')" = \
+    "$(sed 1d by.csv | awk -F, '{ printf "%.5f,%.5f,%.5f,%.5f ", $4, $5, $6, $7 }')" ] || bad "slopes: $(xargs <by.csv)"
+# outside of the box they are those of the exact shape
+printf 'x,y,z\n9,1,0.5\n-2,8,-6\n' >beyond.csv
+sdmgen generate $model -p a=4.9 --outside exact --points beyond.csv --columns distance,slopes -o by_model.csv 2>err || bad "exact slopes: $(cat err)"
+expect 0 - sdmgen exact --shape cochlea -p a=4.9 --points beyond.csv --columns distance,slopes -o by_shape.csv --quiet
+paste -d, by_model.csv by_shape.csv | sed 1d | awk -F, '{ for (i = 4; i <= 8; i++) if (!($i - $(i + 8) < 1e-5 && $(i + 8) - $i < 1e-5)) exit 1 } END { if (NR != 2) exit 1 }' ||
+    bad "exact slopes: $(xargs <by_model.csv), of the shape $(xargs <by_shape.csv)"
 echo '0,0,100' >far.csv
 # a file that is no table of points: nothing else is said before
 printf 'x,y\n1,2\n' >two.csv
@@ -58,7 +74,7 @@ grep -q '1 of 1 points lie outside of the box of the network: their values are l
 expect 0 - sdmgen generate $model -p a=4.2 --points points.csv -o one.csv --outside bound --quiet
 printf 'x,y,z\n0,0,0\n\n90,1,1\n' >far.csv
 expect 5 'far\.csv:4: point 2 of 2 \(90, 1, 1\) mm lies outside of the box' sdmgen generate $model --points far.csv -o x.csv
-expect 2 'distance and gradient only' sdmgen generate $model --points points.csv --columns triangle -o x.csv
+expect 2 'distance, gradient and slopes only' sdmgen generate $model --points points.csv --columns triangle -o x.csv
 expect 2 '--spacing is an option of maps' sdmgen generate $model --points points.csv --spacing 0.45 -o x.csv
 expect 2 'an output is needed' sdmgen generate $model --points points.csv
 expect 2 'belongs to --points' sdmgen generate $model --columns distance -o x.npy

@@ -37,6 +37,15 @@ for kind in sdmnn deepsdf imnet template; do
     hash=$(json values_crc64)
     sdmgen generate $model --json --threads 3 >out 2>err || bad "$kind: generate: $(cat err)"
     [ "$hash" = "$(json values_crc64)" ] || bad "$kind: the values depend on the number of threads"
+    # a parameter out of range: the error alone, whatever is to be said of the network
+    param=radius
+    [ $kind != template ] || param=rx
+    echo '0,0,0' >zero.csv
+    for what in '-o no.npy' '--points zero.csv -o no.csv'; do
+        # shellcheck disable=SC2086 # several words
+        sdmgen generate $model -p $param=99 $what >out 2>err && bad "$kind: $param=99 $what"
+        [ "$(grep -c . err)" = 1 ] && grep -q "^sdmgen: error: parameter '$param' = 99" err || bad "$kind: $param=99 $what: $(cat err)"
+    done
     expect 0 - sdmgen eval $model --samples 2 --naive 0 --json --quiet
     awk -v v="$(json mse_mm2)" 'BEGIN { exit !(v > 0) }' || bad "$kind: eval: mse_mm2 is $(json mse_mm2)"
     expect 0 - sdmgen bench network $model --json

@@ -174,6 +174,26 @@ static void test_each_allocation_may_fail(void **state)
     assert_true(failures > 8);
 }
 
+/* The same for slopes of exact distances at a point. */
+static void test_each_allocation_of_exact_slopes_may_fail(void **state)
+{
+    const scene *s = *state;
+    const sdm_generate_opts o = {
+        .policy = SDM_RANGE_EXACT, .exact_shape = s->shape, .n_threads = 1};
+    const double p[2] = {1.7, 0.5}, x[3] = {5, 0, 0};
+    float value, slopes[2];
+    sdm_error err;
+    sdm_status status = SDM_E_NOMEM;
+    unsigned long i = 1;
+    for (; status; i++) {
+        sdm_alloc_fail_after(i);
+        status = sdm_generate_points(s->model[0], p, &o, x, 1, &value, NULL, slopes, NULL, &err);
+        sdm_alloc_fail_after(0);
+        assert_true(!status || status == SDM_E_NOMEM);
+    }
+    assert_true(i > 20 && fabs((double)slopes[0] + 1) < 5e-3);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -181,6 +201,7 @@ int main(void)
         cmocka_unit_test(test_check_on_a_grid),
         cmocka_unit_test(test_wrong_arguments_are_refused),
         cmocka_unit_test(test_each_allocation_may_fail),
+        cmocka_unit_test(test_each_allocation_of_exact_slopes_may_fail),
     };
     return cmocka_run_group_tests(tests, open_scene, close_scene);
 }

@@ -20,7 +20,7 @@ if [ -n "$long" ]; then
     wrong=1
 fi
 . .ci/setup.sh
-configure release
+configure release -DSDM_TESTS=ON -DSDM_BENCH=ON
 
 printf '%s\0' "${sources[@]}" | xargs -0 -P "$(nproc)" -n 16 "$tidy" -p build/release --quiet 2>/dev/null || wrong=1
 [ $wrong = 0 ] || {

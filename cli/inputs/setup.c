@@ -1,6 +1,7 @@
 /* Opens the shapes, models and mesh files of the command line; reads parameters and grids. */
 #include "setup.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,6 +51,24 @@ static sdm_status isolate(const cli_args *args, sdm_registry *r, sdm_error *err)
     return args->isolate ? sdm_registry_isolate(r, &how, err) : SDM_OK;
 }
 
+/* Tells of file number i in SDMGEN_PLUGIN_PATH that was skipped. given: so many of the first shapes
+ * are built in or from --plugin, which comes before the path. */
+static void tell_skipped(const sdm_registry *r, size_t i, size_t given)
+{
+    const char *skipped = sdm_registry_skipped(r, i), *end = strstr(skipped, ": shape '");
+    for (size_t k = 0; k < given && end; k++) {
+        const char *origin = sdm_registry_origin(r, k);
+        char clash[PATH_MAX + 200];
+        const char *name = sdm_registry_at(r, k)->name;
+        snprintf(clash, sizeof clash, ": shape '%s' is there already (%s): ", name, origin);
+        if (origin[0] != '/' || strncmp(end, clash, strlen(clash)) != 0) continue;
+        cli_notice("shape '%s' is from --plugin, not from %.*s in SDMGEN_PLUGIN_PATH", name,
+                   (int)(end - skipped), skipped);
+        return;
+    }
+    cli_notice("skipped a file in SDMGEN_PLUGIN_PATH: %s", skipped);
+}
+
 sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error *err)
 {
     sdm_status s = sdm_registry_create(out, err);
@@ -57,6 +76,7 @@ sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error
     if (!s) s = isolate(args, *out, err);
     for (size_t i = 0; i < args->plugins.n && !s; i++)
         s = sdm_registry_load(*out, args->plugins.items[i], err);
+    const size_t given = s ? 0 : sdm_registry_count(*out);
     if (!s) s = sdm_registry_load_path(*out, getenv("SDMGEN_PLUGIN_PATH"), err);
     if (s) {
         sdm_registry_free(*out);
@@ -67,7 +87,7 @@ sdm_status cli_open_registry(const cli_args *args, sdm_registry **out, sdm_error
         if (sdm_registry_skipped_folder(*out, i))
             cli_warn("SDMGEN_PLUGIN_PATH: %s", skipped);
         else
-            cli_notice("skipped a file in SDMGEN_PLUGIN_PATH: %s", skipped);
+            tell_skipped(*out, i, given);
     return s;
 }
 

@@ -77,7 +77,10 @@ expect 0 - sdmgen shapes octahedron --quiet
 expect 2 "unknown shape 'broken'; plug-in .*/path/broken\.so cannot be loaded: " sdmgen shapes broken --quiet
 expect 2 "unknown shape 'cube'; sdmgen shapes lists" sdmgen shapes cube --quiet
 printf '        ' >>path/copy.so # another file; --plugin comes before the path
-SDMGEN_PLUGIN_PATH=$good expect 0 "octahedron\.so: shape 'octahedron' is there already \(.*/copy\.so\)" sdmgen shapes octahedron --plugin path/copy.so
+SDMGEN_PLUGIN_PATH=$good expect 0 "^sdmgen: shape 'octahedron' is from --plugin, not from .*/octahedron\.so in SDMGEN_PLUGIN_PATH$" sdmgen shapes octahedron --plugin path/copy.so
+if grep -q 'another name' err; then bad "advice that nobody needs: $(cat err)"; fi
+mkdir twice && cp path/copy.so twice
+SDMGEN_PLUGIN_PATH=$good:$PWD/twice expect 0 "skipped a file in SDMGEN_PLUGIN_PATH: .*/copy\.so: shape 'octahedron' is there already \(.*/octahedron\.so\): choose another name" sdmgen shapes octahedron
 SDMGEN_PLUGIN_PATH=$PWD/none:$good expect 0 '^sdmgen: warning: SDMGEN_PLUGIN_PATH: plug-in folder .*/none: No such file' sdmgen shapes octahedron
 # one folder too high
 SDMGEN_PLUGIN_PATH=$(dirname "$good") expect 2 "unknown shape 'octahedron'; SDMGEN_PLUGIN_PATH=.* holds no plug-in: name the folder in which the \.so file lies" sdmgen shapes octahedron

@@ -59,6 +59,16 @@ static void tell_vain_keys(const sdm_config *c)
         tell(c, "train", TRAIN, "train.refine is 0, so these keys have no effect");
 }
 
+/* The last line. of_shape: so many of the warnings are about the shape, not about the file. */
+static void print_verdict(const char *file, size_t of_shape)
+{
+    const size_t n = cli_warnings() - of_shape;
+    printf("%s: no mistakes%s", file, of_shape ? " in the file" : "");
+    if (n) printf(", %zu warning%s", n, n > 1 ? "s" : "");
+    if (of_shape) printf("; the shape has %zu (above)", of_shape);
+    printf("\n");
+}
+
 sdm_status cmd_config(const cli_args *args, sdm_error *err)
 {
     sdm_text text = {0};
@@ -74,19 +84,17 @@ sdm_status cmd_config(const cli_args *args, sdm_error *err)
     sdm_config *config = NULL;
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
+    size_t of_shape = 0;
     sdm_status s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && !args->dump) tell_vain_keys(config);
     if (!s && !args->dump)
-        cli_notice_survey(config, shape, cli_other_process(args, registry, shape));
+        of_shape = cli_notice_survey(config, shape, cli_other_process(args, registry, shape));
     if (!s && !args->dump) s = cli_check_memory(config, shape, err);
     if (!s && args->dump) {
         sdm_config_dump(config, &text);
         s = cli_print_text(&text, err);
     } else if (!s) {
-        const size_t n = cli_warnings();
-        printf("%s: no mistakes", args->files.items[0]);
-        if (n) printf(", %zu warning%s", n, n > 1 ? "s" : "");
-        printf("\n");
+        print_verdict(args->files.items[0], of_shape);
     }
     sdm_instance_free(shape);
     sdm_registry_free(registry);

@@ -188,7 +188,7 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     sdm_model *before = first && args->force ? cli_model_before(folder) : NULL;
     // a run that goes on has told it at its beginning
     if (first && !(args->resume && has_checkpoint(folder)))
-        cli_notice_survey(config, shape, cli_other_process(args, registry, shape));
+        (void)cli_notice_survey(config, shape, cli_other_process(args, registry, shape));
     if (first) cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
     if (first) cli_progress_end(&progress, !s);
@@ -246,7 +246,8 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     if (!s && args->out && strlen(args->out) >= sizeof config->output.folder)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
-    if (!s && !trains) cli_notice_survey(config, shape, cli_other_process(args, registry, shape));
+    if (!s && !trains)
+        (void)cli_notice_survey(config, shape, cli_other_process(args, registry, shape));
     if (!s && !trains) s = cli_plan_training(args, config, shape, err);
     if (!s && trains && !sdm_comm_rank(comm))
         s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);

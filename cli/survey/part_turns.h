@@ -1,18 +1,28 @@
-/* Finds where a part of a shape turns inside out. */
+/* Finds where a part of a shape turns inside out, and why. */
 #pragma once
 
 #include "sdm/internal/shape_survey.h"
+
+typedef enum cli_turn_cause {
+    CLI_TURN_LENGTH,   /* its volume goes through 0: a length becomes negative */
+    CLI_TURN_ORDER,    /* the triangles have other vertices there */
+    CLI_TURN_VERTICES, /* its volume jumps, but the triangles stay: the vertices change places */
+} cli_turn_cause;
 
 /* A part that is inside out in one shape of a survey and right in another. */
 typedef struct cli_part_turn {
     size_t part;  /* index of the part, in all meshes */
     size_t right; /* index of the shape in which it is right */
+    cli_turn_cause cause;
     /* The parameter that turns it over by itself, while the others are those of the shape in which
      * it is inside out: n_params if no single one does. Around `value` it turns: above it the part
      * is inside out, or (above: false) below. */
     size_t param;
     double value;
     bool above;
+    /* Where it turns back, on the way from `value` to the end of the surveyed range. NaN: nowhere
+     * that was looked at. */
+    double back;
 } cli_part_turn;
 
 /* *out = about the first part that is inside out in shape `wrong` of the survey, of which `audit`

@@ -78,7 +78,9 @@ sdm_status cli_survey_tell(const cli_survey *s, unsigned stages, cli_tell *tell_
     if (stages & SDM_SURVEY_REST) {
         tell_walls_closer(&t);
         tell_motion(&t);
-        tell_grid(&t);
+    }
+    if (stages & CLI_STAGE_GRID) tell_grid(&t);
+    if (stages & SDM_SURVEY_REST) {
         tell_overlaps(&t);
         tell_groups(&t);
         tell_untested(&t);
@@ -97,7 +99,7 @@ static void notice(void *user, sdm_status weight, const char *line)
         cli_notice("%s", line);
 }
 
-void cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_repeat_process process)
+size_t cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_repeat_process process)
 {
     double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS], range[SDM_MAX_PARAMS][2];
     sdm_distribution distribution[SDM_MAX_PARAMS];
@@ -105,7 +107,7 @@ void cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_repea
     sdm_instance_params(shape, &n);
     if (n > SDM_MAX_PARAMS || sdm_train_ranges(c, shape, min, max, NULL) ||
         sdm_train_distributions(c, shape, min, max, distribution, NULL))
-        return;
+        return 0;
     for (size_t i = 0; i < n; i++) {
         range[i][0] = min[i];
         range[i][1] = max[i];
@@ -121,7 +123,12 @@ void cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_repea
                                   .n_threads = (int)c->threads,
                                   .cancelled = cli_interrupted};
     cli_survey s = {.shape = shape, .grid = &c->grid, .config = c, .brief = true};
-    if (sdm_shape_survey_make(shape, &opts, &s.found, NULL)) return;
-    if (!s.found.cancelled) (void)cli_survey_tell(&s, CLI_ALL_STAGES, notice, NULL, NULL);
+    if (sdm_shape_survey_make(shape, &opts, &s.found, NULL)) return 0;
+    const size_t before = cli_warnings();
+    if (!s.found.cancelled)
+        (void)cli_survey_tell(&s, CLI_ALL_STAGES & ~CLI_STAGE_GRID, notice, NULL, NULL);
+    const size_t warnings = cli_warnings() - before;
+    if (!s.found.cancelled) (void)cli_survey_tell(&s, CLI_STAGE_GRID, notice, NULL, NULL);
     sdm_shape_survey_dispose(&s.found);
+    return warnings;
 }

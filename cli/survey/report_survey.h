@@ -3,8 +3,12 @@
 
 #include "findings.h"
 
-/* For cli_survey_tell(): the findings of all stages. */
-enum { CLI_ALL_STAGES = SDM_SURVEY_MESHES | SDM_SURVEY_PARTS | SDM_SURVEY_REST };
+/* For cli_survey_tell(): the findings about the grid, which come with those of the last stage; the
+ * findings of all stages. */
+enum {
+    CLI_STAGE_GRID = 8,
+    CLI_ALL_STAGES = SDM_SURVEY_MESHES | SDM_SURVEY_PARTS | SDM_SURVEY_REST | CLI_STAGE_GRID
+};
 
 /* Calls tell() for every finding of a sum of stages, for each the gravest first. Where
  * sdm_survey_mend_first(), it leaves out what may follow. SDM_E_NOMEM. */
@@ -15,6 +19,8 @@ sdm_status cli_survey_tell(const cli_survey *s, unsigned stages, cli_tell *tell,
 void cli_survey_untested(const cli_survey *s, sdm_text *text);
 
 /* A survey of about a second of the shape of a configuration, over its ranges, distributions and
- * grid, told as warnings and notices; some meshes are made in the process, too. Errors, such as
- * that of an interrupt, are no notices: what follows meets them again. */
-void cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_repeat_process process);
+ * grid, told as warnings and notices; some meshes are made in the process, too. Returns the number
+ * of warnings about the shape, without those about the grid. Errors, such as that of an interrupt,
+ * are no notices: what follows meets them again. */
+size_t cli_notice_survey(const sdm_config *c, const sdm_instance *shape,
+                         sdm_repeat_process process);

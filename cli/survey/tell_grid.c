@@ -14,7 +14,7 @@ static void add_proposal(const cli_survey *s, sdm_text *text)
     sdm_text use = {0};
     if (!s->config) return;
     sdm_config config = *s->config;
-    if (s->found.thin.shapes > 0) {
+    if (s->found.thin.shapes > 0 && !s->found.inside_out.shapes) {
         const double most = 0.5 * sdm_grid_coarsest(s->grid) / s->found.thin.amount,
                      unit = pow(10, floor(log10(most)) - 1), spacing = floor(most / unit) * unit;
         for (int a = 0; a < 3; a++) config.grid.spacing[a] = fmin(config.grid.spacing[a], spacing);
@@ -109,9 +109,10 @@ static void tell_thin(teller *t)
 {
     const sdm_survey_count *c = &t->s->found.thin;
     sdm_text text = {0};
-    // tell_tiny() and tell_unit() explain parts and shapes in another unit
-    if (!c->shapes || t->s->found.tiny.shapes >= c->shapes || t->s->found.scale.odd_size ||
-        t->s->found.scale.odd_speed)
+    // tell_tiny() and tell_unit() explain parts and shapes in another unit, tell_inside_out() parts
+    // that take away from others
+    if (!c->shapes || t->s->found.inside_out.shapes || t->s->found.tiny.shapes >= c->shapes ||
+        t->s->found.scale.odd_size || t->s->found.scale.odd_speed)
         return;
     const sdm_part_audit *audit = teller_audit(t, c->worst);
     if (!audit) {

@@ -122,7 +122,8 @@ static void tell_folded(teller *t)
     const sdm_survey_count *c = &f->folded;
     const sdm_param *params = sdm_instance_params(t->s->shape, NULL);
     sdm_text text = {0};
-    if (!c->shapes) return;
+    // a part whose triangles turn over does the same: tell_inside_out() has told it
+    if (!c->shapes || f->inside_out.shapes) return;
     const double *p = f->p + c->worst * f->n_params;
     sdm_text_add(&text, "walls pass through each other ");
     sdm_text_add(&text, "in %zu of the %zu shapes that were followed from the default shape",

@@ -20,7 +20,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
-     "meets|groups|crumb|spare|offset|around|unlisted|sticky|diagonal",
+     "meets|groups|crumb|spare|offset|around|unlisted|sticky|diagonal|negative|window|swapped",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -152,6 +152,10 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
                              ? p[0] + reach - 1.6
                              : p[0] + (strcmp(fault, "apart") && !groups ? -0.5 : 0.5);
     double handle[2][3] = {{begin, -half, -half + shift}, {p[0] + reach, half, half + shift}};
+    // `negative`: the height of the handle becomes negative at size 2; `swapped`: its ends change
+    // places there
+    if (!strcmp(fault, "negative")) handle[0][1] = -1, handle[1][1] = 1 - p[0];
+    if (!strcmp(fault, "swapped") && is_large) handle[0][1] = half, handle[1][1] = -half;
     if (!strcmp(fault, "within")) handle[0][0] -= 1, handle[1][0] -= 2.2;
     if (!strcmp(fault, "twins")) memcpy(handle, body, sizeof handle);
     if (groups) {
@@ -171,7 +175,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     uint32_t tri[72];
     if (less) all.tri = tri;
     faulty_box(&all, 1, handle[0], handle[1],
-               !strcmp(fault, "handle") || (!strcmp(fault, "late") && is_large));
+               !strcmp(fault, "handle") || (!strcmp(fault, "late") && is_large) ||
+                   (!strcmp(fault, "window") && p[1] > 1.25 && p[1] < 1.75 && p[0] < 2.9));
     if (less) memcpy(out->tri + 36, tri + 36, 33 * sizeof *tri);
     if (!strcmp(fault, "wires") && is_large) {
         // the other diagonal of the first face

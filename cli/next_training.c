@@ -235,7 +235,7 @@ static void print_finish(const char *begin, const cli_args *args, const sdm_trai
     // trials and first training used one half
     if (minutes > 0)
         printf("; train.minutes=%.6g with auto compares both",
-               ceil(10 * (least + fmax(minutes, r->seconds / 60))) / 10);
+               fmax(r->trial_minutes, ceil(10 * (least + fmax(minutes, r->seconds / 60))) / 10));
     printf(")\n");
 }
 
@@ -256,6 +256,43 @@ static double finer_use(const sdm_verdict *v, const char **use)
 static const char *named_key(const sdm_verdict *v)
 {
     return !v->key[0] && v->limited && v->limit == SDM_CAUSE_ROUNDING ? "network.weights" : v->key;
+}
+
+/* Has network.kind: auto left the other kind without a trial and a training? Then no command names
+ * the kind that was trained. */
+static bool is_open(const sdm_train_report *r)
+{
+    return r->trial_minutes > 0 && !r->tried && !r->compared && !(r->verdict.inside_out > 0);
+}
+
+/* The changes with train.minutes that hold the trials of both kinds on the grid of the changes. */
+static sdm_verdict with_trials(const sdm_train_report *r, const sdm_verdict *changes, double factor)
+{
+    sdm_verdict v = *changes;
+    const double least = ceil(10 * factor * r->trial_minutes - 1e-6) / 10;
+    if (!strcmp(v.key, "train.minutes"))
+        v.to = fmax(v.to, least);
+    else
+        v.minutes = fmax(v.minutes, least);
+    return v;
+}
+
+/* How many times as long a map takes on the grid of a key that makes its voxels smaller. */
+static double finer_factor(const sdm_verdict *v)
+{
+    return strcmp(v->key, "grid.spacing") ? 1 : fmax(1, pow(v->from / v->to, 3));
+}
+
+/* The part of a note about a command that leaves the kind open; "": the command names a kind. */
+static const char *open_note(const sdm_train_report *r, char text[160])
+{
+    *text = '\0';
+    if (is_open(r))
+        snprintf(text, 160,
+                 "network.kind stays auto: train.minutes holds the trial of %s, which this run has "
+                 "left out; ",
+                 r->kind == SDM_NETWORK_POD ? "template" : "pod");
+    return text;
 }
 
 /* The line `better` of a good model whose error at the surface is small: a grid for the first use
@@ -281,15 +318,42 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
         return true;
     }
     if (!use || !(factor > 1 && factor <= FINER) || !args->files.n || args->dataset) return false;
+    char open[160];
     sdm_verdict finer = {.to = spacing,
                          .minutes = r->steps > 0 ? ceil(2 * factor * minutes) / 2 : 0};
     strcpy(finer.key, "grid.spacing");
-    if (!print_command("  better      ", args, r, &finer, kind)) return false;
+    if (is_open(r)) finer = with_trials(r, &finer, factor);
+    if (!print_command("  better      ", args, r, &finer, is_open(r) ? NULL : kind)) return false;
     printf(
-        "              (for %s, which `not for` leaves out: %.2g times the voxels; %s: the error "
+        "              (%sfor %s, which `not for` leaves out: %.2g times the voxels; %s: the error "
         "at the surface is %.2g voxels)\n",
-        use, factor, wait, voxels);
+        open_note(r, open), use, factor, wait, voxels);
     return true;
+}
+
+/* The note below the command: which kind it trains, and whether it mends what `not for` names. */
+static void print_note(const sdm_train_report *r, const char *kind, double ms_map)
+{
+    const sdm_verdict *v = &r->verdict;
+    char open[160], unfit[SDM_MODEL_UNFIT], time[60] = "";
+    sdm_text note = {0};
+    sdm_verdict_unfit(v, unfit);
+    // the maps of another grid take another time
+    if (strncmp(v->key, "grid.", 5))
+        snprintf(time, sizeof time, ", with which a map takes %.3g ms", ms_map);
+    if (is_open(r))
+        sdm_text_add(&note, "%s", open_note(r, open));
+    else if (kind && isfinite(ms_map))
+        sdm_text_add(&note,
+                     "the kind stays %s%s; without network.kind=%s the run chooses a kind again; ",
+                     kind, time, kind);
+    if (unfit[0] && strncmp(v->key, "grid.", 5))
+        sdm_text_add(&note, "whether this mends what `not for` names is not known; ");
+    else if (v->derivatives_bad[0])
+        sdm_text_add(&note, "whether this mends derivatives of maps is not known; ");
+    if (!note.failed && note.size > 2)
+        printf("              (%.*s)\n", (int)(note.size - 2), note.data);
+    sdm_text_dispose(&note);
 }
 
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
@@ -308,10 +372,8 @@ void cli_print_next(const cli_args *args, const sdm_train_report *r, const char 
         return;
     }
     if (print_enough(args, r, kind, minutes)) return;
-    if ((!v->key[0] && !(v->cut > 0)) || !args->files.n || other_maps) return;
-    if (!print_command(begin, args, r, v, kind) || !kind || !isfinite(ms_map)) return;
-    // the maps of another grid take another time
-    char time[40] = "";
-    if (strncmp(v->key, "grid.", 5)) snprintf(time, sizeof time, ", %.3g ms a map", ms_map);
-    printf("              (%s again%s; network.kind=auto would choose anew)\n", kind, time);
+    const bool open = is_open(r);
+    if ((!v->key[0] && !(v->cut > 0) && !open) || !args->files.n || other_maps) return;
+    const sdm_verdict changes = open ? with_trials(r, v, finer_factor(v)) : *v;
+    if (print_command(begin, args, r, &changes, open ? NULL : kind)) print_note(r, kind, ms_map);
 }

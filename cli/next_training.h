@@ -13,7 +13,9 @@
      configuration gives another budget), with twice as many if `auto` has trained `pod` in a part
      of them; if `pod` was much worse then, the line says that no training helps.
    kind: the kind of the model where network.kind was auto, else NULL. The command names it, so that
-   the same kind is trained again, and a second line tells the time of a map, ms_map. */
+   the same kind is trained again, and a second line tells the time of a map, ms_map. If auto had
+   no time for a trial of the other kind (trial_minutes), the command names no kind, and its
+   train.minutes hold the trials of both. */
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
                     double ms_map, double minutes);
 

@@ -208,6 +208,12 @@ static bool lacks_time(const trainer *t, const trial_look *l)
     return trainer_by_time(t) && l->trials > TRAINER_TRIALS_SHARE * 60 * t->config->train.minutes;
 }
 
+/* train.minutes of which TRAINER_TRIALS_SHARE holds the trials of both kinds. */
+static double trial_minutes(const trial_look *l)
+{
+    return ceil(10 * l->trials / (60 * TRAINER_TRIALS_SHARE)) / 10;
+}
+
 /* true: there is no time for trials, and pod is taken without one: a template is not likely to be
  * kept. */
 static bool takes_pod(const trainer *t, const trial_look *l, size_t n_params)
@@ -239,7 +245,7 @@ static sdm_status look(trainer *t, sdm_config *scratch, trial_look *l, double *m
                         l->trials, TRAINER_TRIALS_SHARE * budget,
                         takes_pod(t, l, n_params) ? "pod is taken without trials"
                                                   : "template alone has one",
-                        ceil(10 * l->trials / (60 * TRAINER_TRIALS_SHARE)) / 10);
+                        trial_minutes(l));
     return SDM_OK;
 }
 
@@ -352,6 +358,9 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
         out->pod_minutes = out->kind[0] == SDM_NETWORK_POD || done ? 0 : pod_minutes;
         const entrant *other = out->kind[0] == e[0].kind ? &e[1] : &e[0];
         out->tried_other = other->finished;
+        // a kind that the shape does not allow, or that is not needed, has no trial later either
+        const bool left_out = brief && !done && (takes_pod(t, &l, n_params) || out->untried);
+        out->trial_minutes = left_out ? trial_minutes(&l) : 0;
         if (out->tried_other) out->other = other->errors;
         trainer_message(t, "auto: network.kind is %s: %s", trainer_turn_name(out->kind[0]), reason);
         for (size_t i = 0; i < 2; i++)

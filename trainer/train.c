@@ -88,6 +88,7 @@ static sdm_status train_turn(run *r, const trainer *common, bool *unfit, sdm_tra
 static void report_trial(const training_turns *r, sdm_train_report *report)
 {
     report->pod_minutes = fmax(report->pod_minutes, r->pod_minutes);
+    report->trial_minutes = r->trial_minutes;
     if (r->untried) {
         report->unfinished = true;
         trainer_verdict_unfinished(trainer_turn_name(SDM_NETWORK_TEMPLATE),

@@ -119,12 +119,117 @@ static void grid_or_key(void **state)
     r.verdict.rmse_voxel_mm = 0.1;
     next_lines(&r, 1, text, second);
     assert_string_equal(second,
-                        "              (template again, 1 ms a map; network.kind=auto would "
-                        "choose anew)\n");
+                        "              (the kind stays template, with which a map takes 1 ms; "
+                        "without network.kind=template the run chooses a kind again)\n");
     strcpy(r.verdict.key, "grid.spacing");
     next_lines(&r, 1, text, second);
-    assert_string_equal(second,
-                        "              (template again; network.kind=auto would choose anew)\n");
+    assert_string_equal(second, "              (the kind stays template; without "
+                                "network.kind=template the run chooses a kind again)\n");
+}
+
+// auto had no time for a trial of template: no command fixes the kind, whatever the key is, and its
+// minutes hold the trials of both kinds, which take longer with more voxels.
+static void kind_stays_open(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *key, *changes;
+        double from, to, minutes;
+    } cases[] = {{"train.minutes", "train.minutes=10.5", 2, 4, 0},
+                 {"train.minutes", "train.minutes=12", 2, 12, 0},
+                 {"network.rank", "network.rank=18 train.minutes=10.5", 9, 18, 0},
+                 {"network.rank", "network.rank=18 train.minutes=14", 9, 18, 14},
+                 {"grid.spacing", "grid=auto grid.spacing=1.5 train.minutes=84", 3, 1.5, 16},
+                 {"", "train.minutes=10.5", 0, 0, 0}};
+    char text[512], second[512], expected[512];
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        sdm_train_report r = {.model_path = "run/model.sdm",
+                              .steps = 1000,
+                              .kind = SDM_NETWORK_POD,
+                              .chosen = true,
+                              .trial_minutes = 10.5,
+                              .verdict = {.limited = true,
+                                          .limit = SDM_CAUSE_NETWORK,
+                                          .grade = SDM_GRADE_USABLE,
+                                          .voxel_mm = 3,
+                                          .coarse_mm = 3,
+                                          .rmse_voxel_mm = 0.4,
+                                          .dice = 0.97,
+                                          .thickness_mm = 30,
+                                          .from = cases[i].from,
+                                          .to = cases[i].to,
+                                          .minutes = cases[i].minutes}};
+        strcpy(r.verdict.key, cases[i].key);
+        next_lines(&r, 2, text, second);
+        snprintf(expected, sizeof expected, "  next        sdmgen train can.yaml %s --out run-2\n",
+                 cases[i].changes);
+        assert_string_equal(text, expected);
+        assert_string_equal(second,
+                            "              (network.kind stays auto: train.minutes holds the trial "
+                            "of template, which this run has left out)\n");
+        // a kind that was tried needs no other trial
+        r.tried = true;
+        next_lines(&r, 2, text, second);
+        assert_true(!cases[i].key[0] || strstr(text, " network.kind=template --out run-2\n"));
+    }
+}
+
+// The same of a good model whose command mends a use.
+static void finer_grid_leaves_kind_open(void **state)
+{
+    (void)state;
+    char text[512], second[512];
+    const sdm_train_report r = {.model_path = "run/model.sdm",
+                                .steps = 1000,
+                                .kind = SDM_NETWORK_POD,
+                                .chosen = true,
+                                .trial_minutes = 10.5,
+                                .verdict = {.grade = SDM_GRADE_GOOD,
+                                            .voxel_mm = 3,
+                                            .coarse_mm = 3,
+                                            .rmse_voxel_mm = 0.03,
+                                            .dice = 0.99,
+                                            .thickness_mm = 30,
+                                            .volume_derivatives_bad = "height: off by 28 %",
+                                            .volume_derivative_voxels = 0.25}};
+    next_lines(&r, 2, text, second);
+    assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.5 "
+                              "train.minutes=84 --out run-2\n");
+    assert_string_equal(second, "              (network.kind stays auto: train.minutes holds the "
+                                "trial of template, which this run has left out; for derivatives "
+                                "of the volume, which `not for` leaves out: 8 times the voxels; "
+                                "nothing else needs to change: the error at the surface is 0.01 "
+                                "voxels)\n");
+}
+
+// A key that the verdict names for the error may leave the uses in `not for` as they are: the note
+// does not promise them.
+static void uses_are_not_promised(void **state)
+{
+    (void)state;
+    char text[512], second[512];
+    sdm_train_report r = {.model_path = "run/model.sdm",
+                          .steps = 1000,
+                          .verdict = {.limited = true,
+                                      .limit = SDM_CAUSE_NETWORK,
+                                      .grade = SDM_GRADE_USABLE,
+                                      .voxel_mm = 3,
+                                      .coarse_mm = 3,
+                                      .rmse_voxel_mm = 0.4,
+                                      .dice = 0.97,
+                                      .thickness_mm = 30,
+                                      .derivatives_bad = "bit: off by 86 %",
+                                      .key = "network.width",
+                                      .from = 128,
+                                      .to = 256}};
+    next_lines(&r, 2, text, second);
+    assert_non_null(strstr(second, "; whether this mends what `not for` names is not known)\n"));
+    strcpy(r.verdict.key, "grid.spacing");
+    next_lines(&r, 2, text, second);
+    assert_non_null(strstr(second, "; whether this mends derivatives of maps is not known)\n"));
+    r.verdict.derivatives_bad[0] = '\0';
+    next_lines(&r, 2, text, second);
+    assert_null(strstr(second, "mends"));
 }
 
 // Without another fault a good model needs nothing but the grid for the use that it leaves out; a
@@ -196,8 +301,12 @@ static void faster_pod(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(template_that_errs_near_the_surface), cmocka_unit_test(grid_or_key),
-        cmocka_unit_test(finer_grid_alone), cmocka_unit_test(faster_pod)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(template_that_errs_near_the_surface),
+                                       cmocka_unit_test(grid_or_key),
+                                       cmocka_unit_test(kind_stays_open),
+                                       cmocka_unit_test(finer_grid_leaves_kind_open),
+                                       cmocka_unit_test(uses_are_not_promised),
+                                       cmocka_unit_test(finer_grid_alone),
+                                       cmocka_unit_test(faster_pod)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

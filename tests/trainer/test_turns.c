@@ -310,7 +310,7 @@ static void template_remains(void **state)
     sdm_train_report r = train(&large);
     assert_non_null(strstr(warned, "template is kept, because pod failed: test.yaml: data.static"));
     assert_kind("template");
-    assert_true(!r.compared && r.tried && !r.unfinished);
+    assert_true(!r.compared && r.tried && !r.unfinished && r.trial_minutes == 0);
     n_reports = 0;
     r = train(&brief);
     assert_true(first_phase == SDM_PHASE_TRIAL && last_phase == SDM_PHASE_EVALUATE);
@@ -345,6 +345,11 @@ static void no_time_for_trials(void **state)
         !strstr(said, " s: pod is taken without trials (for both raise train.minutes to "))
         fail_msg("%s", said);
     assert_true(r.chosen && !r.compared && !r.tried && !r.unfinished);
+    // the advice has the minutes that the run has told
+    char told[80];
+    snprintf(told, sizeof told, "without trials (for both raise train.minutes to %.4g)",
+             r.trial_minutes);
+    assert_true(r.trial_minutes > 0 && strstr(said, told));
 }
 
 // Thick parts that overlap: the verdict tells the error far inside from that near the surface, and

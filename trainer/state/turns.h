@@ -20,11 +20,13 @@ typedef struct training_turns {
     double share;             /* part of the budget left by the trials that the first of two may
                                  use, 0 .. 1 */
     sdm_train_report first;   /* result of the first, while the second trains */
-    double pod_minutes; /* train.minutes for a training of pod alone at the pace of the trials; 0:
-                           the budget holds its maps */
-    bool untried;       /* pod may be better, but the budget was too short for its trial */
-    bool tried_other;   /* the kind that is not trained, or trained later, had a trial: */
-    turn_figures other; /* its errors in the trial */
+    double pod_minutes;   /* train.minutes for a training of pod alone at the pace of the trials; 0:
+                             the budget holds its maps */
+    double trial_minutes; /* train.minutes that hold the trials of both kinds, where the budget was
+                             too short for that of the kind that is not trained; 0: else */
+    bool untried;         /* pod may be better, but the budget was too short for its trial */
+    bool tried_other;     /* the kind that is not trained, or trained later, had a trial: */
+    turn_figures other;   /* its errors in the trial */
 } training_turns;
 
 /* *out = `asked` with the kind of the present turn, its defaults for all keys that have those of

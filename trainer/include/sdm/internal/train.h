@@ -95,6 +95,10 @@ typedef struct sdm_train_report {
     /* train.minutes that hold the maps which the parameters ask of a training of `pod`, at the
        pace of this run; 0: it had them, or the budget is no time. */
     double pod_minutes;
+    /* train.minutes of which a fifth holds the trials of both kinds, where network.kind: auto left
+       the other kind without a trial and a training, because train.minutes was too short; 0: else.
+     */
+    double trial_minutes;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled

@@ -96,6 +96,18 @@ static bool is_worse(const cli_eval *e, double stated, double errors)
     return errors == 0 || !(e->mse_mm2 - errors * standard_error(e) <= allowed); // a NaN is worse
 }
 
+/* How the measured error compares with the stated one, in words. */
+static const char *compared(const cli_eval *e, double stated)
+{
+    const double off = e->mse_mm2 - stated * stated;
+    if (is_worse(e, stated, 0)) return "";
+    if (e->n < 2) return ": in order, though one shape tells little";
+    if (fabs(off) <= 2 * standard_error(e))
+        return ": in order, the difference is within the scatter between these shapes";
+    return off < 0 ? ": in order, these shapes are more exact than stated"
+                   : ": in order, up to 25 % more than stated is allowed";
+}
+
 static sdm_status report_model(const cli_args *args, const char *path, const sdm_model_info *info,
                                const cli_eval *e, const cli_timing *times, sdm_error *err)
 {
@@ -121,8 +133,8 @@ static sdm_status report_model(const cli_args *args, const char *path, const sdm
         const char *next = next_fact(args);
         cli_print("%s: every checksum is right", path);
         if (e->n > 0)
-            cli_print("%sRMSE %.5f mm on %zu random shapes, stated %.5f mm", next, e->rmse_mm, e->n,
-                      stated);
+            cli_print("%sRMSE %.5f mm on %zu random shapes, stated %.5f mm%s", next, e->rmse_mm,
+                      e->n, stated, compared(e, stated));
         if (e->n > 0 && good && is_worse(e, stated, 0))
             cli_print("%sit is more than 25 %% worse, which may be due to the choice of these "
                       "shapes: --samples %zu tells",

@@ -39,7 +39,7 @@ static const char *stage_text(sdm_plan_stage stage)
     return texts[stage];
 }
 
-static void print_stages(const sdm_config *config, const sdm_train_work *w, const sdm_train_plan *p)
+static void print_stages(const sdm_train_work *w, const sdm_train_plan *p)
 {
     char time[32], bytes[32], count[64];
     printf("  %-8s %-16s %10s  %-18s  %s\n", "stage", "work", "time", "received by a node",
@@ -59,39 +59,36 @@ static void print_stages(const sdm_config *config, const sdm_train_work *w, cons
                cli_format_seconds(p->seconds[i], time), format_bytes(p->received[i], bytes),
                stage_text((sdm_plan_stage)i));
     }
-    char sum[96] = "the sum of these lines";
-    const double budget = 60 * config->train.minutes;
-    const bool longer = budget > 0 && p->all_seconds > 1.01 * budget;
-    if (longer)
-        snprintf(sum, sizeof sum, "train.minutes ends the run; the sum of these lines is %s",
-                 cli_format_seconds(p->all_seconds, time));
-    printf("  %-8s %-16s %10s  %-18s  %s\n", "total", "",
-           cli_format_seconds(longer ? budget : p->all_seconds, time),
-           format_bytes(p->all_received, bytes), sum);
+    printf("  %-8s %-16s %10s  %-18s  %s\n", "total", "", cli_format_seconds(p->all_seconds, time),
+           format_bytes(p->all_received, bytes), "the sum of these lines");
 }
 
-/* Says what a budget of time is for, or, if half of it is too short for the maps that the
- * configuration asks for, for how many it is enough. */
+/* Says what a budget of time is for, and how many maps of the table it holds. */
 static void print_budget(const sdm_config *c, const sdm_train_work *w, const sdm_train_plan *p)
 {
-    char a[32], made[64], all[64];
-    const double before = w->n_holdout + w->n_maps - (double)c->data.online,
+    char a[32], b[32], made[64], all[64], later[64];
+    const double online = (double)c->data.online, before = w->n_holdout + w->n_maps - online,
                  seconds = p->seconds[SDM_PLAN_DESIGN] +
                            p->seconds[SDM_PLAN_MAPS] * before / (w->n_holdout + w->n_maps),
                  half = 30 * c->train.minutes;
     if (!(c->train.minutes > 0)) return;
+    const bool longer = p->all_seconds > 1.01 * 2 * half;
+    printf("  budget   train.minutes is %.4g%s", c->train.minutes,
+           longer ? ", less than `total`, and ends the run: " : ": ");
     if (seconds <= half) {
-        printf(
-            "  budget   train.minutes is %.4g: the maps before training take %s of it, the rest is "
-            "for as many steps as fit\n",
-            c->train.minutes, cli_format_seconds(seconds, a));
+        printf("the maps before training take %s of it, the rest is for as many steps as fit\n",
+               cli_format_seconds(seconds, a));
         return;
     }
+    printf("after half of it (%s) training begins with %s of the %s maps that it asks for",
+           cli_format_seconds(half, a), cli_format_count((int64_t)(before * half / seconds), made),
+           cli_format_count((int64_t)before, all));
+    if (online > 0)
+        printf(" (the other %s of the table, data.online, are made while it trains)",
+               cli_format_count((int64_t)online, later));
     printf(
-        "  budget   the training begins after half of train.minutes (%s), with %s of the %s maps: "
-        "raise train.minutes to %.4g for all of them, or lower data.start or data.static\n",
-        cli_format_seconds(half, a), cli_format_count((int64_t)(before * half / seconds), made),
-        cli_format_count((int64_t)before, all), ceil(10 * seconds / 30) / 10);
+        "; all of them take %s: raise train.minutes to %.4g, or lower data.start or data.static\n",
+        cli_format_seconds(seconds, b), ceil(10 * seconds / 30) / 10);
 }
 
 static void print_text(const sdm_config *config, const sdm_train_work *w, const sdm_train_plan *p,
@@ -105,7 +102,7 @@ static void print_text(const sdm_config *config, const sdm_train_work *w, const 
            1 / w->map);
     if (w->fit_step > 0) printf(", %.3g steps a second on a core", 1 / w->fit_step);
     printf("\n");
-    print_stages(config, w, p);
+    print_stages(w, p);
     if (w->only_pod)
         printf("  auto     planned as pod: a template does not suit the shape\n");
     else if (config->network.kind == SDM_NETWORK_AUTO)

@@ -135,18 +135,27 @@ code=$?
 [ $code -eq 0 ] || [ $code -eq 4 ] || bad "verify: exit code $code: $(cat err)"
 has 'every checksum is right'
 # A model that states a twentieth of its error is refused, but not for one shape alone, as the scatter between shapes is then not known.
+sdmgen verify $model --quiet --json >out 2>err
+measured=$(json rmse_mm)
 python=
 for p in python3 /usr/bin/python3; do $p -c 'import numpy' 2>/dev/null && python=$p && break; done
 if [ "$python" ]; then
-    PYTHONPATH=$source_folder/tests/oracle PYTHONDONTWRITEBYTECODE=1 $python - $model <<'END' || bad 'no model forged'
+    PYTHONPATH=$source_folder/tests/oracle PYTHONDONTWRITEBYTECODE=1 $python - $model "$measured" <<'END' || bad 'no model forged'
 import re
 import sys
 import sdm_file
 parts = sdm_file.sections(open(sys.argv[1], "rb").read())
-meta = re.sub(r"(?m)^accuracy\.rmse_mm=(.*)$", lambda m: f"accuracy.rmse_mm={float(m[1]) * 0.05!r}", dict(parts)["meta"].decode())
-open("boast.sdm", "wb").write(sdm_file.build([(name, meta.encode() if name == "meta" else content) for name, content in parts]))
+old = dict(parts)["meta"].decode()
+for name, stated in ("boast", float(re.search(r"(?m)^accuracy\.rmse_mm=(.*)$", old)[1]) * 0.05), ("equal", float(sys.argv[2])), ("modest", 10 * float(sys.argv[2])):
+    meta = re.sub(r"(?m)^accuracy\.rmse_mm=.*$", f"accuracy.rmse_mm={stated!r}", old)
+    open(name + ".sdm", "wb").write(sdm_file.build([(section, meta.encode() if section == "meta" else content) for section, content in parts]))
 END
     expect 4 'boast.sdm: RMSE [0-9.]+ mm on 20 random shapes, stated [0-9.]+ mm: more than 25 % worse, and by more than the scatter between the shapes \(--samples 200 measures it more exactly\)' sdmgen verify boast.sdm --quiet
+    # a right model is called in order, and why
+    expect 0 - sdmgen verify equal.sdm --quiet
+    has '^RMSE ([0-9.]+) mm on 20 random shapes, stated \1 mm: in order, the difference is within the scatter between these shapes$'
+    expect 0 - sdmgen verify modest.sdm --quiet
+    has '^RMSE [0-9.]+ mm on 20 random shapes, stated [0-9.]+ mm: in order, these shapes are more exact than stated$'
     expect 0 - sdmgen verify boast.sdm --quiet --samples 1
     has '^it is more than 25 % worse, which may be due to the choice of these shapes: --samples 10 tells$'
 fi

@@ -166,7 +166,7 @@ rm -r both
 expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 --out both --quiet --json
 has '"other": \{"kind": "(pod|template)", .*"ms_network": [0-9.e-]+, "grade": "[a-z]+", "model": "both/model-(pod|template)\.sdm"\}'
 sdmgen train link.yaml data.start=300 data.memory_gb=6 train.steps=0 train.minutes=0.0001 --out both --force >out 2>err || bad "hurried: $(cat err)"
-grep -Eq '^sdmgen: [0-9.e+]+ exact maps a second: about 0 fit into their part of train\.minutes \(0\.0001\); [0-9] parameters? asks? for [0-9]+, which train\.minutes=[0-9.]+ holds$' err ||
+grep -Eq '^sdmgen: [0-9.e+]+ exact maps a second: about 0 fit into their part of train\.minutes \(0\.0001\); [0-9] parameters? asks? for [0-9]+; if too few limit the model, the last lines of the run name the train\.minutes for more$' err ||
     bad "no word about the pace of maps: $(cat err)"
 grep -Eq '^sdmgen: auto: trials of both kinds would take about [0-9.]+ s, and a fifth of train\.minutes is 0\.0012 s: template alone has one \(for both raise train\.minutes to [0-9.]+\)$' err ||
     bad "no word about the trials ahead: $(cat err)"

@@ -50,14 +50,15 @@ double trainer_tell_pace(trainer *t, const sdm_config *pod, double per_map, doub
     if (!trainer_by_time(t) || !(per_map > 0)) return 0;
     // bases take about as long as the maps
     const double minutes = fit < asked ? trainer_minutes_for(asked, per_map, asked * per_map) : 0;
-    char hold[48] = "";
-    if (minutes > 0) snprintf(hold, sizeof hold, ", which train.minutes=%.4g holds", minutes);
+    const char *more = minutes > 0 ? "; if too few limit the model, the last lines of the run name "
+                                     "the train.minutes for more"
+                                   : "";
     if (!t->pace_told)
         trainer_message(t,
                         "%.3g exact maps a second: about %.0f fit into their part of train.minutes "
                         "(%.4g); %zu %s for %.0f%s",
                         1 / per_map, fit, t->config->train.minutes, n_params,
-                        n_params == 1 ? "parameter asks" : "parameters ask", asked, hold);
+                        n_params == 1 ? "parameter asks" : "parameters ask", asked, more);
     t->pace_told = true;
     return minutes;
 }

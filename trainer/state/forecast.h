@@ -21,7 +21,7 @@ double trainer_minutes_for(double maps, double per_map, double after);
    had enough, it is of another kind, or the budget is no time. */
 double trainer_minutes_asked(const trainer *t);
 
-/* Tells once, with a budget of time, how many maps of `per_map` seconds fit into `seconds`, how
-   many the parameters ask for, and the minutes that hold these. Returns these minutes; 0: all fit.
- */
+/* Tells once, with a budget of time, how many maps of `per_map` seconds fit into `seconds`, and
+   how many the parameters ask for. Returns about the minutes that hold these; 0: all fit. The end
+   of a run measures them. */
 double trainer_tell_pace(trainer *t, const sdm_config *pod, double per_map, double seconds);

@@ -290,8 +290,8 @@ static void write_sentence(const verdict_input *in, const char *what, sdm_verdic
                  sqrt(v->part_mm2[SDM_CAUSE_GRID]));
     else if (v->limit != SDM_CAUSE_NETWORK && v->at_best_mm > 0)
         snprintf(result, sizeof result,
-                 "; without this part the RMSE would be %.2g mm at best, not %.2g mm",
-                 v->at_best_mm, v->rmse_mm);
+                 "; without this part alone the RMSE would be %.2g mm, not %.2g mm", v->at_best_mm,
+                 v->rmse_mm);
     if (v->limit != SDM_CAUSE_GRID) {
         const double rest = v->at_best_mm * v->at_best_mm, part = v->part_mm2[v->limit];
         snprintf(share, sizeof share, " (%.0f %% of the mean square error)",

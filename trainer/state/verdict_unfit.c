@@ -68,7 +68,7 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
         add(l,
             "exact fits by the network alone: its thinnest part, %.2g mm thick in a few held-out "
             "shapes, has %.1f voxels across; fits need %d there, %.2g with a margin: sdmgen fit "
-            "--exact --spacing S (S = %.2g, or %.2g times the blur of the image if that is less)",
+            "--exact --spacing S (S: the smaller of %.2g and %.2g times the blur of the image)",
             v->thickness_mm, floor(10 * v->thickness_mm / v->coarse_mm + 1e-9) / 10,
             SDM_GRID_FIT_VOXELS, SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED, finer,
             SDM_GRID_FIT_ADVISED * SDM_GRID_FIT_DATA);
@@ -96,7 +96,7 @@ static void add_derivatives(const sdm_verdict *v, unfit_lines *l)
     char cause[160];
     write_cause(v, cause);
     if (v->derivatives_bad[0])
-        add(l, "derivatives of maps by %s; the network errs, exact --jacobian does not",
+        add(l, "derivatives of maps by %s; the network causes it: sdmgen exact --jacobian is exact",
             v->derivatives_bad);
     if (v->volume_derivatives_bad[0])
         add(l, "derivatives of the volume by %s%s", v->volume_derivatives_bad, cause);

@@ -78,8 +78,10 @@ void cli_fit_print_next(const cli_fit *f)
         // a map and its samples take no longer than in proportion to its voxels
         const double factor = pow(cli_fit_map_voxel(f) / r->advised_voxel_mm, 3),
                      most = factor * (r->seconds - r->seconds_search);
-        snprintf(price, sizeof price, "; %.2g times as many voxels, up to %.2g %s", factor,
-                 most < 100 ? most : most / 60, most < 100 ? "s" : "minutes");
+        char number[32];
+        snprintf(price, sizeof price, "; %.2g times as many voxels, up to %s %s", factor,
+                 cli_number(most < 100 ? most : most / 60, 2, number),
+                 most < 100 ? "s" : "minutes");
     }
     for (size_t i = 0; i < f->n_params; i++) {
         if (lacks && sdm_fit_hardly_known(r, i)) {

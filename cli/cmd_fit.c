@@ -18,6 +18,8 @@ typedef struct progress_state {
     const cli_fit *f;
     sdm_fit_phase phase;
     size_t before; /* number of iterations before this phase */
+    size_t n_fits;
+    double coarse_mm;
 } progress_state;
 
 /* Share of the time of a search that its first round takes, roughly. */
@@ -42,10 +44,34 @@ static void show_search(progress_state *w, const sdm_fit_progress *p)
     cli_progress_show(&w->bar, "search", fraction, text);
 }
 
+/* Tells why a search or iterations follow a verdict: the maps are finer now, or the fit is refused
+ * and goes on from another start. */
+static void tell_why_again(progress_state *w, const sdm_fit_progress *p)
+{
+    const cli_fit *f = w->f;
+    const bool judged = w->phase == SDM_FIT_JUDGE && p->phase != SDM_FIT_JUDGE;
+    char text[80];
+    if (f->coarse_mm > 0 && !(w->coarse_mm > 0)) {
+        snprintf(text, sizeof text, "going on with finer maps (voxels of %.2g mm)",
+                 cli_fit_map_voxel(f));
+        cli_progress_tell(&w->bar, "fit", text);
+    } else if (judged && f->n_fits == w->n_fits && p->phase == SDM_FIT_SEARCH) {
+        cli_progress_tell(&w->bar, "search",
+                          "the fit is refused: looking for a better pose or value of a parameter");
+    } else if (judged && f->n_fits == w->n_fits) {
+        cli_progress_tell(
+            &w->bar, "fit",
+            "the fit is refused: going on from a better pose or value of a parameter");
+    }
+    w->coarse_mm = f->coarse_mm;
+    w->n_fits = f->n_fits;
+}
+
 static void show_progress(void *user, const sdm_fit_progress *p)
 {
     progress_state *w = user;
     const sdm_fit_opts *o = &w->f->opts;
+    tell_why_again(w, p);
     // a further candidate counts from 1 again
     if (p->phase != w->phase || p->iteration <= w->before)
         w->phase = p->phase, w->before = p->iteration - 1;
@@ -60,6 +86,7 @@ static void show_progress(void *user, const sdm_fit_progress *p)
     char text[140] = "";
     if (w->f->candidate)
         snprintf(text, sizeof text, "candidate %zu of %zu, ", w->f->candidate, w->f->n_candidates);
+    if (w->f->at_mirror) strcat(text, "mirror image, ");
     const size_t used = strlen(text), n = p->iteration - w->before,
                  most = 2 *
                         (p->phase == SDM_FIT_POLISH ? o->max_polish_iterations : o->max_iterations);

@@ -71,6 +71,9 @@ typedef struct cli_fit {
 
     sdm_fit_opts opts;
 
+    size_t n_fits;  /* fits begun, that of the mirror image, too */
+    bool at_mirror; /* the present one is that of the mirror image */
+
     /* fit_mirror.c: the fit of the mirror image of the shape */
     const char *mirror;        /* option that mirrors the shape; NULL: none is tried */
     char side[64];             /* its value in the result; "" where the shape is a model's */
@@ -280,6 +283,13 @@ bool cli_fit_lacks_data(const cli_fit *f);
 /* After the fit: a shape that was changed after the training of the network makes the check of the
  * network doubtful. */
 void cli_fit_doubt_changed_shape(cli_fit *f);
+
+/* Do the data show a part of the shape, and does this alone decide which values can be used? */
+bool cli_fit_knows_usable(const cli_fit *f);
+
+/* Prints the line `use`: the parameters that can be used, and those that cannot. Those that are
+ * kept are not named. */
+void cli_fit_print_usable(const cli_fit *f);
 
 /* Prints the verdict as text; adds it to a JSON object. */
 void cli_fit_print_verdict(const cli_fit *f);

@@ -92,6 +92,7 @@ static sdm_status take_other_side(cli_fit *f, sdm_error *err)
     if (s) return s;
     sdm_fit_dispose(&f->result);
     f->doubt = (sdm_error){0};
+    f->n_fits++;
     f->doubt.status = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
     f->better = -f->better;
     return SDM_OK;
@@ -130,6 +131,8 @@ sdm_status cli_fit_mirror(cli_fit *f, sdm_error *err)
     if (!shape || !shape->mirror) return SDM_OK;
     f->mirror = shape->mirror;
     sdm_fit_result rival = {0};
+    f->n_fits++;
+    f->at_mirror = true;
     sdm_status s = sdm_fit_mirrored(&f->source, &f->target, &f->opts, &rival, err);
     if (s == SDM_E_QUALITY) s = SDM_OK;
     f->better = sdm_fit_compare(&f->result, &rival);
@@ -144,6 +147,8 @@ sdm_status cli_fit_mirror(cli_fit *f, sdm_error *err)
 sdm_status cli_fit_run(cli_fit *f, sdm_error *err)
 {
     f->doubt = (sdm_error){0};
+    f->n_fits++;
+    f->at_mirror = false;
     f->doubt.status = sdm_fit(&f->source, &f->target, &f->opts, &f->result, &f->doubt);
     return !f->doubt.status || f->doubt.status == SDM_E_QUALITY ? cli_fit_mirror(f, err) : SDM_OK;
 }

@@ -128,6 +128,15 @@ static bool untested(const sdm_fit_verdict *v)
     return x && x->grade == SDM_FIT_DOUBTFUL && isnan(x->limit);
 }
 
+/* Is the fit doubtful, and only because the data show a part of the shape? */
+static bool only_a_part(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    static const sdm_fit_check_kind part[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA};
+    return v->grade == SDM_FIT_DOUBTFUL &&
+           only(v, SDM_FIT_DOUBTFUL, part, sizeof part / sizeof *part) && cli_fit_knows_usable(f);
+}
+
 /* What a verdict that is not `passed` means for the user of the values. */
 static const char *in_short(const cli_fit *f)
 {
@@ -145,6 +154,9 @@ static const char *in_short(const cli_fit *f)
         return only(v, SDM_FIT_FAILED, end, 1)
                    ? "do not use the values: the fit has not come to an end"
                    : "do not use the values: the data contradict them or do not decide";
+    if (only_a_part(f))
+        return "the data show a part of the shape: the line `use` names the values that can be "
+               "used";
     if (only(v, SDM_FIT_DOUBTFUL, part, sizeof part / sizeof *part))
         return "the data show a part of the shape: do not use what the lines below name, nor what "
                "is `not determined`";
@@ -196,6 +208,7 @@ void cli_fit_print_verdict(const cli_fit *f)
     if (cli_fit_start_is_suspect(f) && f->opts.turns == SDM_FIT_TURNS_NONE &&
         !isnan(f->args->pose.rotation[0]))
         printf("  --rotation gives one start: without it the fit tries 60 rotations\n");
+    if (only_a_part(f)) cli_fit_print_usable(f);
 }
 
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *j)

@@ -79,6 +79,24 @@ static void print_slicer(double fraction)
     fflush(stdout);
 }
 
+static void print_line(const char *title, double fraction, const char *text)
+{
+    if (cli_get_form() == CLI_FORM_JSON)
+        print_json(title, fraction, text);
+    else if (cli_get_form() == CLI_FORM_SLICER)
+        print_slicer(fraction);
+    else
+        fprintf(stderr, "sdmgen: %s %.0f %%  %s\n", title, 100 * fraction, text);
+}
+
+void cli_progress_tell(cli_progress *p, const char *title, const char *text)
+{
+    if (cli_is_quiet()) return;
+    cli_progress_clear(p);
+    print_line(title, 0, text);
+    p->last = sdm_clock();
+}
+
 void cli_progress_show(cli_progress *p, const char *title, double fraction, const char *text)
 {
     const double now = sdm_clock();
@@ -90,12 +108,8 @@ void cli_progress_show(cli_progress *p, const char *title, double fraction, cons
 
     if (p->bar)
         draw(p, title, fraction, text);
-    else if (cli_get_form() == CLI_FORM_JSON)
-        print_json(title, fraction, text);
-    else if (cli_get_form() == CLI_FORM_SLICER)
-        print_slicer(fraction);
     else
-        fprintf(stderr, "sdmgen: %s %.0f %%  %s\n", title, 100 * fraction, text);
+        print_line(title, fraction, text);
 }
 
 void cli_progress_clear(cli_progress *p)

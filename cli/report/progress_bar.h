@@ -17,6 +17,9 @@ void cli_progress_start(cli_progress *p);
  * none). Cheap: it does nothing until the interval has passed. */
 void cli_progress_show(cli_progress *p, const char *title, double fraction, const char *text);
 
+/* Prints the title and the text as a line of its own, at once: why the progress begins again. */
+void cli_progress_tell(cli_progress *p, const char *title, const char *text);
+
 /* Removes the bar before other output. */
 void cli_progress_clear(cli_progress *p);
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen fit: a refused fit names its likely cause: a start away from the data, points in another frame, exchanged values.
-# Tests: fit_astray.c fit_correlated.c fit_finer.c cause.c
+# Tests: fit_astray.c fit_finer.c fit_usable.c cause.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
 negate() { awk -F, 'NR == 1 { print; next } { printf "%g,%g,%s\n", -$1, -$2, $3 }' "$1"; }
@@ -64,6 +64,8 @@ expect 0 - $small small-label.nii --margin 0.5 --truth small.json
 has '^verdict: passed$'
 has '^  maps .*, voxels of 0\.13[0-9]* mm, because those of 0\.1[78][0-9]* mm at first were coarse beside the voxels of the labels$'
 has '^  radius .* truth 0\.6, off by [0-2]\.[0-9] sd$'
+${small% --quiet} small-label.nii --margin 0.5 >out 2>err || bad "a fit with progress: $(cat err)"
+grep -Eq '^sdmgen: fit 0 %  going on with finer maps \(voxels of 0\.13 mm\)$' err || bad "no line on finer maps: $(cat err)"
 grep -q 'finer maps from here' out && bad 'the command of a fit that went on by itself'
 # Maps that would be too large are left to the user.
 expect 0 - sdmgen phantom --shape capsule -p radius=0.6 -p length=1 --spacing 0.05 -o fine.nii --label fine-label.nii --quiet

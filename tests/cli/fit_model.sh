@@ -80,6 +80,16 @@ has '^  convergence  passed '
 has '^  q1 .* not determined: '
 has '^  network bias passed '
 has '^  covered      doubtful .*: the data hardly determine q1.*: no points lie near the part of the fitted surface that '
+has '^  in short +the data show a part of the shape: the line `use` names '
+has "^  use +no parameter$"
+
+# Points of an arm of another thickness: voxels that pass their own check are no cause of residuals, and no other ones are advised.
+sdmgen phantom --shape linkage -O links=2 -O edge=0.5 -O radius=1.05 -O tip=0.5 --spacing 1 -o arm.nii --surface thick-arm.csv --surface-points 1000 \
+    --surface-noise 0.02 --quiet >out 2>err || bad "thick-arm.csv: $(cat err)"
+sdmgen fit link/model.sdm thick-arm.csv --rotation 0,0,0 --quiet >out 2>err
+has '^  map voxels   passed '
+has '^  residuals    FAILED .*: another shape lies there'
+grep -q 'voxels of the maps.*coarse' out && bad "coarse voxels beside a check of them that passes: $(cat out)"
 
 # Steps that are too large for that: more iterations and another start do not help either. The command with a known value does.
 arm_without_its_end 4

@@ -90,7 +90,7 @@ static void name_cause(const fit_problem *p, const fit_misfit *m, const fit_susp
                  other->bounds->n_wanted ? other->bounds->text : "");
     else if (other->bounds->n_wanted)
         snprintf(cause, size, "%.300s", other->bounds->text);
-    else if (isfinite(coarse->advice))
+    else if (voxel > coarse->limit) // else the check of the voxels passes
         snprintf(
             cause, size,
             "%sthe voxels of the maps, %.2g mm, are coarse beside %s: try exact maps with voxels "

@@ -277,7 +277,7 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
         const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
         judge_patches(p, &found, on.n + strays.n, stray, bare, v);
-        char names[200], unseen_text[320] = "", astray[80] = "", beside[90] = "";
+        char names[SDM_FIT_NAMES_MAX], unseen_text[320] = "", astray[80] = "", beside[90] = "";
         const double voxel = fit_longest_edge(&p->maps.grid);
         char place[FIT_PLACE_NAME] = "";
         const double *middle = grown || other ? NULL : middle_of_bare(&surface, bare_at);

@@ -57,6 +57,12 @@
 // of the points, from which on it is named, too: a single point on the part that it moves fastest
 // would tell as much
 #define MOTION_HARDLY_KNOWN 3.0
+// fastest motion of places well within the points, over that of all places, up to which the points
+// lie on nothing that the parameter moves
+#define STILL 0.05
+// a place lies well within the points if no place without points is nearer than this multiple of
+// the distance at which a place has none
+#define WITHIN 1.5
 
 typedef struct cloud {
     double (*x)[3];
@@ -215,35 +221,81 @@ static const double *middle_of_bare(const fit_places *surface, const bool *bare)
     return middle;
 }
 
-/* Names the parameters that the points hardly determine and that move a surface which has no
-   points: text[size]. Returns the largest share of such a surface without points; 0: there is none.
- */
-static double name_unseen(const fit_problem *p, const sdm_fit_result *r, const fit_places *surface,
-                          const bool *bare, char *text, size_t size)
+/* within[i]: place i of the surface has points, and so have the places near it. */
+static sdm_status find_within(const fit_places *surface, const bool *bare, double reach,
+                              bool *within, sdm_error *err)
+{
+    cloud without = {0};
+    const sdm_status s = SDM_ALLOC(&without.x, surface->n + 1, "places of the surface", err);
+    if (s) return s;
+    for (size_t i = 0; i < surface->n; i++)
+        if (bare[i]) memcpy(without.x[without.n++], surface->world[i], sizeof *without.x);
+    for (size_t i = 0; i < surface->n; i++) {
+        double d2;
+        size_t number;
+        find_nearest(&without, surface->world[i], SIZE_MAX, 1, &d2, &number);
+        within[i] = d2 > WITHIN * WITHIN * reach * reach;
+    }
+    sdm_free(without.x);
+    return SDM_OK;
+}
+
+/* The parameters that the points hardly determine and that move a surface which has no points. */
+typedef struct unseen {
+    char names[SDM_FIT_NAMES_MAX];
+    double most;  // largest share of such a surface without points; 0: there is no such parameter
+    bool touched; // one of them moves places well within the points, too
+    bool narrow;  // all have a standard deviation far below that before the fit
+} unseen;
+
+static unseen find_unseen(const fit_problem *p, const sdm_fit_result *r, const fit_places *surface,
+                          const bool *bare, const bool *within)
 {
     const double edge = fit_longest_edge(&p->maps.grid);
-    double most = 0;
-    *text = '\0';
+    unseen found = {.narrow = true};
     for (size_t k = 0; k < p->n_params; k++) {
-        double all = 0, unseen = 0, fastest = 0, low, high;
+        double all = 0, without = 0, fastest = 0, inner = 0, low, high;
         const double sd = sdm_fit_prior_sd(p, k);
         const char *name = "";
         if (fit_param_is_kept(p, k)) continue;
         for (size_t i = 0; i < surface->n; i++) {
             const double by = surface->by[i * p->n_params + k];
             all += by * by;
-            unseen += bare[i] ? by * by : 0;
+            without += bare[i] ? by * by : 0;
             fastest = fmax(fastest, fabs(by));
+            if (within[i]) inner = fmax(inner, fabs(by));
         }
-        const double known =
-            fmin(SDM_FIT_HARDLY_KNOWN * sd, MOTION_HARDLY_KNOWN * p->state.point_sd / fastest);
-        if (!(fastest * sd > edge) || !(unseen > UNSEEN_MIN * all) || !(r->sd[k] > known)) continue;
-        most = fmax(most, unseen / all);
+        const bool wide = r->sd[k] > SDM_FIT_HARDLY_KNOWN * sd, touched = inner > STILL * fastest,
+                   vague = !touched && r->sd[k] * fastest > MOTION_HARDLY_KNOWN * p->state.point_sd;
+        if (!(fastest * sd > edge) || !(without > UNSEEN_MIN * all) || !(wide || vague)) continue;
+        found.most = fmax(found.most, without / all);
+        found.touched = found.touched || touched;
+        found.narrow = found.narrow && !wide;
         sdm_fit_bounds(p->source, k, &low, &high, &name);
-        const size_t used = strlen(text);
-        snprintf(text + used, size - used, "%s%.40s", used ? ", " : "", name);
+        const size_t used = strlen(found.names);
+        snprintf(found.names + used, sizeof found.names - used, "%s%.40s", used ? ", " : "", name);
     }
-    return most;
+    return found;
+}
+
+/* text[size] = which parameters these are, and what helps. Another start may help where the fit
+   stopped at a wrong value of which it is sure. */
+static void describe_unseen(const unseen *x, char *text, size_t size)
+{
+    const char *move = strchr(x->names, ',') ? "they move" : "it moves";
+    char why[100];
+    if (x->touched)
+        snprintf(why, sizeof why, "most of the part of the fitted surface that %s has no points",
+                 move);
+    else
+        snprintf(why, sizeof why, "no points lie near the part of the fitted surface that %s",
+                 move);
+    snprintf(text, size,
+             "the data hardly determine %s: %s; keep a known value (sdm_fit_opts.start_params, "
+             "sdm_fit_opts.kept), or take points from there%s",
+             x->names, why,
+             x->narrow ? "; the fit may have stopped at a wrong value: start from another one"
+                       : "");
 }
 
 /* Share of the parameters that end at a bound. */
@@ -261,11 +313,12 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
 {
     cloud on = {0}, strays = {0};
     fit_places surface = {0};
-    bool *bare_at = NULL;
+    bool *bare_at = NULL, *within = NULL;
     double spacing = 0;
     sdm_status s = SDM_ALLOC(&on.x, MOST + 1, "points of the fit", err);
     if (!s) s = SDM_ALLOC(&strays.x, MOST + 1, "points of the fit", err);
     if (!s) s = SDM_ALLOC(&bare_at, MOST + 1, "places of the surface", err);
+    if (!s) s = SDM_ALLOC(&within, MOST + 1, "places of the surface", err);
     if (!s) split_points(p, &on, &strays);
     if (!s && on.n > MANY) s = find_spacing(&on, &spacing, err);
     if (!s && on.n > MANY) s = sdm_fit_places_create(&p->maps, &p->state, MOST, &surface, err);
@@ -277,7 +330,7 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
         const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
         judge_patches(p, &found, on.n + strays.n, stray, bare, v);
-        char names[SDM_FIT_NAMES_MAX], unseen_text[320] = "", astray[80] = "", beside[90] = "";
+        char unseen_text[512] = "", astray[80] = "", beside[90] = "";
         const double voxel = fit_longest_edge(&p->maps.grid);
         char place[FIT_PLACE_NAME] = "";
         const double *middle = grown || other ? NULL : middle_of_bare(&surface, bare_at);
@@ -289,17 +342,13 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
             snprintf(beside, sizeof beside,
                      "; or the voxels of the maps, %.2g mm, are too coarse to show its surface",
                      voxel);
-        const double unseen = name_unseen(p, r, &surface, bare_at, names, sizeof names);
-        if (unseen > 0)
-            snprintf(unseen_text, sizeof unseen_text,
-                     "the data hardly determine %s: no points lie near the part of the fitted "
-                     "surface that %s; start from other values (sdm_fit_opts.start_params), take "
-                     "points from there, or keep a known value (sdm_fit_opts.kept)",
-                     names, strchr(names, ',') ? "they move" : "it moves");
+        s = find_within(&surface, bare_at, REACH * spacing + 3 * sd, within, err);
+        const unseen hidden = s ? (unseen){0} : find_unseen(p, r, &surface, bare_at, within);
+        if (hidden.most > 0) describe_unseen(&hidden, unseen_text, sizeof unseen_text);
         const bool covered = bare <= UNCOVERED_MAX;
-        if (covered && unseen > 0)
-            sdm_fit_judge_add(v, SDM_FIT_CHECK_COVERED, false, SDM_FIT_DOUBTFUL, unseen, UNSEEN_MIN,
-                              "%s", unseen_text);
+        if (covered && hidden.most > 0)
+            sdm_fit_judge_add(v, SDM_FIT_CHECK_COVERED, false, SDM_FIT_DOUBTFUL, hidden.most,
+                              UNSEEN_MIN, "%s", unseen_text);
         else
             sdm_fit_judge_add(
                 v, SDM_FIT_CHECK_COVERED, covered,
@@ -310,11 +359,12 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
                           "strays out (sdm_fit_opts.tolerance allows more)"
                 : other ? "most of it, and half of the parameters or more end at their bounds: the "
                           "data show another shape, or their lengths are in another unit"
-                : unseen > 0 ? ""
-                             : "the data lack a part of the shape, or the shape is too large",
-                (grown || other) && unseen > 0 ? "; " : "", unseen_text, beside);
+                : hidden.most > 0 ? ""
+                                  : "the data lack a part of the shape, or the shape is too large",
+                (grown || other) && hidden.most > 0 ? "; " : "", unseen_text, beside);
     }
     sdm_free(bare_at);
+    sdm_free(within);
     sdm_free(on.x);
     sdm_free(strays.x);
     sdm_fit_places_dispose(&surface);

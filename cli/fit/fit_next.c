@@ -7,6 +7,7 @@
 
 #include "args/shell_word.h"
 #include "fit_command.h"
+#include "report/terminal.h"
 #include "sdm/internal/hardly_known.h"
 
 /* Options that say where a fit starts, how much it prints, or which maps it takes: the command has

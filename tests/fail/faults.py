@@ -119,7 +119,9 @@ class Runner:
             return bool(json.loads(text))
         if name.endswith((".md", ".csv")):  # a row that failed has no figures
             return text.split("\n")[0] == case.reference[name].decode().split("\n")[0] and text.endswith("\n")
-        if name.endswith(("pod/model.sdm", ".html")) or (name.startswith("run/") and name.endswith(".png")):
+        if name.endswith("pod/model.sdm"):  # whole, but without the figures for which memory was too short; 4: less exact than stated
+            return subprocess.run([self.program, "verify", name], cwd=folder, capture_output=True).returncode in (0, 4)
+        if name.endswith(".html") or (name.startswith("run/") and name.endswith(".png")):
             return abs(len(content) - len(case.reference[name])) < 200 and content[-4:] == case.reference[name][-4:]
         return False
 

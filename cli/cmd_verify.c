@@ -18,7 +18,8 @@ enum { DEFAULT_SAMPLES = 20 };
 /* Largest allowed ratio of measured to stated RMSE. */
 #define TOLERANCE 1.25
 
-/* What separates two facts about a file: of several files each has one line. */
+/* The text between two facts about a file. Where several files are verified, all facts about one
+ * stand in one line. */
 static const char *next_fact(const cli_args *args) { return args->files.n > 1 ? "; " : "\n"; }
 
 static sdm_status verify_vdb(const cli_args *args, const char *path, sdm_error *err)

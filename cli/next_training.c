@@ -265,7 +265,8 @@ static bool is_open(const sdm_train_report *r)
     return r->trial_minutes > 0 && !r->tried && !r->compared && !(r->verdict.inside_out > 0);
 }
 
-/* The changes with train.minutes that hold the trials of both kinds on the grid of the changes. */
+/* Returns the changes of keys, with train.minutes raised so that they hold the trials of both
+ * kinds. factor: by which a map takes longer on the grid of the changes. */
 static sdm_verdict with_trials(const sdm_train_report *r, const sdm_verdict *changes, double factor)
 {
     sdm_verdict v = *changes;

@@ -12,7 +12,7 @@
 #define VOXELS_MAX 2097152.0
 #define VALUES_MAX 16777216.0
 
-/* Does the command line leave the grid of the exact maps open? */
+/* Are the exact maps on the default grid, because no model and no option gives another one? */
 static bool grid_is_open(const cli_fit *f)
 {
     const cli_args *a = f->args;

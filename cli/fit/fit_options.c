@@ -147,7 +147,7 @@ void cli_fit_default_lengths(cli_fit *f)
     o->blur = isnan(a->blur) ? d.blur : a->blur;
     o->l_ref = isnan(a->l_ref) ? d.l_ref : a->l_ref;
     o->margin = isnan(a->margin) ? d.margin : a->margin;
-    // the fit with coarse maps has told it
+    // a fit that goes on with finer maps has printed this warning before
     if (!(f->coarse_mm > 0) && f->target.kind != SDM_FIT_POINTS &&
         o->margin < 0.999 * MARGIN_MIN * voxel)
         cli_warn("--margin %g mm is less than %g voxels of %.3g mm: the fit hardly sees what lies "

@@ -17,7 +17,8 @@
 /* Is its standard deviation that of a fitted parameter in its range? */
 static bool is_fitted(const sdm_fit_result *r, size_t k) { return r->sd[k] > 0 && !r->at_bound[k]; }
 
-/* The standard deviations of the two weigh what is well determined: x / sd(x) + y / sd(y). */
+/* Prints the combination of x and y that the data determine well: x + weight y or x - weight y.
+ * weight: the standard deviation of x over that of y. */
 static void print_pair(const sdm_param *x, const sdm_param *y, double weight, double correlation)
 {
     const bool sum = correlation < 0;

@@ -196,7 +196,7 @@ static size_t row_fill(const cli_points_table *t, size_t i, double row[ROW_MAX])
     return n;
 }
 
-/* Writes the names of column c. */
+/* Writes the headings of column c: of slopes, d_NAME for each parameter. */
 static sdm_status write_header(const cli_points_table *t, int c, sdm_outfile *f, sdm_error *err)
 {
     const char *header = kinds[t->column[c]].header;

@@ -37,7 +37,8 @@ static void tell_open(teller *t)
     teller_tell(t, SDM_E_MESH, &text);
 }
 
-/* Appends why a part turns over, and how to mend it. name: of the parameter; NULL: several. */
+/* Appends why a part turns over, and how to mend it. name: the parameter that turns it over; NULL:
+ * several do it together. */
 static void add_turn_cause(cli_turn_cause cause, const char *name, sdm_text *text)
 {
     const char *quote = name ? "'" : "", *word = name ? name : "the parameters";

@@ -22,8 +22,8 @@ typedef struct training_turns {
     sdm_train_report first;   /* result of the first, while the second trains */
     double pod_minutes;   /* train.minutes for a training of pod alone at the pace of the trials; 0:
                              the budget holds its maps */
-    double trial_minutes; /* train.minutes that hold the trials of both kinds, where the budget was
-                             too short for that of the kind that is not trained; 0: else */
+    double trial_minutes; /* train.minutes whose part for trials holds those of both kinds, if the
+                             budget left out the trial of the kind that is not trained; else 0 */
     bool untried;         /* pod may be better, but the budget was too short for its trial */
     bool tried_other;     /* the kind that is not trained, or trained later, had a trial: */
     turn_figures other;   /* its errors in the trial */

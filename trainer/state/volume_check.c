@@ -26,16 +26,25 @@ static void add(volume_sums *sums, double volume, double exact)
     sums->largest = fmax(sums->largest, fabs(error));
 }
 
+/* *e, *volume = the exact engine at p, which the caller frees, and the volume of its mesh; NULL and
+ * 0: the grid cuts the mesh. */
+static sdm_status open_mesh(const trainer *t, const double *p, sdm_exact **e, double *volume,
+                            sdm_error *err)
+{
+    double area;
+    *e = NULL;
+    *volume = 0;
+    const sdm_status s = trainer_exact_within(&t->data, p, t->n_threads, e, err);
+    if (*e) sdm_mesh_sums(sdm_exact_surface(*e), volume, &area);
+    return s;
+}
+
 /* *volume = the volume of the mesh of held-out shape i; 0: the grid cuts it. */
 static sdm_status mesh_volume(const trainer *t, size_t i, double *volume, sdm_error *err)
 {
-    const dataset *d = &t->data;
-    sdm_exact *e = NULL;
-    double area;
+    sdm_exact *e;
     const sdm_status s =
-        trainer_exact_within(d, d->holdout_params + i * d->n_params, t->n_threads, &e, err);
-    *volume = 0;
-    if (e) sdm_mesh_sums(sdm_exact_surface(e), volume, &area);
+        open_mesh(t, t->data.holdout_params + i * t->data.n_params, &e, volume, err);
     sdm_exact_free(e);
     return s;
 }
@@ -96,15 +105,11 @@ static sdm_status volumes_at(const trainer *t, const double *p, float *values, d
                              double *mesh, bool *cut, sdm_error *err)
 {
     const dataset *d = &t->data;
-    sdm_exact *e = NULL;
-    double area;
-    sdm_status s = trainer_exact_within(d, p, t->n_threads, &e, err);
+    sdm_exact *e;
+    sdm_status s = open_mesh(t, p, &e, mesh, err);
     *cut = !e;
-    if (!s && e) {
-        sdm_mesh_sums(sdm_exact_surface(e), mesh, &area);
-        s = sdm_exact_map(e, d->grid, values, err);
-        if (!s) s = sdm_map_volume(d->grid, values, t->n_threads, map, err);
-    }
+    if (!s && e) s = sdm_exact_map(e, d->grid, values, err);
+    if (!s && e) s = sdm_map_volume(d->grid, values, t->n_threads, map, err);
     sdm_exact_free(e);
     return s;
 }

@@ -290,8 +290,8 @@ static const char *open_note(const sdm_train_report *r, char text[160])
     *text = '\0';
     if (is_open(r))
         snprintf(text, 160,
-                 "network.kind stays auto: train.minutes holds the trial of %s, which this run has "
-                 "left out; ",
+                 "network.kind stays auto: this run had no time to try %s, too; these "
+                 "train.minutes are enough to try both kinds; ",
                  r->kind == SDM_NETWORK_POD ? "template" : "pod");
     return text;
 }
@@ -349,9 +349,10 @@ static void print_note(const sdm_train_report *r, const char *kind, double ms_ma
                      "the kind stays %s%s; without network.kind=%s the run chooses a kind again; ",
                      kind, time, kind);
     if (unfit[0] && strncmp(v->key, "grid.", 5))
-        sdm_text_add(&note, "whether this mends what `not for` names is not known; ");
+        sdm_text_add(&note, "this lowers the error of distances; the uses that `not for` names may "
+                            "need another change; ");
     else if (v->derivatives_bad[0])
-        sdm_text_add(&note, "whether this mends derivatives of maps is not known; ");
+        sdm_text_add(&note, "derivatives of maps may need another change; ");
     if (!note.failed && note.size > 2)
         printf("              (%.*s)\n", (int)(note.size - 2), note.data);
     sdm_text_dispose(&note);

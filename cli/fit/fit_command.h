@@ -288,8 +288,9 @@ void cli_fit_doubt_changed_shape(cli_fit *f);
 bool cli_fit_knows_usable(const cli_fit *f);
 
 /* Prints the line `use`: the parameters that can be used, and those that cannot. Those that are
- * kept are not named. */
+ * kept are not named. cli_fit_json_usable adds the list of the former to a JSON object. */
 void cli_fit_print_usable(const cli_fit *f);
+void cli_fit_json_usable(const cli_fit *f, sdm_json *json);
 
 /* Prints the verdict as text; adds it to a JSON object. */
 void cli_fit_print_verdict(const cli_fit *f);

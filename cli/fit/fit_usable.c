@@ -128,3 +128,12 @@ void cli_fit_print_usable(const cli_fit *f)
     }
     printf("\n");
 }
+
+void cli_fit_json_usable(const cli_fit *f, sdm_json *json)
+{
+    const bool *kept = f->opts.kept;
+    sdm_json_open(json, "usable", '[');
+    for (size_t k = 0; k < f->n_params; k++)
+        if (!(kept && kept[k]) && is_usable(f, k)) sdm_json_text(json, NULL, f->params[k].name);
+    sdm_json_close(json, ']');
+}

@@ -228,6 +228,8 @@ void cli_fit_json_verdict(const cli_fit *f, sdm_json *j)
         sdm_json_close(j, '}');
     }
     sdm_json_close(j, ']');
+    if (v->n_findings && v->grade != SDM_FIT_PASSED) sdm_json_text(j, "in_short", in_short(f));
+    if (only_a_part(f)) cli_fit_json_usable(f, j);
     sdm_json_close(j, '}');
     if (!f->mirror) return;
     sdm_json_open(j, "mirror", '{');

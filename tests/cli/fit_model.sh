@@ -74,7 +74,7 @@ arm_without_its_end() { # SEED: writes upper-arm.csv
     awk -F, 'NR == 1 || $1 < 2' arm.csv >upper-arm.csv
 }
 arm_without_its_end 9
-expect 0 - sdmgen fit link/model.sdm upper-arm.csv --rotation 0,0,0 --quiet
+expect 0 - sdmgen fit link/model.sdm upper-arm.csv --rotation 0,0,0 -o upper-arm.json --quiet
 has '^  convergence  passed '
 # the network is no cause of what the data do not determine
 has '^  q1 .* not determined: '
@@ -84,6 +84,7 @@ has '^  covered      doubtful .*: the data hardly determine q1: most of the part
 near "$(sed -n 's/^  q2 *\([-0-9.]*\) .*/\1/p' out)" -1.008 0.08
 has '^  in short +the data show a part of the shape: the line `use` names '
 has '^  use +q2; do not use q1$'
+tr -d '\n ' <upper-arm.json | grep -q '"usable":\["q2"\]' || bad "upper-arm.json: $(head -c 2000 upper-arm.json)"
 
 # Points of an arm of another thickness: voxels that pass their own check are no cause of residuals, and no other ones are advised.
 sdmgen phantom --shape linkage -O links=2 -O edge=0.5 -O radius=1.05 -O tip=0.5 --spacing 1 -o arm.nii --surface thick-arm.csv --surface-points 1000 \

@@ -134,10 +134,11 @@ grep -q '^1,false,.*of the volume of the shape is empty in the labels' hole/wron
 expect 0 - sdmgen phantom --shape ellipsoid -p rx=4 -p ry=3.2 -p rz=2.5 --spacing 0.5 --seed 3 -o e.nii --surface e.csv --surface-noise 0.05 \
     --surface-points 1500 -q
 awk -F, 'NR == 1 || $1 < 0.5' e.csv >half.csv
-expect 0 - sdmgen fit --shape ellipsoid half.csv --rotation 0,0,0 --start-centre 0,0,0 -q
+expect 0 - sdmgen fit --shape ellipsoid half.csv --rotation 0,0,0 --start-centre 0,0,0 -o half.json -q
 has '^  covered      doubtful '
 has '^  in short +the data show a part of the shape: the line `use` names '
 has '^  use +all values, each with its \+-$'
+tr -d '\n ' <half.json | grep -q '"in_short":"thedatashowapartoftheshape:.*"usable":\["rx","ry","rz"\]' || bad "half.json: $(head -c 2000 half.json)"
 
 # Forty points have no neighbours: nothing tests them but a standard deviation that is known.
 expect 0 - sdmgen phantom --shape capsule -p radius=1.2 -p length=5 --spacing 0.5 -o few.nii --surface few.csv --surface-points 40 --surface-noise 0.05 -q

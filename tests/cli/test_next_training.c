@@ -165,8 +165,8 @@ static void kind_stays_open(void **state)
                  cases[i].changes);
         assert_string_equal(text, expected);
         assert_string_equal(second,
-                            "              (network.kind stays auto: train.minutes holds the trial "
-                            "of template, which this run has left out)\n");
+                            "              (network.kind stays auto: this run had no time to try "
+                            "template, too; these train.minutes are enough to try both kinds)\n");
         // a kind that was tried needs no other trial
         r.tried = true;
         next_lines(&r, 2, text, second);
@@ -195,8 +195,9 @@ static void finer_grid_leaves_kind_open(void **state)
     next_lines(&r, 2, text, second);
     assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.5 "
                               "train.minutes=84 --out run-2\n");
-    assert_string_equal(second, "              (network.kind stays auto: train.minutes holds the "
-                                "trial of template, which this run has left out; for derivatives "
+    assert_string_equal(second, "              (network.kind stays auto: this run had no time to "
+                                "try template, too; these train.minutes are enough to try both "
+                                "kinds; for derivatives "
                                 "of the volume, which `not for` leaves out: 8 times the voxels; "
                                 "nothing else needs to change: the error at the surface is 0.01 "
                                 "voxels)\n");
@@ -223,13 +224,14 @@ static void uses_are_not_promised(void **state)
                                       .from = 128,
                                       .to = 256}};
     next_lines(&r, 2, text, second);
-    assert_non_null(strstr(second, "; whether this mends what `not for` names is not known)\n"));
+    assert_non_null(strstr(second, "; this lowers the error of distances; the uses that `not for` "
+                                   "names may need another change)\n"));
     strcpy(r.verdict.key, "grid.spacing");
     next_lines(&r, 2, text, second);
-    assert_non_null(strstr(second, "; whether this mends derivatives of maps is not known)\n"));
+    assert_non_null(strstr(second, "; derivatives of maps may need another change)\n"));
     r.verdict.derivatives_bad[0] = '\0';
     next_lines(&r, 2, text, second);
-    assert_null(strstr(second, "mends"));
+    assert_null(strstr(second, "another change"));
 }
 
 // Without another fault a good model needs nothing but the grid for the use that it leaves out; a

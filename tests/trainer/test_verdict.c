@@ -490,13 +490,13 @@ static void uses_and_spacing(void **state)
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines,
                         "exact fits by the network alone: its thinnest part, 2.3 mm thick "
-                        "in a few held-out shapes, has 2.9 voxels across; fits need 4 there, "
-                        "5 with a margin: sdmgen fit --exact --spacing S (S: the smaller of "
-                        "0.46 and 1.2 times the blur of the image)\n");
+                        "in a few held-out shapes, has 2.9 voxels across, and fits need 5: "
+                        "take sdmgen fit --exact --spacing 0.46 (for an image with a blur below "
+                        "0.38 mm: 1.2 times the blur)\n");
     // not 4 where there are nearly so many
     v.thickness_mm = 3.96 * v.coarse_mm;
     sdm_verdict_unfit(&v, lines);
-    assert_non_null(strstr(lines, " has 3.9 voxels across; "));
+    assert_non_null(strstr(lines, " has 3.9 voxels across, "));
     // the promise leaves a fifth of the four voxels that the check `map voxels` of a fit asks for:
     // the fitted shape may be thinner
     v.thickness_mm = 4.9 * v.coarse_mm;

@@ -63,15 +63,15 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
             percent(v->surface_volume_error, text), v->coarse_mm, 100 * SDM_VOLUME_AIM, spacing);
     else if (sdm_verdict_surfaces_off(v))
         add(l, "volumes of surfaces (.stl): off by %s %%", percent(v->surface_volume_error, text));
-    const double finer = sdm_verdict_fit_spacing(v);
+    const double finer = sdm_verdict_fit_spacing(v),
+                 blurs = SDM_GRID_FIT_ADVISED * SDM_GRID_FIT_DATA; // voxels by the blur
     if (finer > 0 && !sdm_verdict_lacks_part(v))
         add(l,
             "exact fits by the network alone: its thinnest part, %.2g mm thick in a few held-out "
-            "shapes, has %.1f voxels across; fits need %d there, %.2g with a margin: sdmgen fit "
-            "--exact --spacing S (S: the smaller of %.2g and %.2g times the blur of the image)",
+            "shapes, has %.1f voxels across, and fits need %.2g: take sdmgen fit --exact --spacing "
+            "%.2g (for an image with a blur below %.2g mm: %.2g times the blur)",
             v->thickness_mm, floor(10 * v->thickness_mm / v->coarse_mm + 1e-9) / 10,
-            SDM_GRID_FIT_VOXELS, SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED, finer,
-            SDM_GRID_FIT_ADVISED * SDM_GRID_FIT_DATA);
+            SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED, finer, finer / blurs, blurs);
 }
 
 /* text[160] = what causes the error of derivatives of the volume, and what mends it; "": not

@@ -13,6 +13,8 @@ enum { CLI_OPTIONS_MAX = 64 };
 typedef struct cli_overlap {
     bool measured;
     size_t n_fit, n_reference, n_both; /* voxels inside, on the reference's grid */
+    size_t n_beyond;                   /* labelled voxels farther outside than the margin */
+    double beyond[3], beyond_mm;       /* the nearest of them (LPS mm), its distance */
     double dice;
     bool has_surface;                     /* both surfaces have vertices in the field of view */
     double mean_mm, q95_mm, hausdorff_mm; /* distances between the surfaces, in both directions */

@@ -1,6 +1,7 @@
 /* Compares a fitted shape with labels: overlap of the voxels inside, and distances between the
  * surfaces, within the field of view of the image. */
 #include <math.h>
+#include <string.h>
 
 #include "fit_command.h"
 #include "measure/median.h"
@@ -53,6 +54,15 @@ static bool is_in_view(const cli_fit *f, const double world[3])
     return true;
 }
 
+/* Counts a labelled voxel that the fit has not seen, because it lies beyond the margin. */
+static void count_beyond(cli_overlap *o, const double world[3], double distance)
+{
+    if (!o->n_beyond++ || distance < o->beyond_mm) {
+        o->beyond_mm = distance;
+        memcpy(o->beyond, world, sizeof o->beyond);
+    }
+}
+
 /* Counts the voxels inside map[g] (below 0) and labels[g] (above 0) and computes Dice. */
 static void count_voxels(cli_fit *f, const sdm_grid *g, const float *map, const float *labels)
 {
@@ -69,6 +79,7 @@ static void count_voxels(cli_fit *f, const sdm_grid *g, const float *map, const 
                 o->n_fit += fit;
                 o->n_reference += reference;
                 o->n_both += fit && reference;
+                if (reference && *map > f->opts.margin) count_beyond(o, world, *map);
             }
     const size_t both = o->n_fit + o->n_reference;
     o->dice = both ? 2 * (double)o->n_both / (double)both : NAN;

@@ -107,6 +107,7 @@ static void add_overlap(sdm_json *j, const cli_fit *f)
     sdm_json_real(j, "dice", o->dice);
     sdm_json_int(j, "voxels_fit", (int64_t)o->n_fit);
     sdm_json_int(j, "voxels_reference", (int64_t)o->n_reference);
+    if (f->reference_is_target) sdm_json_int(j, "voxels_far", (int64_t)o->n_beyond);
     if (o->has_surface) {
         sdm_json_real(j, "surface_mean_mm", o->mean_mm);
         sdm_json_real(j, "surface_q95_mm", o->q95_mm);

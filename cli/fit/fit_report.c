@@ -11,6 +11,11 @@
 // ... and that with them so large.
 #define OPEN_WITH 10.0
 
+// Labels beyond the margin are told from so many voxels on, and from this share of all labels on:
+// fewer are specks.
+#define BEYOND_MIN 8
+#define BEYOND_SHARE 0.002
+
 static void print_params(const cli_fit *f)
 {
     const sdm_fit_result *r = &f->result;
@@ -71,6 +76,20 @@ static void print_overlap(const cli_fit *f)
     if (o->has_surface)
         printf("  surfaces     mean %.3g, 95 %% below %.3g, Hausdorff %.3g mm\n", o->mean_mm,
                o->q95_mm, o->hausdorff_mm);
+}
+
+/* Labels of other bodies: the check `missing` counts them, and does not know their place. */
+static void print_beyond(const cli_fit *f)
+{
+    const cli_overlap *o = &f->overlap;
+    if (!o->measured || !f->reference_is_target || o->n_beyond < BEYOND_MIN ||
+        (double)o->n_beyond < BEYOND_SHARE * (double)o->n_reference)
+        return;
+    printf("  far labels   %zu labelled voxels, %.2g %% of them, lie farther outside than --margin "
+           "(%.3g mm), and the shape is not fitted to them; the nearest is %.3g mm away, at %.4g, "
+           "%.4g, %.4g mm\n",
+           o->n_beyond, 100 * (double)o->n_beyond / (double)o->n_reference, f->opts.margin,
+           o->beyond_mm, o->beyond[0], o->beyond[1], o->beyond[2]);
 }
 
 static void print_law(const char *side, const sdm_fit_law *law)
@@ -161,6 +180,7 @@ void cli_fit_print(const cli_fit *f)
     if (f->measures.n) cli_print_measures(&f->measures, true);
     print_overlap(f);
     print_target(f);
+    print_beyond(f);
     cli_fit_print_verdict(f);
     cli_fit_print_next(f);
     cli_fit_print_candidates(f);

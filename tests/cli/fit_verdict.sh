@@ -130,6 +130,15 @@ expect 0 - sdmgen experiment hole.yaml --out hole -q
 grep -q '^1,true,' hole/right/fits.csv || bad "right fit: $(tail -n 1 hole/right/fits.csv)"
 grep -q '^1,false,.*of the volume of the shape is empty in the labels' hole/wrong/fits.csv || bad "wrong fit: $(tail -n 1 hole/wrong/fits.csv)"
 
+# Labels of another body beyond the margin are counted, and the nearest is named: 30 voxels of the first row, up to x = (29 - 29.5) 0.4 mm.
+expect 0 - sdmgen phantom --shape torus -O edge=0.5 --size 60,60,24 --spacing 0.4 -o wide.nii --label wide-label.nii -q
+head -c 30 /dev/zero | tr '\0' '\1' | dd of=wide-label.nii bs=1 seek=352 conv=notrunc status=none
+expect 0 - sdmgen fit --shape torus -O edge=0.5 wide-label.nii --label 1 --rotation 0,0,0 -q
+has '^  far labels   30 labelled voxels, 3.5 % of them, lie farther outside than --margin \(1.5 mm\), .*; the nearest is 9 mm away, at -0.2, -11.8, -4.6 mm$'
+has '^  missing      doubtful .*: 30 voxels far from the surface'
+expect 0 - sdmgen fit --shape torus -O edge=0.5 torus-label.nii --label 1 --rotation 0,0,0 -q
+grep -q '^  far labels' out && bad "labels of one body: $(cat out)"
+
 # Half of a surface determines all values of an ellipsoid: each can be used.
 expect 0 - sdmgen phantom --shape ellipsoid -p rx=4 -p ry=3.2 -p rz=2.5 --spacing 0.5 --seed 3 -o e.nii --surface e.csv --surface-noise 0.05 \
     --surface-points 1500 -q

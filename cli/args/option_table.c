@@ -370,7 +370,8 @@ const cli_option cli_options[] = {
     {"jacobian", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT),
      AT(jacobian),
      "also write the derivatives by the shape's parameters: float32 [parameter][z][y][x], mm per "
-     "unit (--points: [point][parameter])"},
+     "unit (--points: [point][parameter]); the map of a network then differs by about a thousandth "
+     "of a voxel"},
     {"audit", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH), AT(audit),
      "check the mesh and print its properties, defects and parts"},
     {"turn-parts", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH) | ON(CLI_EXACT), AT(turn_parts),

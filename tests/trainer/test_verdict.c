@@ -222,6 +222,13 @@ static void patience_left_time(void **state)
         trainer_verdict_decide(&in, &v);
         assert_string_equal(v.key, early ? "train.patience" : "train.minutes");
         if (early) assert_non_null(strstr(v.sentence, "raise train.patience from 0.3 to 0.6"));
+        assert_int_equal(strstr(v.sentence, "too short, it made fewer than 500 steps") != NULL,
+                         !early);
+        v = figures();
+        v.part_mm2[SDM_CAUSE_NETWORK] = 1e-4;
+        in.steps = 0, in.ended_early = false;
+        trainer_verdict_decide(&in, &v);
+        assert_non_null(strstr(v.sentence, "too short, the maps left no time for steps"));
     }
 }
 

@@ -93,7 +93,8 @@ static const char *advise_network(const verdict_input *in, sdm_verdict *v)
         return "train.patience ended the training after few steps";
     if (few) {
         advise_budget(in, v);
-        return "The training was too short";
+        return in->steps > 0 ? "The training was too short, it made fewer than 500 steps"
+                             : "The training was too short, the maps left no time for steps";
     }
     if (falls) {
         advise_budget(in, v);

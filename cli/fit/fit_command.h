@@ -300,7 +300,7 @@ void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);
 
 /* Before a fit to an image: SDM_E_QUALITY where the values of the tissues are clearly exchanged at
  * the start pose, unless rotations are tried or --force is given; then, and where it is not clear,
- * a notice. */
+ * a notice. A notice, too, where the border of the image has the values of the inside. */
 sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err);
 
 /* After a fit to an image that is not trustworthy: where the image at the start pose looks like the

@@ -12,9 +12,13 @@
 
 /* Before the fit, the values pass for exchanged where the mean on either side of the start shape is
  * nearer to the value of the other side than this share of its distance from its own, and the means
- * differ by this many of their standard deviations. */
+ * differ by this many of their standard deviations. A value is like the inside by the same share.
+ */
 #define CLEARLY 0.5
 #define DEVIATIONS 5.0
+
+/* An image shows the inside at its border where so much of it is like the inside. */
+#define BORDER_SHARE 0.9
 
 /* Sums and number of the voxels of an image on one side of the surface. */
 typedef struct side_values {
@@ -141,6 +145,40 @@ static double variance_of_mean(const cli_fit *f, const side_values *side)
     return (side->squares / side->n - mean * mean) / (side->n * share / 27);
 }
 
+/* Is the value clearly nearer to the inside than to every tissue outside? */
+static bool is_like_inside(const sdm_fit_appearance *a, double value)
+{
+    const double own = fabs(value - a->inside[0].mean);
+    for (size_t k = 0; k < a->n_outside; k++)
+        if (!(own < CLEARLY * fabs(value - a->outside[k].mean))) return false;
+    return true;
+}
+
+/* A notice where nearly the whole border of the image has the values of the inside, as an image
+ * that holds the whole shape never has. One value alone there is padding. */
+static void check_border(const cli_fit *f)
+{
+    const sdm_grid *g = &f->target.grid;
+    double sum = 0, least = INFINITY, most = -INFINITY;
+    size_t n = 0, like = 0, v = 0;
+    for (int64_t k = 0; k < g->n[2]; k++)
+        for (int64_t j = 0; j < g->n[1]; j++)
+            for (int64_t i = 0; i < g->n[0]; i++, v++) {
+                const double value = f->target.values[v];
+                const bool within = i > 0 && j > 0 && k > 0 && i < g->n[0] - 1 && j < g->n[1] - 1 &&
+                                    k < g->n[2] - 1;
+                if (within || !isfinite(value)) continue;
+                n++, like += is_like_inside(&f->opts.appearance, value);
+                sum += value, least = fmin(least, value), most = fmax(most, value);
+            }
+    if (!n || !(most > least) || (double)like < BORDER_SHARE * (double)n) return;
+    cli_notice(
+        "%.0f %% of the border of the image (mean %.4g) is nearer to the value of the inside, "
+        "%.4g, than to those outside, %.4g%s: are --inside and --outside exchanged?",
+        100 * (double)like / (double)n, sum / (double)n, f->opts.appearance.inside[0].mean,
+        f->opts.appearance.outside[0].mean, f->opts.appearance.n_outside > 1 ? " and others" : "");
+}
+
 sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err)
 {
     const double inside = f->opts.appearance.inside[0].mean,
@@ -149,14 +187,21 @@ sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err)
     sdm_fit_finding why;
     if (f->target.kind != SDM_FIT_IMAGE || f->args->fit.find) return SDM_OK;
     // the fit itself tells what a shape lacks that has no map
-    if (measure_start(f, &in, &around, NULL) || !(in.n > 0) || !(around.n > 0)) return SDM_OK;
+    if (measure_start(f, &in, &around, NULL)) return SDM_OK;
+    if (!(in.n > 0) || !(around.n > 0)) {
+        check_border(f);
+        return SDM_OK;
+    }
     const double a = in.sum / in.n, b = around.sum / around.n;
     const bool other = fabs(a - outside) < fabs(a - inside) && fabs(b - inside) < fabs(b - outside),
                clear = fabs(a - outside) < CLEARLY * fabs(a - inside) &&
                        fabs(b - inside) < CLEARLY * fabs(b - outside) &&
                        fabs(a - b) > DEVIATIONS * sqrt(variance_of_mean(f, &in) +
                                                        variance_of_mean(f, &around));
-    if (!other || !((a - b) / (outside - inside) > CONTRAST_MIN)) return SDM_OK;
+    if (!other || !((a - b) / (outside - inside) > CONTRAST_MIN)) {
+        check_border(f);
+        return SDM_OK;
+    }
     describe_exchange(f, a, b, false, why.text, sizeof why.text);
     if (clear && f->opts.turns == SDM_FIT_TURNS_NONE && !f->args->force)
         return sdm_fail(err, SDM_E_QUALITY, "%s: %s; --force fits nevertheless", f->path, why.text);

@@ -36,6 +36,11 @@ expect 0 - $torus turned.nii --inside 40,170 --outside 1300,270 --start-centre 1
 sdmgen fit --shape torus -O edge=0.5 turned.nii --spacing 0.4 --inside 1300,270 --outside 40,170 --start-axis 0,0,1 --turns 1 --max-iterations 1 >out 2>err
 grep -q '^sdmgen: the values of the inside and the outside are exchanged: at the start .*: exchange --inside and --outside, if the shape lies near the start$' err ||
     bad "no notice of exchanged values: $(cat err)"
+# a start so far beside the shape that it shows nothing: the border of the image tells
+sdmgen fit --shape torus -O edge=0.5 turned.nii --spacing 0.4 --inside 1300,270 --outside 40,170 --start-centre 0,0,4 --max-iterations 1 --turns 1 >out 2>err
+grep -q '^sdmgen: [0-9]* % of the border of the image (mean 1[23][0-9.]*) is nearer to the value of the inside, 1300, than to those outside, 40' err || bad "no notice of the border: $(cat err)"
+sdmgen fit --shape torus -O edge=0.5 turned.nii --spacing 0.4 --inside 40,170 --outside 1300,270 --start-centre 0,0,4 --max-iterations 1 --turns 1 >out 2>err
+grep -q 'border of the image' err && bad "a notice of the border with the right values: $(cat err)"
 expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside are exchanged: .*: exchange --inside and --outside$' \
     $torus turned.nii --inside 1300,270 --outside 40,170 --force
 has '^  given values doubtful  [0-9.]+, need at most 3 '

@@ -174,7 +174,8 @@ static void add_jumps(sdm_json *j, const check *c)
 {
     static const char *const names[] = {[SDM_BREAK_JUMP] = "jump",
                                         [SDM_BREAK_SIZES] = "sizes",
-                                        [SDM_BREAK_TRIANGLES] = "triangles"};
+                                        [SDM_BREAK_TRIANGLES] = "triangles",
+                                        [SDM_BREAK_STATE] = "state"};
     const sdm_shape_survey *f = &c->survey.found;
     size_t n;
     const sdm_param *params = sdm_instance_params(c->survey.shape, &n);

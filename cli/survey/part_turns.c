@@ -15,6 +15,10 @@ enum { TRIED = 64, HALVINGS = 16, STEPS = 32 };
 /* A volume that goes through 0 is smaller than this share of itself after the halvings. */
 #define SMALL 0.01
 
+/* Where parameter `only` goes from that of the shape in which the part is inside out: to that of
+ * another shape, and to the ends of the surveyed range. */
+enum { GOALS = 3 };
+
 /* The shapes on the line from one in which the part is inside out (at 0) to another one (at 1). */
 typedef struct line {
     const sdm_instance *shape;
@@ -61,11 +65,14 @@ static void halve(const line *l, double *bad, double *good)
     }
 }
 
+/* A part without thickness may be none. */
+static double volume_or_0(double volume) { return isnan(volume) ? 0 : fabs(volume); }
+
 /* Why the part turns over between two places that lie close together. */
 static cli_turn_cause find_cause(const line *l, double bad, double good)
 {
     sdm_mesh here = {0}, there = {0}, whole = {0};
-    const double a = fabs(measure(l, bad, &here)), b = fabs(measure(l, good, &there)),
+    const double a = volume_or_0(measure(l, bad, &here)), b = volume_or_0(measure(l, good, &there)),
                  all = fabs(measure(l, 0, &whole));
     const bool same = here.tri && there.tri && here.n_tri == there.n_tri &&
                       !memcmp(here.tri, there.tri, 3 * here.n_tri * sizeof *here.tri);
@@ -76,18 +83,24 @@ static cli_turn_cause find_cause(const line *l, double bad, double good)
     return same ? CLI_TURN_VERTICES : CLI_TURN_ORDER;
 }
 
-/* The value of parameter k at which the part turns back beyond `bad`, away from `good`; NaN: none
- * was found up to the end of the surveyed range. */
-static double find_back(const line *l, const sdm_shape_survey *f, double bad, double good)
+/* The surveyed range of parameter k. */
+static void find_range(const sdm_shape_survey *f, size_t k, double range[2])
 {
-    const size_t k = l->only;
-    const double from = l->wrong[k], across = l->right[k] - from;
-    double end = bad;
-    for (size_t i = 0; i < f->n; i++) {
-        const double at = (f->p[i * f->n_params + k] - from) / across;
-        end = bad < good ? fmin(end, at) : fmax(end, at);
+    range[0] = range[1] = f->p[k];
+    for (size_t i = 1; i < f->n; i++) {
+        range[0] = fmin(range[0], f->p[i * f->n_params + k]);
+        range[1] = fmax(range[1], f->p[i * f->n_params + k]);
     }
-    double before = bad;
+}
+
+/* The value of the parameter at which the part turns back beyond `bad`, away from the other end of
+ * the line; NaN: none was found up to the end of the surveyed range. */
+static double find_back(const line *l, const sdm_shape_survey *f, double bad)
+{
+    const double from = l->wrong[l->only], across = l->right[l->only] - from;
+    double range[2], before = bad;
+    find_range(f, l->only, range);
+    const double end = (range[across < 0] - from) / across;
     for (int i = 1; i <= STEPS; i++) {
         double at = bad + (end - bad) * i / STEPS;
         if (is_right(l, at)) {
@@ -99,32 +112,78 @@ static double find_back(const line *l, const sdm_shape_survey *f, double bad, do
     return NAN;
 }
 
-/* Sets out->param: the first one that makes the part right by itself. */
-static void find_param(line *l, cli_part_turn *out)
+/* Adds parameter l->only to *out if it turns the part back by itself. */
+static void find_turn(const line *l, const sdm_shape_survey *f, cli_part_turn *out)
 {
-    for (l->only = 0; l->only < l->n_params; l->only++)
-        if (l->right[l->only] != l->wrong[l->only] && is_right(l, 1)) break;
-    out->param = l->only;
+    const size_t k = l->only;
+    const double from = l->wrong[k];
+    double range[2], goal[SDM_MAX_PARAMS];
+    find_range(f, k, range);
+    const double to[GOALS] = {l->right[k], range[0], range[1]};
+    memcpy(goal, l->wrong, l->n_params * sizeof *goal);
+    line one = *l;
+    one.right = goal;
+    for (int i = 0; i < GOALS; i++) {
+        goal[k] = to[i];
+        if (goal[k] == from || !is_right(&one, 1)) continue;
+        double bad = 0, good = 1;
+        halve(&one, &bad, &good);
+        if (!out->n) out->cause = find_cause(&one, bad, good);
+        out->by[out->n++] = (cli_turn_param){.param = k,
+                                             .value = from + 0.5 * (bad + good) * (to[i] - from),
+                                             .above = to[i] < from,
+                                             .back = find_back(&one, f, bad),
+                                             .safe = NAN};
+        return;
+    }
+}
+
+/* Finds out->by[i].safe of all, from the worst corner of their ranges. */
+static void find_safe(const line *l, const sdm_shape_survey *f, cli_part_turn *out)
+{
+    double worst[SDM_MAX_PARAMS], goal[SDM_MAX_PARAMS];
+    memcpy(worst, l->wrong, l->n_params * sizeof *worst);
+    for (size_t i = 0; i < out->n; i++) {
+        double range[2];
+        if (isfinite(out->by[i].back)) return;
+        find_range(f, out->by[i].param, range);
+        worst[out->by[i].param] = range[out->by[i].above];
+    }
+    memcpy(goal, worst, l->n_params * sizeof *goal);
+    for (size_t i = 0; i < out->n; i++) {
+        cli_turn_param *by = &out->by[i];
+        double range[2], bad = 0, good = 1;
+        line one = *l;
+        find_range(f, by->param, range);
+        one.only = by->param;
+        one.wrong = worst;
+        one.right = goal;
+        goal[by->param] = range[!by->above];
+        if (is_right(&one, 1) && !is_right(&one, 0)) {
+            halve(&one, &bad, &good);
+            by->safe = worst[by->param] + good * (goal[by->param] - worst[by->param]);
+        }
+        goal[by->param] = worst[by->param];
+    }
 }
 
 bool cli_find_part_turn(const sdm_instance *shape, const sdm_shape_survey *found, size_t wrong,
                         const sdm_part_audit *audit, cli_part_turn *out)
 {
     const size_t n = found->n_params, most = found->n < TRIED ? found->n : TRIED;
-    *out = (cli_part_turn){.param = n, .back = NAN};
+    *out = (cli_part_turn){0};
     while (out->part < audit->n && !cli_part_inside_out(audit, out->part)) out->part++;
     if (out->part == audit->n || n > SDM_MAX_PARAMS) return false;
     line l = {shape, n, audit->n, out->part, found->p + wrong * n, found->p, n};
     while (out->right < most && !is_right(&l, 1)) l.right = found->p + ++out->right * n;
     if (out->right == most) return false;
-    find_param(&l, out);
+    for (l.only = 0; l.only < n && out->n < sizeof out->by / sizeof *out->by; l.only++)
+        find_turn(&l, found, out);
+    if (out->n > 1) find_safe(&l, found, out);
+    if (out->n) return true;
     double bad = 0, good = 1;
+    l.only = n;
     halve(&l, &bad, &good);
     out->cause = find_cause(&l, bad, good);
-    if (out->param == n) return true;
-    const double from = l.wrong[out->param], across = l.right[out->param] - from;
-    out->value = from + 0.5 * (bad + good) * across;
-    out->above = across < 0;
-    out->back = find_back(&l, found, bad, good);
     return true;
 }

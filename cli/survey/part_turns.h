@@ -9,20 +9,29 @@ typedef enum cli_turn_cause {
     CLI_TURN_VERTICES, /* its volume jumps, but the triangles stay: the vertices change places */
 } cli_turn_cause;
 
-/* A part that is inside out in one shape of a survey and right in another. */
-typedef struct cli_part_turn {
-    size_t part;  /* index of the part, in all meshes */
-    size_t right; /* index of the shape in which it is right */
-    cli_turn_cause cause;
-    /* The parameter that turns it over by itself, while the others are those of the shape in which
-     * it is inside out: n_params if no single one does. Around `value` it turns: above it the part
-     * is inside out, or (above: false) below. */
+/* A parameter that turns the part back by itself, while the others are those of the shape in which
+ * it is inside out. */
+typedef struct cli_turn_param {
     size_t param;
+    /* Around `value` it turns: above it the part is inside out, or (above: false) below. */
     double value;
     bool above;
     /* Where it turns back, on the way from `value` to the end of the surveyed range. NaN: nowhere
      * that was looked at. */
     double back;
+    /* Beyond this value, on the other side than `above` tells, the part is right also where the
+     * other parameters of the list have the worst ends of their ranges. NaN: nowhere, or not
+     * looked for: `back` is finite for one of the list. */
+    double safe;
+} cli_turn_param;
+
+/* A part that is inside out in one shape of a survey and right in another. */
+typedef struct cli_part_turn {
+    size_t part;  /* index of the part, in all meshes */
+    size_t right; /* index of the shape in which it is right */
+    cli_turn_cause cause;
+    cli_turn_param by[3]; /* [n] the first parameters that turn it back by themselves */
+    size_t n;             /* 0: no single one does */
 } cli_part_turn;
 
 /* *out = about the first part that is inside out in shape `wrong` of the survey, of which `audit`

@@ -15,15 +15,19 @@ static void tell_repeat(teller *t)
 {
     static const char *const where[] = {[SDM_REPEAT_THREADS] = " by several threads at once",
                                         [SDM_REPEAT_PROCESS] =
-                                            " in another process, which made another shape first"};
+                                            " in another process, which made another shape first",
+                                        [SDM_REPEAT_BESIDE] = NULL}; // has its own text
     const sdm_repeat *r = &t->s->found.repeat;
     const size_t n = t->s->found.n_params;
     sdm_text text = {0};
     // tell_failed() names the vertex that is not written
     if (!r->unlike || (r->cause == SDM_REPEAT_UNSET && t->s->found.failed.shapes)) return;
+    const sdm_param *params = sdm_instance_params(t->s->shape, NULL);
     if (r->cause == SDM_REPEAT_BEHIND)
         sdm_text_add(&text, "mesh() reads p[%zu], but the last parameter is p[%zu], '%s'; ",
-                     r->param, n - 1, sdm_instance_params(t->s->shape, NULL)[n - 1].name);
+                     r->param, n - 1, params[n - 1].name);
+    else if (r->cause == SDM_REPEAT_BESIDE)
+        sdm_text_add(&text, SDM_REPEAT_BESIDE_TEXT ", for example at ", params[r->param].name);
     else
         sdm_text_add(&text, "meshes have other bits when they are made again%s, for example at ",
                      where[r->cause] ? where[r->cause] : "");

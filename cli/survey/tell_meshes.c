@@ -37,55 +37,92 @@ static void tell_open(teller *t)
     teller_tell(t, SDM_E_MESH, &text);
 }
 
-/* Appends why a part turns over, and how to mend it. name: the parameter that turns it over; NULL:
- * several do it together. */
-static void add_turn_cause(cli_turn_cause cause, const char *name, sdm_text *text)
+/* Appends "'a', 'b' and 'c'": the parameters that turn the part over; "the parameters" if no single
+ * one does. */
+static void add_turners(const sdm_param *params, const cli_part_turn *turn, sdm_text *text)
 {
-    const char *quote = name ? "'" : "", *word = name ? name : "the parameters";
-    switch (cause) {
+    if (!turn->n) sdm_text_add(text, "the parameters");
+    for (size_t i = 0; i < turn->n; i++)
+        sdm_text_add(text, "%s'%s'",
+                     !i                ? ""
+                     : i + 1 < turn->n ? ", "
+                                       : " and ",
+                     params[turn->by[i].param].name);
+}
+
+/* The next number of three digits on the way to the side where the part is right. */
+static double round_safe(const cli_turn_param *by)
+{
+    if (by->safe == 0) return 0;
+    const double unit = pow(10, floor(log10(fabs(by->safe))) - 2), n = by->safe / unit;
+    return unit * (by->above ? floor(n) : ceil(n));
+}
+
+/* Appends which ranges to narrow. */
+static void add_narrower(const sdm_param *params, const cli_part_turn *turn, sdm_text *text)
+{
+    size_t told = 0;
+    for (size_t i = 0; i < turn->n; i++) {
+        const cli_turn_param *by = &turn->by[i];
+        if (!isfinite(by->safe)) continue;
+        sdm_text_add(text, "%s of '%s' %s at %.3g", told++ ? ", or that" : "; let the range",
+                     params[by->param].name, by->above ? "end" : "begin", round_safe(by));
+    }
+    if (told > 1) sdm_text_add(text, " (one of them is enough)");
+    if (told) return;
+    sdm_text_add(text, "; narrow the range%s", turn->n == 1 ? " of " : "s");
+    if (turn->n > 1) sdm_text_add(text, " of ");
+    if (turn->n) add_turners(params, turn, text);
+}
+
+/* Appends why a part turns over, and how to mend it. */
+static void add_turn_cause(const sdm_param *params, const cli_part_turn *turn, sdm_text *text)
+{
+    switch (turn->cause) {
     case CLI_TURN_ORDER:
         sdm_text_add(text,
-                     ": mesh() writes its triangles in another order there: look for an if on "
-                     "%s%s%s",
-                     quote, word, quote);
+                     ": mesh() writes its triangles in another order there: look for an if on ");
+        add_turners(params, turn, text);
         break;
     case CLI_TURN_VERTICES:
-        sdm_text_add(text, ": its vertices jump there: look for an if on %s%s%s", quote, word,
-                     quote);
+        sdm_text_add(text, ": its vertices jump there: look for an if on ");
+        add_turners(params, turn, text);
         break;
     case CLI_TURN_LENGTH:
-        sdm_text_add(text,
-                     ": a length of this part becomes negative there; narrow the range%s%s%s, or "
-                     "limit the length in mesh()",
-                     name ? " of '" : "s", name ? name : "", quote);
+        sdm_text_add(text, ": a length of this part becomes negative there");
+        add_narrower(params, turn, text);
+        sdm_text_add(text, ", or limit the length in mesh()");
     }
 }
 
 /* Appends where a part turns over that is right in other shapes. */
 static void add_turn(const teller *t, size_t wrong, const sdm_part_audit *audit, sdm_text *text)
 {
-    const sdm_shape_survey *f = &t->s->found;
+    const sdm_param *params = sdm_instance_params(t->s->shape, NULL);
     cli_part_turn turn;
     sdm_text_add(text, "in the other shapes the vertices are in the right order: ");
-    if (!cli_find_part_turn(t->s->shape, f, wrong, audit, &turn)) {
+    if (!cli_find_part_turn(t->s->shape, &t->s->found, wrong, audit, &turn)) {
         sdm_text_add(text,
                      "look in mesh() for an if that swaps them, and for a length that becomes "
                      "negative here");
         return;
     }
-    const char *name =
-        turn.param < f->n_params ? sdm_instance_params(t->s->shape, NULL)[turn.param].name : NULL;
-    if (name && isfinite(turn.back)) {
-        sdm_text_add(text, "here part %zu turns over where '%s' is between about %.4g and %.4g",
-                     turn.part + 1, name, fmin(turn.value, turn.back), fmax(turn.value, turn.back));
-    } else if (name) {
-        sdm_text_add(text, "here part %zu turns over where '%s' %s about %.3g", turn.part + 1, name,
-                     turn.above ? "rises above" : "falls below", turn.value);
-    } else {
+    if (turn.n)
+        sdm_text_add(text, "here part %zu turns over where ", turn.part + 1);
+    else
         sdm_text_add(text, "part %zu turns over on the way here from ", turn.part + 1);
-        teller_add_params(t->s, turn.right, SIZE_MAX, text);
+    if (!turn.n) teller_add_params(t->s, turn.right, SIZE_MAX, text);
+    for (size_t i = 0; i < turn.n; i++) {
+        const cli_turn_param *by = &turn.by[i];
+        sdm_text_add(text, "%s'%s' ", i ? " and " : "", params[by->param].name);
+        if (isfinite(by->back))
+            sdm_text_add(text, "is between about %.4g and %.4g", fmin(by->value, by->back),
+                         fmax(by->value, by->back));
+        else
+            sdm_text_add(text, "%s about %.3g", by->above ? "rises above" : "falls below",
+                         by->value);
     }
-    add_turn_cause(turn.cause, name, text);
+    add_turn_cause(params, &turn, text);
 }
 
 static void tell_inside_out(teller *t)

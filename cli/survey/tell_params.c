@@ -89,13 +89,29 @@ void tell_params(teller *t)
     }
 }
 
+/* Meshes beside a value of a parameter that depend on the calls before. */
+static void tell_state(teller *t, const sdm_survey_jump *j, size_t k)
+{
+    sdm_text text = {0};
+    sdm_text_add(&text, "mesh() depends on an earlier call about %s=%.6g%s",
+                 sdm_instance_params(t->s->shape, NULL)[k].name, j->value,
+                 t->s->found.n_params > 1 ? ", with " : "");
+    teller_add_params(t->s, j->shape, k, &text);
+    sdm_text_add(&text,
+                 ": meshes there have other bits when they are made again in another order; "
+                 "%s",
+                 sdm_repeat_advice(SDM_REPEAT_BESIDE));
+    teller_tell(t, SDM_E_QUALITY, &text);
+}
+
 static void tell_jumps(teller *t)
 {
     const sdm_param *params = sdm_instance_params(t->s->shape, NULL);
     for (size_t k = 0; k < t->s->found.n_params && t->s->found.jump; k++) {
         const sdm_survey_jump *j = &t->s->found.jump[k];
         sdm_text text = {0};
-        if (j->kind == SDM_BREAK_NONE) continue;
+        if (j->kind == SDM_BREAK_STATE) tell_state(t, j, k);
+        if (j->kind == SDM_BREAK_NONE || j->kind == SDM_BREAK_STATE) continue;
         if (j->kind == SDM_BREAK_JUMP)
             sdm_text_add(&text, "vertex %zu jumps by %.3g mm", j->vertex, j->mm);
         else

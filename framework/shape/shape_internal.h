@@ -130,7 +130,7 @@ sdm_status sdm_instance_mesh_filled(const sdm_instance *s, const double *p, int 
 /* stack_fill.c: fills the stack where the next calls of the caller have their variables. */
 void sdm_fill_stack(int fill);
 
-/* shape_repeat.c: of the numbers, vertices and triangles of a mesh. */
+/* mesh_checksum.c: of the numbers, vertices and triangles of a mesh. */
 uint64_t sdm_mesh_checksum(const sdm_mesh *m);
 
 /* shape_repeat.c: makes the meshes at p[n][n_params] one after the other and again: backwards, with
@@ -146,6 +146,18 @@ sdm_status sdm_shape_repeat(const sdm_instance *s, const double *p, size_t n, sd
 sdm_status sdm_shape_repeat_at_once(const sdm_instance *s, const double *p, size_t n, int n_threads,
                                     double seconds, sdm_repeat *out, sdm_error *err);
 #define SHAPE_REPEAT_SECONDS 0.25
+
+/* shape_beside.c: makes some of the shapes p[n][n_params], each right after one in which a single
+ * parameter differs, and compares their bits: *out: cause BESIDE, or HISTORY if no parameter
+ * decides, or UNKNOWN and unlike 0. */
+void sdm_shape_repeat_beside(const sdm_instance *s, const double *p, size_t n, bool brief,
+                             sdm_repeat *out);
+
+/* shape_beside.c: q[n_params] = shape `from` of p[n][n_params], with parameter k moved by `share`
+ * of the way to its value in shape `to`, or in another shape if both are the same. false: it has
+ * the same value in all shapes. */
+bool sdm_shape_step_beside(const double *p, size_t n, size_t n_params, size_t from, size_t to,
+                           size_t k, double share, double *q);
 
 /* isolated.c: the callbacks of the shape run in worker processes. */
 bool sdm_is_isolated(const sdm_instance *s);

@@ -1,7 +1,6 @@
 /* Makes meshes again, one after the other or on many threads at once, and compares their bits. */
 #include <string.h>
 
-#include "sdm/internal/checksum.h"
 #include "sdm/internal/clock.h"
 #include "sdm/memory.h"
 #include "shape_internal.h"
@@ -13,14 +12,6 @@ enum { FILL = 0xff, OTHER_FILL = 0x40 };
 enum { THREADS = 4, SHAPES = 8, SHAPES_BRIEF = 4, TRIANGLES = 200000 };
 static const double SECONDS_BRIEF = 0.1;
 #define BEHIND 0.5
-
-uint64_t sdm_mesh_checksum(const sdm_mesh *m)
-{
-    const uint64_t sizes[2] = {m->n_vert, m->n_tri};
-    uint64_t c = sdm_crc64(0, sizes, sizeof sizes);
-    c = sdm_crc64(c, m->vert, 3 * m->n_vert * sizeof *m->vert);
-    return sdm_crc64(c, m->tri, 3 * m->n_tri * sizeof *m->tri);
-}
 
 /* A call of mesh() with other memory around it. */
 typedef struct trial {
@@ -136,6 +127,9 @@ const char *sdm_repeat_advice(sdm_repeat_cause cause)
     case SDM_REPEAT_PROCESS:
         return "a static or global variable keeps what the first call of mesh() set: let mesh() "
                "compute it anew in every call";
+    case SDM_REPEAT_BESIDE:
+        return "a static variable or a cache in mesh() is the usual cause: let mesh() compute "
+               "everything anew in every call";
     default:
         return "mesh() must depend on its arguments alone";
     }
@@ -198,9 +192,15 @@ static size_t choose_shapes(const sdm_instance *shape, const double *p, size_t n
 sdm_status sdm_repeat_find(const sdm_instance *shape, const double *p, size_t n, bool brief,
                            sdm_repeat *out, sdm_error *err)
 {
+    const size_t all = n;
     n = choose_shapes(shape, p, n, brief);
     const sdm_status s = sdm_shape_repeat(shape, p, n, out, err);
     if (s == SDM_E_PLUGIN) return SDM_OK;
+    if (!s && (!out->unlike || out->cause == SDM_REPEAT_HISTORY)) {
+        sdm_repeat beside;
+        sdm_shape_repeat_beside(shape, p, all, brief, &beside);
+        if (beside.cause == SDM_REPEAT_BESIDE || !out->unlike) *out = beside;
+    }
     if (s || out->unlike || sdm_is_isolated(shape)) return s;
     return sdm_shape_repeat_at_once(shape, p, n, THREADS,
                                     brief ? SECONDS_BRIEF : SHAPE_REPEAT_SECONDS, out, err);

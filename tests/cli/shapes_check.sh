@@ -53,8 +53,18 @@ turns() {
     echo "^warning +part [12] of 2 .* is inside out.*; parts are inside out in [0-9]+ of 21 shapes\); in the other shapes the vertices are in the right order: here part 2 turns over where $1: $2$first"
 }
 faulty late 4 "$(turns "'size' rises above about 2" "mesh\(\) writes its triangles in another order there: look for an if on 'size'")"
-faulty window 4 "$(turns "'reach' is between about 1\.25 and 1\.75" "mesh\(\) writes its triangles in another order there: look for an if on 'reach'")"
+faulty window 4 "$(turns "'size' falls below about 2\.9 and 'reach' is between about 1\.25 and 1\.75" "mesh\(\) writes its triangles in another order there: look for an if on 'size' and 'reach'")"
 faulty swapped 4 "$(turns "'size' rises above about 2" "its vertices jump there: look for an if on 'size'")"
+# two parameters decide: a range that ends as the line says is enough, for either of them
+faulty pair 4 "$(turns "'size' falls below about 1\.75 and 'reach' rises above about 1\.25" "a length of this part becomes negative there; let the range of 'size' begin at 1\.76, or that of 'reach' end at 1\.24 \(one of them is enough\), or limit the length in mesh\(\)")"
+for narrow in 'size=[1.76,3]' 'reach=[1,1.24]' 'size=[1.6,3]' 'reach=[1,1.4]'; do
+    printf 'shape: {name: faulty, options: {fault: pair}}\ngrid: auto\ntrain: {minutes: 1}\n' >pair.yaml
+    sdmgen shapes check pair.yaml "shape.ranges.$narrow" --plugin "$plugin" --samples 4 >out 2>err
+    case $narrow in
+    *1.76* | *1.24*) if grep -q 'inside out' out; then bad "pair with $narrow: $(cat out)"; fi ;;
+    *) has 'is inside out' ;;
+    esac
+done
 faulty negative 4 "$(turns "'size' rises above about 2" "a length of this part becomes negative there; narrow the range of 'size', or limit the length in mesh\(\)")"
 if grep -q 'walls pass through each other' out; then bad "a part that turns over, and a wall: $(cat out)"; fi
 faulty body 4 '^warning +part 1 of 2 .* is inside out and larger than the rest: maps turn the whole mesh for it, and subtract part 2 of 2 from what that overlaps \(at size=[0-9.]+ reach=[0-9.]+; parts are inside out in all 21 shapes\)'
@@ -70,11 +80,24 @@ faulty wires 4 '^warning +the triangles get other vertices in .* at size=[0-9.]+
 faulty twins 4 '^warning +triangles given twice in all 21 shapes, up to 12 at .*: they count once; do two parts lie in the same place\?'
 faulty velocity 4 '^warning +velocity\(\) is off by 0\.0099 of the largest velocity by reach, at vertex 9'
 faulty unlike 4 '^warning +meshes have other bits when they are made again, for example at size=2\.5 reach=1\.5; mesh\(\) keeps something from one call to the next: .*; mend this first'
+# a cache of one mesh that does not compare the reach, and state in a part of the range, which looks like a jump
+cache='; a static variable or a cache in mesh\(\) is the usual cause: let mesh\(\) compute everything anew in every call'
+beside="mesh\(\) depends on an earlier call: after a call in which only 'reach' differs it gives another mesh, for example at size=[0-9.]+ reach=[0-9.]+$cache; mend this first"
+faulty cache 4 "^warning +$beside"
+expect 4 'mend' sdmgen shapes check faulty -O fault=cache --plugin "$plugin" --isolate --samples 4
+has "^warning +$beside"
+faulty lapse 4 "^warning +mesh\(\) depends on an earlier call about size=2\.[0-9]+, with reach=[0-9.]+: meshes there have other bits when they are made again in another order$cache\$"
+if grep -q 'jumps' out; then bad "state is told as a jump: $(cat out)"; fi
+expect 4 'mend' sdmgen shapes check faulty -O fault=lapse --plugin "$plugin" --samples 16 --json
+has '"jumps": \[\{"kind": "state", "parameter": "size"'
 faulty shared 4 '^warning +meshes have other bits when they are made again by several threads at once, for example at .*; mesh\(\) writes a static or global variable or array'
 faulty unset 4 '^warning +meshes have other bits when they are made again, for example at .*; mesh\(\) reads memory that it has not written'
 if [ $emulated = no ]; then
     sticky='a static or global variable keeps what the first call of mesh\(\) set: let mesh\(\) compute it anew in every call'
     faulty sticky 4 "^warning +meshes have other bits when they are made again in another process, which made another shape first, for example at size=[0-9.]+ reach=[0-9.]+; $sticky; mend this first"
+    # a cache of many meshes: a process of its own for every thread would not help
+    faulty caches 4 "^warning +$beside"
+    if grep -q 'isolate' out; then bad "a cache is told as a matter of threads: $(cat out)"; fi
     (ulimit -n 7 && sdmgen shapes check faulty --plugin "$plugin" --samples 4) >out 2>err || bad "without another process: $(cat err)"
     has '^note +not tested: meshes in another process, which show a static variable that keeps what the first call of mesh\(\) set; plug-in .*: no connection to a process for it'
 fi
@@ -208,6 +231,9 @@ told "$cuts"
 expect 0 "^sdmgen: warning: $cuts" sdmgen config good.yaml 'grid.size=[29,33,33]' --plugin "$plugin" -q
 has '^good\.yaml: no mistakes, 1 warning$'
 expect 0 'warning: meshes have other bits when they are made again, .* memory that it has not written' sdmgen config good.yaml shape.options.fault=unset --plugin "$plugin" -q
+expect 0 "warning: mesh\(\) depends on an earlier call: after a call in which only 'reach' differs" sdmgen config good.yaml shape.options.fault=cache --plugin "$plugin" -q
+expect 0 "warning: mesh\(\) depends on an earlier call: after a call in which only 'reach' differs" \
+    sdmgen train good.yaml shape.options.fault=cache data='{static: 0, start: 16, online: 0, holdout: 4}' --plugin "$plugin" --out cache -q
 expect 0 'warning: the shape is 0\.0[0-9]+ mm in size' sdmgen config good.yaml shape.options.fault=metres --plugin "$plugin" -q
 # a warning about the grid, which cuts the third box, and one about the shape
 sdmgen config good.yaml shape.options.fault=sizes 'shape.ranges.size=[1,3]' --plugin "$plugin" -q >out 2>err || bad "config of changing numbers: $(cat err)"

@@ -20,7 +20,8 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "none|handle|body|late|jump|kink|sizes|wires|open|fail|velocity|unlike|crash|abort|"
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
-     "meets|groups|crumb|spare|offset|around|unlisted|sticky|diagonal|negative|window|swapped",
+     "meets|groups|crumb|spare|offset|around|unlisted|sticky|diagonal|negative|window|swapped|"
+     "cache|caches|lapse|pair",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -96,6 +97,31 @@ static inline double faulty_unset(void)
     return at[32] > 32 && at[32] < 33 ? 0.1 : 0;
 }
 
+/* What a thread keeps from its last call: `cache`, the reach at which the size was another one than
+ * in the call before, and `lapse`, the size at which the reach was another one. `caches`: the reach
+ * at which a size came for the first time, for the last sizes. */
+static inline double faulty_kept(const char *fault, const double *p, double *reach)
+{
+    static _Thread_local double key, kept, key_size[64], kept_reach[64];
+    static _Thread_local size_t used;
+    const int size = strcmp(fault, "lapse") != 0; // compares the size
+    size_t i = 0;
+    if (!strcmp(fault, "caches")) {
+        while (i < 64 && key_size[i] != p[0]) i++;
+        if (i == 64) {
+            i = used++ % 64;
+            key_size[i] = p[0];
+            kept_reach[i] = p[1];
+        }
+        *reach = 0.5 * (p[1] + kept_reach[i]);
+    } else if (key != p[!size]) {
+        key = p[!size];
+        kept = p[size];
+    }
+    if (!strcmp(fault, "cache")) *reach = 0.5 * (p[1] + kept);
+    return !size && p[0] > 2.19 && p[0] < 2.3 ? kept : p[0];
+}
+
 static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
                        const double *p, sdm_mesh_out *out)
 {
@@ -141,20 +167,26 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     static double sticky; // of the first shape
     if (!(sticky > 0)) sticky = p[0];
     if (!strcmp(fault, "sticky")) r = sticky;
+    double kept_reach = p[1];
+    if (!strncmp(fault, "cache", 5) || !strcmp(fault, "lapse"))
+        r = faulty_kept(fault, p, &kept_reach);
     if (!strcmp(fault, "changed") && !access("trained/model.sdm", F_OK)) r *= 1.01;
     const double body[2][3] = {{-r, -r, -r}, {r, r, r}};
     // `wall`: the sides of the handle pass through each other at size 1.75; `step`: a reach above
     // 1.75 counts, and nothing but that
     const double half = !strcmp(fault, "wall") ? p[0] - 1.75 : 0.25,
-                 reach = strcmp(fault, "step") ? p[1] : 1 + (p[1] > 1.75);
+                 reach = !strncmp(fault, "cache", 5) ? kept_reach
+                         : strcmp(fault, "step")     ? p[1]
+                                                     : 1 + (p[1] > 1.75);
     // `meets`: the handle meets the body up to a reach of 1.6
     const double begin = !strcmp(fault, "meets")
                              ? p[0] + reach - 1.6
                              : p[0] + (strcmp(fault, "apart") && !groups ? -0.5 : 0.5);
     double handle[2][3] = {{begin, -half, -half + shift}, {p[0] + reach, half, half + shift}};
     // `negative`: the height of the handle becomes negative at size 2; `swapped`: its ends change
-    // places there
+    // places there; `pair`: the height becomes negative at a reach of the size and 0.25
     if (!strcmp(fault, "negative")) handle[0][1] = -1, handle[1][1] = 1 - p[0];
+    if (!strcmp(fault, "pair")) handle[0][1] = -1, handle[1][1] = p[0] - p[1] - 0.75;
     if (!strcmp(fault, "swapped") && is_large) handle[0][1] = half, handle[1][1] = -half;
     if (!strcmp(fault, "within")) handle[0][0] -= 1, handle[1][0] -= 2.2;
     if (!strcmp(fault, "twins")) memcpy(handle, body, sizeof handle);

@@ -1,6 +1,6 @@
 /* The tests of shapes: each finds the fault that is made for it, and none finds a fault in a sound
  * shape. The test itself is the program of the workers.
- * Tests: conformance.c shape_repeat.c stack_fill.c isolated.c */
+ * Tests: conformance.c mesh_checksum.c shape_beside.c shape_repeat.c stack_fill.c isolated.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -123,6 +123,16 @@ static void calls_that_differ(void **state)
     has(SDM_TEST_REPEATS, SDM_TEST_FAILED,
         "8 of 8 meshes have other bits when they are made again");
     has(SDM_TEST_THREADS, SDM_TEST_FAILED, "other bits");
+    // a parameter that decides is named
+    make("unfit_cache");
+    has(SDM_TEST_REPEATS, SDM_TEST_FAILED, "after a call in which only 'reach' differs");
+    assert_true(found.test[SDM_TEST_REPEATS].has_params);
+    // what looks like a jump is none if it depends on the calls before
+    make("unfit_lapse");
+    has(SDM_TEST_REPEATS, SDM_TEST_FAILED, "beside this value of size have other bits");
+    assert_true(found.test[SDM_TEST_REPEATS].p[0] > 2.14);
+    assert_true(found.test[SDM_TEST_REPEATS].p[0] < 2.31);
+    has(SDM_TEST_CONTINUOUS, SDM_TEST_SKIPPED, "depend on the calls before");
     make("unfit_shared");
     has(SDM_TEST_REPEATS, SDM_TEST_PASSED, "same bits");
     has(SDM_TEST_THREADS, SDM_TEST_FAILED, "when they are made by several threads at once");
@@ -142,6 +152,15 @@ static void calls_that_crash(void **state)
     has(SDM_TEST_OPTIONS, SDM_TEST_FAILED, "with mode=abort: ");
     assert_int_equal(found.test[SDM_TEST_OPTIONS].figure, 1);
     only(SDM_TEST_OPTIONS);
+}
+
+/* A part in metres beside one in millimetres. */
+static void a_part_in_metres(void **state)
+{
+    (void)state;
+    make("unfit_small");
+    has(SDM_TEST_UNITS, SDM_TEST_DOUBTFUL, "times smaller than another one in 13 of 13 shapes");
+    assert_true(found.test[SDM_TEST_UNITS].has_params);
 }
 
 /* Options that exclude each other: an error with a reason. */
@@ -196,7 +215,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(meshes_that_fail),      cmocka_unit_test(meshes_with_faults),
         cmocka_unit_test(meshes_that_change),    cmocka_unit_test(calls_that_differ),
         cmocka_unit_test(calls_that_crash),      cmocka_unit_test(options_that_are_refused),
-        cmocka_unit_test(interrupted_tests_end),
+        cmocka_unit_test(interrupted_tests_end), cmocka_unit_test(a_part_in_metres),
     };
     return cmocka_run_group_tests(tests, open_registry, close_registry);
 }

@@ -1,7 +1,7 @@
 /* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
  * known from the source; shapes without faults pass.
  * Tests: shape_survey.c survey_fold.c survey_follow.c survey_line.c survey_meeting.c survey_pole.c
- * survey_scale.c survey_shapes.c survey_state.c survey_still.c survey_swing.c
+ * survey_scale.c survey_shapes.c survey_state.c survey_still.c survey_swing.c shape_beside.c
  * units.c */
 #include <math.h>
 #include <setjmp.h>
@@ -414,11 +414,9 @@ static void meshes_made_again(void **state)
     static const struct {
         const char *fault;
         sdm_repeat_cause cause;
-    } cases[] = {{"none", SDM_REPEAT_UNKNOWN},
-                 {"unlike", SDM_REPEAT_HISTORY},
-                 {"behind", SDM_REPEAT_BEHIND},
-                 {"unset", SDM_REPEAT_UNSET},
-                 {"shared", SDM_REPEAT_THREADS}};
+    } cases[] = {{"none", SDM_REPEAT_UNKNOWN},  {"unlike", SDM_REPEAT_HISTORY},
+                 {"behind", SDM_REPEAT_BEHIND}, {"unset", SDM_REPEAT_UNSET},
+                 {"cache", SDM_REPEAT_BESIDE},  {"shared", SDM_REPEAT_THREADS}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         // in the tenth of a second of a brief survey threads need not meet on a busy machine
         for (int brief = 0; brief < (cases[i].cause == SDM_REPEAT_THREADS ? 1 : 2); brief++) {
@@ -427,11 +425,90 @@ static void meshes_made_again(void **state)
             assert_int_equal(s.repeat.cause, cases[i].cause);
             assert_true((s.repeat.unlike == 0) == !i && s.repeat.unlike <= 8);
             if (cases[i].cause == SDM_REPEAT_BEHIND) assert_int_equal(s.repeat.param, 3);
+            if (cases[i].cause == SDM_REPEAT_BESIDE) assert_int_equal(s.repeat.param, 1);
             // behind the parameters there is no number
             const sdm_status bad = cases[i].cause == SDM_REPEAT_BEHIND ? SDM_E_MESH : SDM_E_QUALITY;
             assert_int_equal(sdm_shape_survey_verdict(&s), i ? bad : SDM_OK);
             sdm_shape_survey_dispose(&s);
         }
+}
+
+// State in a part of the range of the size looks like a jump, but a jump is the same again.
+static void state_is_no_jump(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("lapse");
+    assert_int_equal(s.repeat.unlike, 0);
+    assert_int_equal(s.jump[0].kind, SDM_BREAK_STATE);
+    assert_true(s.jump[0].value > 2.14 && s.jump[0].value < 2.31);
+    assert_int_equal(s.jump[1].kind, SDM_BREAK_NONE);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+    sdm_shape_survey_dispose(&s);
+    s = survey("jump");
+    assert_int_equal(s.jump[0].kind, SDM_BREAK_JUMP);
+    sdm_shape_survey_dispose(&s);
+}
+
+/* A shape of three parameters that compares with some of them what it has kept. */
+static const sdm_param KEPT_PARAMS[] = {
+    {"a", "mm", 1, 2, 1.5, "x"}, {"b", "mm", 1, 2, 1.5, "y"}, {"c", "mm", 1, 2, 1.5, "z"}};
+static unsigned kept_compares; // bits of the parameters that are compared
+static double kept_near;       // a smaller difference is none
+static size_t kept_copies = 1; // of every triangle
+
+static int kept_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                     const double *p, sdm_mesh_out *out)
+{
+    static _Thread_local double key[3];
+    double edge[3];
+    (void)self, (void)options;
+    const int failed = host->reserve(host, out, 8, 12 * kept_copies);
+    if (failed) return failed;
+    bool same = true;
+    for (unsigned k = 0; k < 3; k++)
+        same = same && !(kept_compares >> k & 1 && fabs(p[k] - key[k]) > kept_near);
+    if (!same) memcpy(key, p, sizeof key);
+    for (size_t k = 0; k < 3; k++) edge[k] = 0.5 * (p[k] + key[k]);
+    faulty_box(out, 0, (const double[3]){0, 0, 0}, edge, 0);
+    for (size_t i = 1; i < kept_copies; i++)
+        memcpy(out->tri + 36 * i, out->tri, 36 * sizeof *out->tri);
+    return 0;
+}
+
+// Of a cache the survey names a parameter that is not compared, whichever are, and finds one that
+// compares with a tolerance. A cache that compares all values is right. Of large meshes, of which
+// it makes fewer, it names the parameter, too.
+static void caches_of_meshes(void **state)
+{
+    (void)state;
+    static const sdm_shape shape = {.abi = SDM_SHAPE_ABI,
+                                    .size = sizeof(sdm_shape),
+                                    .name = "kept",
+                                    .summary = "test",
+                                    .params = KEPT_PARAMS,
+                                    .n_params = 3,
+                                    .mesh = kept_mesh};
+    sdm_instance *instance = NULL;
+    assert_int_equal(sdm_instance_create(&shape, NULL, 0, NULL, &instance, &err), SDM_OK);
+    const sdm_survey_opts opts = {.samples = 16, .brief = true, .n_threads = 1};
+    for (unsigned compares = 1; compares < 8; compares++)
+        for (int near = 0; near < 2; near++) {
+            sdm_shape_survey s;
+            kept_compares = compares;
+            kept_near = near ? 1e-4 : 0;
+            assert_int_equal(sdm_shape_survey_make(instance, &opts, &s, &err), SDM_OK);
+            assert_true((s.repeat.unlike == 0) == (compares == 7 && !near));
+            if (s.repeat.unlike) assert_int_equal(s.repeat.cause, SDM_REPEAT_BESIDE);
+            if (s.repeat.unlike && !near) assert_false(compares >> s.repeat.param & 1);
+            sdm_repeat large;
+            kept_copies = 8000;
+            assert_int_equal(sdm_repeat_find(instance, s.p, s.n, true, &large, &err), SDM_OK);
+            kept_copies = 1;
+            assert_true((large.unlike == 0) == (compares == 7 && !near));
+            if (large.unlike && !near) assert_false(compares >> large.param & 1);
+            sdm_shape_survey_dispose(&s);
+        }
+    sdm_instance_free(instance);
 }
 
 /* What swinging_mesh() makes of an angle in rad. */
@@ -723,6 +800,8 @@ int main(void)
         cmocka_unit_test(degrees_that_go_to_tan),
         cmocka_unit_test(callbacks),
         cmocka_unit_test(meshes_made_again),
+        cmocka_unit_test(state_is_no_jump),
+        cmocka_unit_test(caches_of_meshes),
         cmocka_unit_test(a_grid_that_cuts),
         cmocka_unit_test(a_grid_that_is_too_coarse),
         cmocka_unit_test(a_grid_that_is_too_large),

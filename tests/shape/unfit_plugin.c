@@ -39,6 +39,9 @@ UNFIT(velocity)
 UNFIT(unlike)
 UNFIT(shared)
 UNFIT(edge)
+UNFIT(cache)
+UNFIT(lapse)
+UNFIT(small)
 
 static const sdm_option PICKY_OPTIONS[] = {
     {"mode", SDM_OPTION_CHOICE, "", 0, 0, 0, "none|abort", "x"}};
@@ -54,6 +57,9 @@ static const sdm_shape SHAPES[] = {TABLE(none),
                                    TABLE(unlike),
                                    TABLE(shared),
                                    TABLE(edge),
+                                   TABLE(cache),
+                                   TABLE(lapse),
+                                   TABLE(small),
                                    {.abi = SDM_SHAPE_ABI,
                                     .size = sizeof(sdm_shape),
                                     .name = "picky",

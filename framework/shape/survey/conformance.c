@@ -123,6 +123,15 @@ static void tell_triangles(tests *t)
         result(t, SDM_TEST_TRIANGLES, SDM_TEST_PASSED, 0, "the same in all shapes");
 }
 
+/* The first parameter with a value beside which the mesh depends on the calls before; n_params:
+ * there is none. */
+static size_t find_state(const sdm_shape_survey *f)
+{
+    size_t k = 0;
+    while (k < f->n_params && !(f->jump && f->jump[k].kind == SDM_BREAK_STATE)) k++;
+    return k;
+}
+
 static void tell_continuous(tests *t)
 {
     const sdm_shape_survey *f = &t->found;
@@ -144,6 +153,8 @@ static void tell_continuous(tests *t)
                                     worst->mm, t->instance->params[param].name);
         at_shape(t, r, worst->shape);
         r->p[param] = worst->value;
+    } else if (find_state(f) < f->n_params) {
+        result(t, SDM_TEST_CONTINUOUS, SDM_TEST_SKIPPED, 0, "meshes depend on the calls before");
     } else {
         result(t, SDM_TEST_CONTINUOUS, SDM_TEST_PASSED, 0, "no jump along any parameter");
     }
@@ -184,8 +195,16 @@ static void tell_units(tests *t)
             sdm_text_add(
                 &text, "%s'%s' ranges from %g to %g mm in a shape of %.3g mm: are these m?",
                 text.data ? "; " : "", params[k].name, params[k].min, params[k].max, c->size);
-    result(t, SDM_TEST_UNITS, text.data ? SDM_TEST_DOUBTFUL : SDM_TEST_PASSED, c->size, "%s",
-           text.data ? text.data : "the size fits to mm, every parameter moves vertices");
+    if (f->tiny.shapes)
+        sdm_text_add(&text,
+                     "%sa part is %.0f times smaller than another one in %zu of %zu shapes: are "
+                     "the vertices of one of them in another unit than mm, or is it a leftover "
+                     "speck?",
+                     text.data ? "; " : "", f->tiny.amount, f->tiny.shapes, f->n);
+    sdm_test_result *r =
+        result(t, SDM_TEST_UNITS, text.data ? SDM_TEST_DOUBTFUL : SDM_TEST_PASSED, c->size, "%s",
+               text.data ? text.data : "the size fits to mm, every parameter moves vertices");
+    if (f->tiny.shapes) at_shape(t, r, f->tiny.worst);
     sdm_text_dispose(&text);
 }
 
@@ -239,6 +258,32 @@ static sdm_status test_meshes(tests *t, sdm_error *err)
 
 /* ---- repeated calls ---- */
 
+/* What the survey has found: a parameter after whose change the mesh is another one. */
+static void tell_beside(tests *t)
+{
+    const sdm_repeat *r = &t->found.repeat;
+    at_shape(t,
+             result(t, SDM_TEST_REPEATS, SDM_TEST_FAILED, (double)r->unlike,
+                    SDM_REPEAT_BESIDE_TEXT "; %s", t->instance->params[r->param].name,
+                    sdm_repeat_advice(r->cause)),
+             r->first);
+}
+
+/* What the survey has found on lines through the ranges. false: nothing. */
+static bool tell_state(tests *t)
+{
+    const sdm_shape_survey *f = &t->found;
+    const size_t k = find_state(f);
+    if (k == f->n_params) return false;
+    sdm_test_result *r = result(t, SDM_TEST_REPEATS, SDM_TEST_FAILED, 1,
+                                "meshes beside this value of %s have other bits when they are made "
+                                "again in another order: %s",
+                                t->instance->params[k].name, sdm_repeat_advice(SDM_REPEAT_BESIDE));
+    at_shape(t, r, f->jump[k].shape);
+    r->p[k] = f->jump[k].value;
+    return true;
+}
+
 /* Repeats the meshes of the survey; too few can be made: the test is skipped. */
 static sdm_status test_repeated(tests *t, int test, int n_threads, sdm_error *err)
 {
@@ -246,6 +291,10 @@ static sdm_status test_repeated(tests *t, int test, int n_threads, sdm_error *er
     const size_t most = f->ms_mesh > 60 ? 1 : REPEATED, n = f->n < most ? f->n : most;
     if (f->failed.shapes) {
         result(t, test, SDM_TEST_SKIPPED, 0, "meshes cannot be made");
+        return SDM_OK;
+    }
+    if (n_threads == 1 && f->repeat.cause == SDM_REPEAT_BESIDE) {
+        tell_beside(t);
         return SDM_OK;
     }
     sdm_repeat r;
@@ -266,7 +315,7 @@ static sdm_status test_repeated(tests *t, int test, int n_threads, sdm_error *er
         result(t, test, SDM_TEST_FAILED, (double)f->repeat.unlike,
                "%zu meshes have other bits in another process: %s", f->repeat.unlike,
                sdm_repeat_advice(SDM_REPEAT_PROCESS));
-    else
+    else if (n_threads > 1 || !tell_state(t))
         result(t, test, SDM_TEST_PASSED, 0, "the same bits, %s", how);
     return SDM_OK;
 }

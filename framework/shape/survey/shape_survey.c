@@ -62,9 +62,14 @@ static sdm_status repeat(const survey *v, sdm_error *err)
     const sdm_instance *shape = v->family.shape;
     const sdm_repeat_process *process = &v->opts->process;
     const sdm_status status = sdm_repeat_find(shape, s->p, s->n, v->opts->brief, &s->repeat, err);
-    if (!status && !s->repeat.unlike && process->plugin)
-        (void)sdm_repeat_in_process(shape, process, s->p, s->n, &s->repeat, &s->process_untested);
-    return status;
+    // threads may keep different meshes, which a process of its own would not mend
+    const bool open = !s->repeat.unlike || s->repeat.cause == SDM_REPEAT_THREADS;
+    if (status || !open || !process->plugin) return status;
+    sdm_repeat there;
+    if (!sdm_repeat_in_process(shape, process, s->p, s->n, &there, &s->process_untested) &&
+        there.unlike)
+        s->repeat = there;
+    return SDM_OK;
 }
 
 /* What takes longer: unions, lines through the ranges, the largest box, surfaces that stay. */

@@ -78,6 +78,19 @@ static sdm_status follow_one(void *user, size_t i, sdm_mesh *mesh, sdm_error *er
     return s;
 }
 
+/* A mesh that depends on the calls before looks like a jump where the dependence begins. */
+static sdm_status tell_state_from_jump(const survey *v, size_t k, sdm_survey_jump *j,
+                                       sdm_error *err)
+{
+    bool same = true;
+    if (j->kind == SDM_BREAK_NONE) return SDM_OK;
+    const double *other = survey_params(v, j->shape ? 0 : v->out->n - 1);
+    const sdm_status s = sdm_survey_line_again(&v->family, survey_params(v, j->shape), k, other,
+                                               j->value, &same, err);
+    if (!same) j->kind = SDM_BREAK_STATE;
+    return s;
+}
+
 static sdm_status follow_lines(survey *v, int n_threads, sdm_error *err)
 {
     sdm_shape_survey *s = v->out;
@@ -95,6 +108,7 @@ static sdm_status follow_lines(survey *v, int n_threads, sdm_error *err)
         // a change of sizes or triangles counts more than a jump
         if (j->kind > worst->kind || (j->kind == worst->kind && j->mm > worst->mm)) *worst = *j;
     }
+    for (size_t k = 0; k < n && !status; k++) status = tell_state_from_jump(v, k, &s->jump[k], err);
     return status;
 }
 

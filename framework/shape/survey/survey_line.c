@@ -6,6 +6,9 @@
 
 enum { STEPS = 32, HALVINGS = 20 };
 
+/* Lies beyond what is left of two steps after the halvings, as a share of the range. */
+#define BESIDE 1e-7
+
 /* Four meshes: three neighbours on the line, and a place for a further one. */
 typedef struct line {
     const shape_family *family;
@@ -153,4 +156,31 @@ sdm_status sdm_survey_line(const shape_family *f, const double *p, size_t k, dou
     for (int i = 0; i < 4; i++) sdm_mesh_dispose(&l.mesh[i]);
     // shapes that cannot be made are counted elsewhere
     return s == SDM_E_PLUGIN ? SDM_OK : s;
+}
+
+sdm_status sdm_survey_line_again(const shape_family *f, const double *p, size_t k,
+                                 const double *other, double value, bool *same, sdm_error *err)
+{
+    enum { MIN, MAX, BELOW, ABOVE, PLACES, OTHER = PLACES };
+    static const int order[] = {MIN, BELOW, ABOVE, MAX, ABOVE, BELOW, OTHER, ABOVE, OTHER, BELOW};
+    const double min = f->min[k], max = f->max[k], step = BESIDE * (max - min),
+                 at[PLACES] = {min, max, fmax(min, value - step), fmin(max, value + step)};
+    uint64_t first[PLACES] = {0};
+    bool made[PLACES] = {false};
+    line l = {.family = f, .param = k};
+    sdm_status s = SDM_OK;
+    *same = true;
+    for (size_t i = 0; i < sizeof order / sizeof *order && *same && !s; i++) {
+        const int place = order[i];
+        memcpy(l.p, place == OTHER ? other : p, f->shape->n_params * sizeof *p);
+        s = line_mesh(&l, place == OTHER ? other[k] : at[place], &l.mesh[0], err);
+        const uint64_t sum = s ? 0 : sdm_mesh_checksum(&l.mesh[0]);
+        if (s == SDM_E_PLUGIN) s = SDM_OK; // a mesh that fails at times is unlike
+        if (place != BELOW && place != ABOVE) continue;
+        *same = !made[place] || sum == first[place];
+        made[place] = true;
+        first[place] = sum;
+    }
+    sdm_mesh_dispose(&l.mesh[0]);
+    return s;
 }

@@ -59,9 +59,11 @@ typedef enum sdm_survey_break {
     SDM_BREAK_JUMP,      /* vertices jump */
     SDM_BREAK_SIZES,     /* the number of vertices or triangles changes */
     SDM_BREAK_TRIANGLES, /* the triangles get other vertices */
+    SDM_BREAK_STATE,     /* it looks like one of these, but depends on the calls before */
 } sdm_survey_break;
 
-/* A value of a parameter at which the mesh does not change continuously. */
+/* A value of a parameter at which the mesh does not change continuously, or beside which it depends
+ * on the calls before. */
 typedef struct sdm_survey_jump {
     sdm_survey_break kind;
     size_t shape;  /* the other parameters are those of this shape */

@@ -329,8 +329,10 @@ static sdm_status repeat(worker *w, isolated_bytes *text, isolated_answer *a, sd
     if (!s && n_threads > 1)
         s = sdm_shape_repeat_at_once(w->instance, p, n_shapes, n_threads, SHAPE_REPEAT_SECONDS,
                                      &a->repeat, err);
-    else if (!s)
+    else if (!s && n_threads)
         s = sdm_shape_repeat(w->instance, p, n_shapes, &a->repeat, err);
+    else if (!s)
+        s = sdm_shape_repeat_options(w->instance, p, &a->repeat, err);
     sdm_free(p);
     return s;
 }

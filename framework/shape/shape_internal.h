@@ -159,14 +159,21 @@ void sdm_shape_repeat_beside(const sdm_instance *s, const double *p, size_t n, b
 bool sdm_shape_step_beside(const double *p, size_t n, size_t n_params, size_t from, size_t to,
                            size_t k, double share, double *q);
 
+/* shape_other_option.c: makes the mesh at p[2][n_params], of which the two differ, right after that
+ * of another instance, each option in turn: *out: cause OPTION, or UNKNOWN and unlike 0. Runs in a
+ * worker process if the shape is isolated: another value of an option may crash. Errors of
+ * sdm_shape_repeat(). */
+sdm_status sdm_shape_repeat_options(const sdm_instance *s, const double *p, sdm_repeat *out,
+                                    sdm_error *err);
+
 /* isolated.c: the callbacks of the shape run in worker processes. */
 bool sdm_is_isolated(const sdm_instance *s);
 
 /* isolated.c: how many calls have ended a worker of an isolated shape. */
 size_t sdm_isolated_ends(const sdm_instance *s);
 
-/* isolated.c: sdm_shape_repeat() (one thread) or sdm_shape_repeat_at_once() in a worker of an
- * isolated shape. */
+/* isolated.c: sdm_shape_repeat() (one thread), sdm_shape_repeat_at_once() (more) or
+ * sdm_shape_repeat_options() (n_threads is 0) in a worker of an isolated shape. */
 sdm_status sdm_isolated_repeat(const sdm_instance *s, const double *p, size_t n, int n_threads,
                                sdm_repeat *out, sdm_error *err);
 

@@ -128,6 +128,7 @@ const char *sdm_repeat_advice(sdm_repeat_cause cause)
         return "a static or global variable keeps what the first call of mesh() set: let mesh() "
                "compute it anew in every call";
     case SDM_REPEAT_BESIDE:
+    case SDM_REPEAT_OPTION:
         return "a static variable or a cache in mesh() is the usual cause: let mesh() compute "
                "everything anew in every call";
     default:

@@ -30,7 +30,7 @@ has '^fine: .*, with doubts$'
 expect 4 '1 of 11 tests failed' sdmgen shapes test picky --plugin "$unfit" --samples 8
 has '^failed +options +with mode=abort: .*unfit\.so: mesh\(\): the plug-in called abort\(\)'
 
-expect 2 '^sdmgen: error: shapes test: --plugin has 15 shapes: name one' sdmgen shapes test "$unfit"
+expect 2 '^sdmgen: error: shapes test: --plugin has 16 shapes: name one' sdmgen shapes test "$unfit"
 expect 2 "unexpected argument 'more'" sdmgen shapes test torus more
 expect 2 'o needs .shapes check' sdmgen shapes test torus -o x.png
 expect 2 'usage: sdmgen shapes test NAME\|PLUGIN\.so' sdmgen shapes test

@@ -1,6 +1,7 @@
 /* The tests of shapes: each finds the fault that is made for it, and none finds a fault in a sound
  * shape. The test itself is the program of the workers.
- * Tests: conformance.c mesh_checksum.c shape_beside.c shape_repeat.c stack_fill.c isolated.c */
+ * Tests: conformance.c mesh_checksum.c shape_beside.c shape_other_option.c shape_repeat.c
+ * stack_fill.c isolated.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -127,6 +128,10 @@ static void calls_that_differ(void **state)
     make("unfit_cache");
     has(SDM_TEST_REPEATS, SDM_TEST_FAILED, "after a call in which only 'reach' differs");
     assert_true(found.test[SDM_TEST_REPEATS].has_params);
+    // and an option
+    make("sided");
+    has(SDM_TEST_REPEATS, SDM_TEST_FAILED, "another value of the option 'side'");
+    only(SDM_TEST_REPEATS);
     // what looks like a jump is none if it depends on the calls before
     make("unfit_lapse");
     has(SDM_TEST_REPEATS, SDM_TEST_FAILED, "beside this value of size have other bits");

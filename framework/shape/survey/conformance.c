@@ -284,6 +284,29 @@ static bool tell_state(tests *t)
     return true;
 }
 
+/* The mesh of the first shape after that of another instance. A call that ends the worker is told
+ * by test_options(). */
+static sdm_status test_other_option(tests *t, sdm_error *err)
+{
+    const sdm_shape_survey *f = &t->found;
+    const size_t size = f->n_params * sizeof *f->p;
+    double p[2 * SHAPE_PARAMS_MAX];
+    sdm_repeat r;
+    if (t->out->test[SDM_TEST_REPEATS].outcome != SDM_TEST_PASSED || f->n < 2) return SDM_OK;
+    memcpy(p, f->p, size);
+    memcpy(p + f->n_params, f->p + (f->n - 1) * f->n_params, size);
+    const sdm_status s = sdm_shape_repeat_options(t->instance, p, &r, err);
+    if (s) return s == SDM_E_PLUGIN ? SDM_OK : s;
+    if (r.unlike)
+        at_shape(t,
+                 result(t, SDM_TEST_REPEATS, SDM_TEST_FAILED, (double)r.unlike,
+                        "mesh() depends on an earlier call: after a call with another value of the "
+                        "option '%s' it gives another mesh; %s",
+                        t->instance->shape->options[r.param].name, sdm_repeat_advice(r.cause)),
+                 r.first);
+    return SDM_OK;
+}
+
 /* Repeats the meshes of the survey; too few can be made: the test is skipped. */
 static sdm_status test_repeated(tests *t, int test, int n_threads, sdm_error *err)
 {
@@ -462,6 +485,8 @@ sdm_status sdm_conformance_make(const sdm_instance *shape, const sdm_conformance
     sdm_status s = test_meshes(&t, err);
     if (!s) s = test_repeated(&t, SDM_TEST_REPEATS, 1, err);
     if (!s) s = test_repeated(&t, SDM_TEST_THREADS, AT_ONCE, err);
+    // the last one: what it leaves in a cache is no fault of threads
+    if (!s) s = test_other_option(&t, err);
     if (!s) test_outside(&t);
     if (!s) test_options(&t);
     sdm_shape_survey_dispose(&t.found);

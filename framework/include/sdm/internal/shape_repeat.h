@@ -15,14 +15,16 @@ typedef enum sdm_repeat_cause {
     SDM_REPEAT_UNSET,   /* mesh() reads memory that it has not written */
     SDM_REPEAT_THREADS, /* the mesh changes when several threads call at once */
     SDM_REPEAT_PROCESS, /* the mesh is another one in a process that made another shape first */
-    SDM_REPEAT_BESIDE   /* the mesh is another one after a call in which one parameter differs */
+    SDM_REPEAT_BESIDE,  /* the mesh is another one after a call in which one parameter differs */
+    SDM_REPEAT_OPTION   /* the mesh is another one after that of an instance with another option */
 } sdm_repeat_cause;
 
 typedef struct sdm_repeat {
     size_t unlike; /* meshes with other bits */
     size_t first;  /* the first of them */
     sdm_repeat_cause cause;
-    /* BEHIND: the index of the first value that mesh() must not read; BESIDE: of the parameter */
+    /* BEHIND: the index of the first value that mesh() must not read; BESIDE: of the
+     * parameter; OPTION: of the option */
     size_t param;
 } sdm_repeat;
 

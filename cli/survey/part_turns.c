@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "report/report_audit.h"
+#include "sdm/internal/clock.h"
 #include "sdm/internal/config.h"
 
 /* Shapes that are looked through for one in which the part is right; halvings of a range; steps to
@@ -25,6 +26,7 @@ typedef struct line {
     size_t n_params, n_parts, part;
     const double *wrong, *right; /* [n_params] */
     size_t only; /* the parameter that changes along the line; n_params: all of them */
+    double end;  /* time of the clock, s: what is not needed is left out then */
 } line;
 
 /* The volume of the part at `at`, and the mesh in *mesh, which the caller disposes of. NaN: the
@@ -138,17 +140,54 @@ static void find_turn(const line *l, const sdm_shape_survey *f, cli_part_turn *o
     }
 }
 
-/* Finds out->by[i].safe of all, from the worst corner of their ranges. */
+/* The volume of the part where parameter k of p[] has the value, and the others are as they are. */
+static double volume_at(const line *l, double *p, size_t k, double value)
+{
+    const double keep = p[k];
+    sdm_mesh mesh = {0};
+    line one = *l;
+    one.wrong = p;
+    p[k] = value;
+    const double volume = measure(&one, 0, &mesh);
+    sdm_mesh_dispose(&mesh);
+    p[k] = keep;
+    return volume;
+}
+
+/* Moves worst[], the shape in which the part is inside out, to the ends of the ranges at which it
+ * is farthest from being right. false: the part turns back somewhere, or it takes too long. */
+static bool find_worst(const line *l, const sdm_shape_survey *f, const cli_part_turn *turn,
+                       double worst[SDM_MAX_PARAMS])
+{
+    bool turns[SDM_MAX_PARAMS] = {false};
+    double range[2];
+    for (size_t i = 0; i < turn->n; i++) {
+        if (isfinite(turn->by[i].back)) return false;
+        find_range(f, turn->by[i].param, range);
+        worst[turn->by[i].param] = range[turn->by[i].above];
+        turns[turn->by[i].param] = true;
+    }
+    for (size_t k = 0; k < l->n_params; k++) {
+        if (sdm_clock() > l->end) return false;
+        if (turns[k]) continue;
+        find_range(f, k, range);
+        double least = volume_at(l, worst, k, worst[k]);
+        for (int end = 0; end < 2; end++) {
+            const double volume = volume_at(l, worst, k, range[end]);
+            if (!(volume < least)) continue;
+            least = volume;
+            worst[k] = range[end];
+        }
+    }
+    return true;
+}
+
+/* Finds out->by[i].safe of all, from the worst corner of the ranges. */
 static void find_safe(const line *l, const sdm_shape_survey *f, cli_part_turn *out)
 {
     double worst[SDM_MAX_PARAMS], goal[SDM_MAX_PARAMS];
     memcpy(worst, l->wrong, l->n_params * sizeof *worst);
-    for (size_t i = 0; i < out->n; i++) {
-        double range[2];
-        if (isfinite(out->by[i].back)) return;
-        find_range(f, out->by[i].param, range);
-        worst[out->by[i].param] = range[out->by[i].above];
-    }
+    if (!find_worst(l, f, out, worst)) return;
     memcpy(goal, worst, l->n_params * sizeof *goal);
     for (size_t i = 0; i < out->n; i++) {
         cli_turn_param *by = &out->by[i];
@@ -168,18 +207,20 @@ static void find_safe(const line *l, const sdm_shape_survey *f, cli_part_turn *o
 }
 
 bool cli_find_part_turn(const sdm_instance *shape, const sdm_shape_survey *found, size_t wrong,
-                        const sdm_part_audit *audit, cli_part_turn *out)
+                        const sdm_part_audit *audit, double end, cli_part_turn *out)
 {
     const size_t n = found->n_params, most = found->n < TRIED ? found->n : TRIED;
     *out = (cli_part_turn){0};
     while (out->part < audit->n && !cli_part_inside_out(audit, out->part)) out->part++;
     if (out->part == audit->n || n > SDM_MAX_PARAMS) return false;
-    line l = {shape, n, audit->n, out->part, found->p + wrong * n, found->p, n};
+    line l = {shape, n, audit->n, out->part, found->p + wrong * n, found->p, n, end};
     while (out->right < most && !is_right(&l, 1)) l.right = found->p + ++out->right * n;
     if (out->right == most) return false;
-    for (l.only = 0; l.only < n && out->n < sizeof out->by / sizeof *out->by; l.only++)
+    for (l.only = 0; l.only < n && out->n < sizeof out->by / sizeof *out->by; l.only++) {
+        if (out->n && sdm_clock() > end) break;
         find_turn(&l, found, out);
-    if (out->n > 1) find_safe(&l, found, out);
+    }
+    if (out->n && out->cause == CLI_TURN_LENGTH) find_safe(&l, found, out);
     if (out->n) return true;
     double bad = 0, good = 1;
     l.only = n;

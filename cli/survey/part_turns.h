@@ -19,9 +19,9 @@ typedef struct cli_turn_param {
     /* Where it turns back, on the way from `value` to the end of the surveyed range. NaN: nowhere
      * that was looked at. */
     double back;
-    /* Beyond this value, on the other side than `above` tells, the part is right also where the
-     * other parameters of the list have the worst ends of their ranges. NaN: nowhere, or not
-     * looked for: `back` is finite for one of the list. */
+    /* Of CLI_TURN_LENGTH: beyond this value, on the other side than `above` tells, the part is
+     * right also where the other parameters have the worst ends of their ranges. NaN: nowhere, or
+     * not looked for: `back` is finite for one of the list. */
     double safe;
 } cli_turn_param;
 
@@ -35,6 +35,7 @@ typedef struct cli_part_turn {
 } cli_part_turn;
 
 /* *out = about the first part that is inside out in shape `wrong` of the survey, of which `audit`
- * is the audit. false: no other shape was found in which it is right. */
+ * is the audit. After the time `end` of the clock, s, it looks for no further parameter and for no
+ * `safe`. false: no other shape was found in which it is right. */
 bool cli_find_part_turn(const sdm_instance *shape, const sdm_shape_survey *found, size_t wrong,
-                        const sdm_part_audit *audit, cli_part_turn *out);
+                        const sdm_part_audit *audit, double end, cli_part_turn *out);

@@ -101,7 +101,7 @@ static void add_turn(const teller *t, size_t wrong, const sdm_part_audit *audit,
     const sdm_param *params = sdm_instance_params(t->s->shape, NULL);
     cli_part_turn turn;
     sdm_text_add(text, "in the other shapes the vertices are in the right order: ");
-    if (!cli_find_part_turn(t->s->shape, &t->s->found, wrong, audit, &turn)) {
+    if (!cli_find_part_turn(t->s->shape, &t->s->found, wrong, audit, t->end, &turn)) {
         sdm_text_add(text,
                      "look in mesh() for an if that swaps them, and for a length that becomes "
                      "negative here");

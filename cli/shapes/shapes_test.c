@@ -120,11 +120,10 @@ static sdm_status read_args(const cli_args *args, test_args *out, sdm_error *err
 
 sdm_status cli_shapes_test(const cli_args *args, sdm_error *err)
 {
-    const sdm_conformance_opts opts = {.samples =
-                                           args->samples >= 0 ? (size_t)args->samples : SAMPLES,
-                                       .seed = args->seed >= 0 ? (uint64_t)args->seed : 1,
-                                       .n_threads = (int)args->threads,
-                                       .cancelled = cli_interrupted};
+    sdm_conformance_opts opts = {.samples = args->samples >= 0 ? (size_t)args->samples : SAMPLES,
+                                 .seed = args->seed >= 0 ? (uint64_t)args->seed : 1,
+                                 .n_threads = (int)args->threads,
+                                 .cancelled = cli_interrupted};
     test_args t = {.name = NULL};
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
@@ -133,6 +132,7 @@ sdm_status cli_shapes_test(const cli_args *args, sdm_error *err)
     if (!s) s = cli_open_registry(&t.args, &registry, err);
     if (!s && !t.name) s = cli_only_shape(&t.args, registry, "test NAME|PLUGIN.so", &t.name, err);
     if (!s) s = cli_create_shape(registry, t.name, &args->options, &shape, err);
+    if (!s) opts.process = cli_other_process(&t.args, registry, shape);
     if (!s) s = SDM_ALLOC(&found, 1, "results of tests", err);
     if (!s) s = sdm_conformance_make(shape, &opts, found, err);
     if (!s) s = args->json ? print_json(shape, found, err) : print_text(shape, found, err);

@@ -19,6 +19,13 @@ expect 3 'unfit_open: 1 of 11 tests failed: meshes are broken' sdmgen shapes tes
 has '^\{"shape": "unfit_open", "verdict": "broken", "corners": 4, "samples": 8, "tests": \[\{"test": "meshes", "outcome": "passed"'
 has '"test": "closed", "outcome": "failed", "figure": 3, "text": "[^"]*", "at": \{"size": '
 
+# a cache of many meshes, which only another process shows: no jump
+if [ $emulated = no ]; then
+    sdmgen shapes test unfit_caches --plugin "$unfit" --samples 64 --threads 1 >out 2>err
+    has "^failed +repeats +mesh\(\) depends on an earlier call: after a call in which only 'reach' differs"
+    if grep -q '^failed *continuous' out; then bad "a cache is told as a jump: $(cat out)"; fi
+fi
+
 # vertices in metres: a hint, no failure
 sed 's/p\[RADIUS\]/p[RADIUS] \/ 1000/g' "$source_folder/examples/plugin/octahedron.c" >metres.c
 cc -shared -fPIC -I"$source_folder/framework/include" metres.c -o metres.so -lm || bad 'the plug-in metres.so was not built'
@@ -30,7 +37,7 @@ has '^fine: .*, with doubts$'
 expect 4 '1 of 11 tests failed' sdmgen shapes test picky --plugin "$unfit" --samples 8
 has '^failed +options +with mode=abort: .*unfit\.so: mesh\(\): the plug-in called abort\(\)'
 
-expect 2 '^sdmgen: error: shapes test: --plugin has 16 shapes: name one' sdmgen shapes test "$unfit"
+expect 2 '^sdmgen: error: shapes test: --plugin has 17 shapes: name one' sdmgen shapes test "$unfit"
 expect 2 "unexpected argument 'more'" sdmgen shapes test torus more
 expect 2 'o needs .shapes check' sdmgen shapes test torus -o x.png
 expect 2 'usage: sdmgen shapes test NAME\|PLUGIN\.so' sdmgen shapes test

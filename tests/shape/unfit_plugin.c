@@ -41,6 +41,7 @@ UNFIT(unlike)
 UNFIT(shared)
 UNFIT(edge)
 UNFIT(cache)
+UNFIT(caches)
 UNFIT(lapse)
 UNFIT(small)
 
@@ -78,6 +79,7 @@ static const sdm_shape SHAPES[] = {TABLE(none),
                                    TABLE(shared),
                                    TABLE(edge),
                                    TABLE(cache),
+                                   TABLE(caches),
                                    TABLE(lapse),
                                    TABLE(small),
                                    {.abi = SDM_SHAPE_ABI,

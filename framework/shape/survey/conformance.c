@@ -144,6 +144,8 @@ static void tell_continuous(tests *t)
         }
     if (!f->jump) {
         result(t, SDM_TEST_CONTINUOUS, SDM_TEST_SKIPPED, 0, "there is no mesh");
+    } else if (find_state(f) < f->n_params || (worst && f->repeat.unlike)) {
+        result(t, SDM_TEST_CONTINUOUS, SDM_TEST_SKIPPED, 0, "meshes depend on the calls before");
     } else if (f->resized.shapes && !worst) {
         result(t, SDM_TEST_CONTINUOUS, SDM_TEST_SKIPPED, 0,
                "meshes with other numbers of vertices cannot be compared");
@@ -153,8 +155,6 @@ static void tell_continuous(tests *t)
                                     worst->mm, t->instance->params[param].name);
         at_shape(t, r, worst->shape);
         r->p[param] = worst->value;
-    } else if (find_state(f) < f->n_params) {
-        result(t, SDM_TEST_CONTINUOUS, SDM_TEST_SKIPPED, 0, "meshes depend on the calls before");
     } else {
         result(t, SDM_TEST_CONTINUOUS, SDM_TEST_PASSED, 0, "no jump along any parameter");
     }
@@ -235,7 +235,8 @@ static sdm_status test_meshes(tests *t, sdm_error *err)
                                   .seed = t->opts->seed,
                                   .n_threads = t->opts->n_threads,
                                   .cancelled = t->opts->cancelled,
-                                  .user = t->opts->user};
+                                  .user = t->opts->user,
+                                  .process = t->opts->process};
     sdm_shape_survey *f = &t->found;
     const sdm_status s = sdm_shape_survey_make(t->instance, &opts, f, err);
     if (s) return s;

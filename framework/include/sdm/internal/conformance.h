@@ -1,6 +1,7 @@
 /* Tests whether a shape keeps the contract of sdm/shape.h, as far as calls can show it. */
 #pragma once
 
+#include "sdm/internal/shape_repeat.h"
 #include "sdm/registry.h"
 
 #ifdef __cplusplus
@@ -54,6 +55,7 @@ typedef struct sdm_conformance_opts {
     int n_threads;                 /* of the survey; 0: the OpenMP default */
     bool (*cancelled)(void *user); /* called by any thread; may be NULL */
     void *user;
+    sdm_repeat_process process; /* as in sdm_survey_opts */
 } sdm_conformance_opts;
 
 /* Tests the shape of the instance, with its options. The tests OUTSIDE and THREADS may end the

@@ -90,7 +90,7 @@ has 'reference: Dice 0.9'
 has 'converged after'
 has '^  rx .* \+- .* mm +truth 3\.5, off by [0-9.]+ sd$'
 has '^  pose         off the truth by 0\.[01][0-9]* mm at the centre of the shape and [0-9](\.[0-9]+)? degrees, [0-2](\.[0-9]+)? sd$'
-has '^  map voxels   doubtful  0.35, need at most 0.2.*coarse beside the point spread of the image: .*with voxels of 0.2[0-9]* mm \(--exact --spacing\)'
+has '^  map voxels   doubtful  0\.35, need at most 0\.3: .*coarse beside the point spread of the image: .*with voxels of 0\.24 mm \(--exact --spacing\), 0\.8 times the limit, show it'
 # the command that goes on from here with finer maps
 has '^finer maps from here; [0-9.]+ times as many voxels, up to [0-9.e+]+ (s|minutes):$'
 eval "$(sed -n 's/^  sdmgen fit ct/expect 0 - sdmgen fit ct/p' out)"

@@ -384,7 +384,7 @@ static void check_network_error(const fit_problem *p, fit_coarseness coarse, sdm
                  r->network_error, *param->unit ? " " : "", param->unit, r->network_error_sd);
     char remedy[120] = "a polish with exact maps (sdm_fit_opts.max_polish_iterations) ends it";
     // a polish of points has exact distances, no maps
-    if (p->target->kind != SDM_FIT_POINTS &&
+    if (p->target->kind != SDM_FIT_POINTS && !*coarse.cause &&
         fit_longest_edge(&p->maps.grid) > SDM_GRID_FIT_ADVISED * coarse.limit) {
         if (!passed) r->advised_voxel_mm = coarse.advice;
         snprintf(remedy, sizeof remedy,
@@ -457,7 +457,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
         s = sdm_fit_check_offset(p, v, err);
     if (!s) check_bounds(p, &misfit, &bounds, r, v);
     if (!s) sdm_fit_check_voxels(p, coarse, r);
-    if (!s && labels) sdm_fit_check_labels(p, v);
+    if (!s && labels) sdm_fit_check_labels(p, coarse.thinnest, v);
     if (!s) sdm_fit_check_determined(p, r, v);
     sdm_fit_residuals_dispose(&residuals);
     if (!s) s = sdm_fit_check_blob(p, *factor, v, err);

@@ -3,11 +3,12 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "finding.h"
+#include "fit/data/shape_details.h"
 #include "noise.h"
 #include "sdm/internal/fit_finding.h"
-#include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
@@ -19,17 +20,12 @@
 #define VOXEL_DIAGONAL 1.4142
 // from this edge on, over the radius of the largest ball inside, voxels miss the shape
 #define VOXEL_OVER_RADIUS_FAR 2
-// sd of the point spread, over the voxels of the image, where the maps are too coarse to show it
+// narrowest sd of the point spread that counts, over the voxels of the image
 #define BLUR_OVER_IMAGE_VOXEL 0.5
-// the limit by the details is known to this share of it: an edge so little beyond passes
+// parts that are thicker than this many voxels of the limit do not ask for it
+#define FINER_THAN_THIN 16
+// a point spread so little beyond the smallest one of the maps counts as that
 #define LIMIT_ERROR 0.05
-// shortest gradient of a distance whose details are shown
-#define GRADIENT_MIN 0.8
-// largest share of the surface with a shorter gradient
-#define DETAILS_MAX 0.1
-
-// from this share on, thin walls bend the distance, not edges
-#define WALLS_MIN 0.3
 
 // scatter of points about the surface, over the radius of the largest ball inside, from which on
 // residuals that agree with their neighbours show another shape
@@ -146,26 +142,14 @@ void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v)
                       sqrt(sum / free), sqrt(over));
 }
 
-/* Share of the surface beside details that the voxels of the maps do not show: there the gradient
- * of the distance, by differences over two voxels, is clearly shorter than 1. */
-static double detail_share(const fit_maps *m)
+/* What the fitted shape needs: measured at the shape itself, where it is known. */
+static fit_details shape_details(const fit_problem *p, double most)
 {
-    const sdm_grid *g = &m->grid;
-    const int64_t step[3] = {1, g->n[0], g->n[0] * g->n[1]};
-    const double near = 0.5 * fit_longest_edge(g);
-    double all = 0, bent = 0;
-    for (int64_t k = 1; k + 1 < g->n[2]; k++)
-        for (int64_t j = 1; j + 1 < g->n[1]; j++)
-            for (int64_t i = 1; i + 1 < g->n[0]; i++) {
-                const double *d = m->distance + k * step[2] + j * step[1] + i;
-                double square = 0;
-                if (fabs(*d) > near) continue;
-                for (int a = 0; a < 3; a++)
-                    square += pow((d[step[a]] - d[-step[a]]) / (2 * g->spacing[a]), 2);
-                all++;
-                bent += square < GRADIENT_MIN * GRADIENT_MIN;
-            }
-    return all > 0 ? bent / all : 0;
+    const fit_maps *m = &p->maps;
+    const sdm_model *model = p->source->model;
+    fit_details d;
+    if (p->source->shape && !sdm_fit_shape_details(m, p->state.params, most, &d, NULL)) return d;
+    return sdm_fit_map_details(m, model ? sdm_model_get_info(model)->quality.thickness_mm : NAN);
 }
 
 static void coarseness_limit(fit_coarseness *c, double limit, const char *detail)
@@ -173,50 +157,76 @@ static void coarseness_limit(fit_coarseness *c, double limit, const char *detail
     if (limit < c->limit) c->limit = limit, c->detail = detail;
 }
 
-/* Thickness (mm) of the thinnest part of the fitted shape; without the shape, of the thinnest part
- * that the training of the network found. NaN: not known. */
-static double thinnest_part(const fit_problem *p)
+/* Longest edge of voxels that show the data. */
+static fit_coarseness data_limit(const fit_problem *p, double blur)
 {
-    const sdm_fit_source *f = p->source;
-    sdm_mesh mesh = {0};
-    sdm_part_audit audit = {0};
-    double thick = NAN;
-    if (!f->shape) return f->model ? sdm_model_get_info(f->model)->quality.thickness_mm : NAN;
-    if (!sdm_instance_mesh(f->shape, p->state.params, &mesh, NULL) &&
-        !sdm_part_audit_make(&mesh, SDM_AUDIT_WALLS, NULL, &audit, NULL))
-        thick = sdm_part_audit_thickness(&audit);
-    sdm_part_audit_dispose(&audit);
-    sdm_mesh_dispose(&mesh);
-    return thick;
+    fit_coarseness c = {.limit = INFINITY, .advice = INFINITY, .detail = "", .thinnest = NAN};
+    const double image = fit_longest_edge(&p->target->grid);
+    if (fit_is_labels(p))
+        coarseness_limit(&c, SDM_GRID_FIT_DATA * image, "the voxels of the labels");
+    if (!(blur > 0)) return c;
+    // an image hardly shows a point spread below half of its voxels, and maps with coarse voxels
+    // show none below half of theirs: finer ones may find a narrower one
+    const double narrow = BLUR_OVER_IMAGE_VOXEL * image;
+    const bool bound = !p->opts->keep_blur && blur <= p->maps.min_blur * (1 + LIMIT_ERROR);
+    coarseness_limit(&c, SDM_GRID_FIT_DATA * (bound ? narrow : fmax(blur, narrow)),
+                     "the point spread of the image");
+    return c;
+}
+
+/* Number of voxels of this edge in the grid of the maps. */
+static double voxels_of(const fit_maps *m, double edge)
+{
+    double n = 1;
+    for (int a = 0; a < 3; a++) n *= (double)m->grid.n[a] * m->grid.spacing[a] / edge;
+    return n;
+}
+
+/* Names the length that asks for voxels of `limit` mm. */
+static void name_cause(const fit_problem *p, const fit_details *d, double limit, double of_data,
+                       char *text, size_t size)
+{
+    const double thin = fmin(isnan(d->thinnest) ? INFINITY : d->thinnest, 2 * d->radius);
+    const sdm_instance *shape = p->source->shape;
+    size_t n = 0, k = 0;
+    if (of_data <= limit) {
+        snprintf(
+            text, size,
+            "they want voxels of %.2g mm, where the fitted shape is about %.3g mm long: is one "
+            "of both in another unit?",
+            limit, 2 * p->extent.reach);
+        return;
+    }
+    if (thin > FINER_THAN_THIN * limit) {
+        snprintf(text, size,
+                 "they want voxels of %.2g mm: is a length of the shape in another unit?", limit);
+        return;
+    }
+    const sdm_param *params = shape ? sdm_instance_params(shape, &n) : NULL;
+    if (shape) k = sdm_fit_thinning_param(shape, p->state.params, thin);
+    const int used =
+        snprintf(text, size, "the thinnest part of the fitted shape is %.2g mm thick", thin);
+    if (k < n)
+        snprintf(text + used, size - (size_t)used, ": '%.40s' is at %.3g%s%.10s", params[k].name,
+                 p->state.params[k], *params[k].unit ? " " : "", params[k].unit);
 }
 
 fit_coarseness sdm_fit_coarseness(const fit_problem *p, double blur)
 {
-    fit_coarseness c = {INFINITY, INFINITY, "", false};
-    if (fit_maps_direct(&p->maps)) return c;
-    const double voxel = fit_longest_edge(&p->maps.grid), radius = sdm_fit_inradius(&p->maps),
-                 thinnest = thinnest_part(p), details = detail_share(&p->maps);
-    // coarse maps show the largest ball inside too small; no part is thicker than it
-    const double thick = fmax(2 * radius, thinnest) / SDM_GRID_FIT_VOXELS,
-                 // at edges the share grows with the voxel
-        edges = voxel * DETAILS_MAX / details * (1 + LIMIT_ERROR),
-                 // in walls thinner than two voxels all of the surface bends at once
-        walls = details > WALLS_MIN ? fmin(thick, 0.5 * voxel) : 0;
-    if (details > 0) coarseness_limit(&c, fmax(edges, walls), "the details of the shape");
-    coarseness_limit(&c, thick, "the thickness of the shape");
-    if (sdm_too_thin(thinnest, voxel))
-        coarseness_limit(&c, thinnest / VOXEL_DIAGONAL, "the thinnest part of the shape");
-    if (fit_is_labels(p))
-        coarseness_limit(&c, SDM_GRID_FIT_DATA * fit_longest_edge(&p->target->grid),
-                         "the voxels of the labels");
-    if (blur > 0) coarseness_limit(&c, SDM_GRID_FIT_DATA * blur, "the point spread of the image");
-    c.blind = voxel > VOXEL_OVER_RADIUS_FAR * radius;
+    if (fit_maps_direct(&p->maps))
+        return (fit_coarseness){
+            .limit = INFINITY, .advice = INFINITY, .detail = "", .thinnest = NAN};
+    fit_coarseness c = data_limit(p, blur);
+    const double of_data = c.limit;
+    const fit_details d = shape_details(p, c.limit);
+    coarseness_limit(&c, d.edge, "the details of the shape");
+    coarseness_limit(&c, 2 * d.radius / SDM_GRID_FIT_VOXELS, "the thickness of the shape");
+    coarseness_limit(&c, d.thinnest / VOXEL_DIAGONAL, "the thinnest part of the shape");
+    c.blind = fit_longest_edge(&p->maps.grid) > VOXEL_OVER_RADIUS_FAR * sdm_fit_inradius(&p->maps);
     c.advice = SDM_GRID_FIT_ADVISED * c.limit;
-    // an estimate of the point spread at its smallest value with these maps is an upper bound:
-    // finer maps may show a shorter one
-    if (voxel > c.advice && blur > 0 && blur <= p->maps.min_blur * (1 + LIMIT_ERROR))
-        c.advice = fmin(c.advice, SDM_GRID_FIT_ADVISED * SDM_GRID_FIT_DATA * BLUR_OVER_IMAGE_VOXEL *
-                                      fit_longest_edge(&p->target->grid));
+    c.thinnest = d.thinnest;
+    if (voxels_of(&p->maps, c.advice) > FIT_SENSIBLE_VOXELS)
+        name_cause(p, &d, c.limit, of_data, c.cause, sizeof c.cause);
     return c;
 }
 
@@ -224,23 +234,28 @@ void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_r
 {
     const double voxel = fit_longest_edge(&p->maps.grid);
     if (p->opts->keep_params || fit_maps_direct(&p->maps)) return;
-    if (voxel > coarse.limit) r->advised_voxel_mm = coarse.advice;
-    sdm_fit_judge_add(
-        &r->verdict, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit),
-        coarse.blind ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, voxel, coarse.limit,
-        "the voxels of the maps are coarse beside %s: parameters may be biased, and their "
-        "standard deviations %s; exact maps with voxels of %.2g mm "
-        "(sdm_fit_source.grid) show it",
-        coarse.detail,
-        p->target->kind == SDM_FIT_POINTS ? "contain an estimate of this error"
-                                          : "may be too small",
-        coarse.advice);
+    char remedy[sizeof coarse.cause];
+    memcpy(remedy, coarse.cause, sizeof remedy);
+    if (!*remedy)
+        snprintf(remedy, sizeof remedy,
+                 "exact maps with voxels of %.2g mm (sdm_fit_source.grid), %g times the limit, "
+                 "show it",
+                 coarse.advice, SDM_GRID_FIT_ADVISED);
+    if (voxel > coarse.limit && !*coarse.cause) r->advised_voxel_mm = coarse.advice;
+    sdm_fit_judge_add(&r->verdict, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit),
+                      coarse.blind ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, voxel, coarse.limit,
+                      "the voxels of the maps are coarse beside %s: parameters may be biased, and "
+                      "their standard deviations %s; %s",
+                      coarse.detail,
+                      p->target->kind == SDM_FIT_POINTS ? "contain an estimate of this error"
+                                                        : "may be too small",
+                      remedy);
 }
 
-void sdm_fit_check_labels(const fit_problem *p, sdm_fit_verdict *v)
+void sdm_fit_check_labels(const fit_problem *p, double thinnest, sdm_fit_verdict *v)
 {
     if (p->opts->keep_params) return;
-    const double voxel = fit_longest_edge(&p->target->grid), thick = thinnest_part(p);
+    const double voxel = fit_longest_edge(&p->target->grid), thick = thinnest;
     if (!isfinite(thick)) return;
     // a parameter at a bound shows that the fit has missed the part
     bool missed = false;

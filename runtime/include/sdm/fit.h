@@ -538,7 +538,8 @@ typedef struct sdm_fit_result {
     double seconds_verdict;
     /* edge of the voxels of exact maps (mm) that would be fine enough, where the check
        SDM_FIT_CHECK_VOXELS has not passed, or SDM_FIT_CHECK_NETWORK_ERROR and a polish on the grid
-       of the network may end too coarse; else NaN */
+       of the network may end too coarse: 0.8 times the limit of SDM_FIT_CHECK_VOXELS. Else NaN, and
+       where such maps had more than 2^27 voxels, which the text of the check explains */
     double advised_voxel_mm;
 } sdm_fit_result;
 

@@ -62,6 +62,9 @@ typedef struct cli_fit {
      * followed, and beside which part of the shape or the data they are coarse; 0: none followed */
     double coarse_mm;
     char coarse_beside[64];
+    /* fit_finer.c: voxels of the maps that the fit would have gone on with, and the largest number
+     * that it takes by itself; 0: these were not too many */
+    double too_many, many_at_most;
 
     /* fit_target.c: the image, labels or points to fit to */
     sdm_volume image;
@@ -133,9 +136,9 @@ sdm_status cli_fit_finer_grid(const cli_fit *f, const double *params, double spa
 
 /* After cli_fit_run(): where the command line leaves the voxels of exact maps open and nothing but
  * them leaves the fit in doubt, goes on from its result with the voxels that its verdict advises,
- * and f->result is that of the second fit. Nothing where these are too many, or a prior of the pose
- * is given. Where the second fit ends with an error other than SDM_E_QUALITY, the first result
- * stays, and a warning tells why. SDM_E_CANCELLED. */
+ * and f->result is that of the second fit. Nothing where a prior of the pose is given, nor where
+ * these are too many: f->too_many then holds their number. Where the second fit ends with an error
+ * other than SDM_E_QUALITY, the first result stays, and a warning tells why. SDM_E_CANCELLED. */
 sdm_status cli_fit_go_finer(cli_fit *f, sdm_error *err);
 
 /* After cli_fit_open_source(): reads --depth. With --measure it measures the shape at the start, so

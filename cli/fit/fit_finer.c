@@ -109,8 +109,12 @@ sdm_status cli_fit_go_finer(cli_fit *f, sdm_error *err)
     if (!grid_is_open(f) || anchored || !only_maps_doubt(f) ||
         cli_fit_finer_grid(f, f->result.params, f->result.advised_voxel_mm, &g, NULL))
         return SDM_OK;
-    const double voxels = (double)sdm_grid_count(&g), values = voxels * (double)(f->n_params + 1);
-    if (voxels > VOXELS_MAX || values > VALUES_MAX) return SDM_OK;
+    const double voxels = (double)sdm_grid_count(&g),
+                 most = fmin(VOXELS_MAX, floor(VALUES_MAX / (double)(f->n_params + 1)));
+    if (voxels > most) {
+        f->too_many = voxels, f->many_at_most = most;
+        return SDM_OK;
+    }
     cli_fit before = *f;
     sdm_error why = {0};
     const sdm_status s = fit_finer(f, &before, &g, &why);

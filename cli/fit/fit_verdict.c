@@ -149,7 +149,8 @@ static const char *in_short(const cli_fit *f)
                                               SDM_FIT_CHECK_NETWORK},
                                     coarse[] = {SDM_FIT_CHECK_VOXELS,  SDM_FIT_CHECK_NETWORK_ERROR,
                                                 SDM_FIT_CHECK_NETWORK, SDM_FIT_CHECK_RESIDUALS,
-                                                SDM_FIT_CHECK_BESIDE,  SDM_FIT_CHECK_OFFSET};
+                                                SDM_FIT_CHECK_BESIDE,  SDM_FIT_CHECK_OFFSET,
+                                                SDM_FIT_CHECK_INSIDE,  SDM_FIT_CHECK_OUTSIDE};
     if (v->grade == SDM_FIT_FAILED)
         return only(v, SDM_FIT_FAILED, end, 1)
                    ? "do not use the values: the fit has not come to an end"

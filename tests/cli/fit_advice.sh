@@ -67,11 +67,11 @@ has '^  radius .* truth 0\.6, off by [0-2]\.[0-9] sd$'
 ${small% --quiet} small-label.nii --margin 0.5 >out 2>err || bad "a fit with progress: $(cat err)"
 grep -Eq '^sdmgen: fit 0 %  going on with finer maps \(voxels of 0\.13 mm\)$' err || bad "no line on finer maps: $(cat err)"
 grep -q 'finer maps from here' out && bad 'the command of a fit that went on by itself'
-# Maps that would be too large are left to the user.
+# Maps that would be too large are left to the user, and the fit says so.
 expect 0 - sdmgen phantom --shape capsule -p radius=0.6 -p length=1 --spacing 0.05 -o fine.nii --label fine-label.nii --quiet
 expect 0 - $small fine-label.nii --margin 0.3
 has '^  map voxels   doubtful .* coarse beside the voxels of the labels'
-has '^finer maps from here; '
+has '^finer maps from here; [0-9.]+ times as many voxels, [0-9.]+ million in all \(more than the 2\.1 million that a fit takes by itself\), up to [0-9.e+]+ (s|minutes):$'
 has '^  maps .*, voxels of 0\.1[78][0-9]* mm$'
 
 # Exchanged values of a thin shape beside its place: as much of both tissues lies within the start as around it.

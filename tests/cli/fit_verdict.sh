@@ -107,6 +107,13 @@ has '^  map voxels   doubtful  0\.6, .* beside the details of the shape: '
 $gear "$(sed -n 's/^  map voxels .*voxels of \([0-9.]*\) mm.*/\1/p' out)" >out 2>err
 has '^  map voxels   passed '
 
+# Coarse maps also widen the values inside: `in short` names the maps, not the data.
+expect 0 - sdmgen phantom --shape torus -O edge=0.5 --spacing 0.3 -o ring.nii --quiet
+expect 0 - sdmgen fit --shape torus -O edge=0.5 ring.nii --rotation 0,0,0 --quiet --spacing 0.6
+has '^  inside       doubtful '
+has '^  map voxels   doubtful '
+has '^  in short     the maps are too coarse for these data: '
+
 # The side of an ear is found; the wrong one is refused.
 expect 0 - sdmgen phantom --shape cochlea -O edge=0.8 -O ear=left --spacing 0.5 --seed 5 -o left.nii --quiet
 ear='sdmgen fit --shape cochlea -O edge=0.8 left.nii --quiet --rotation 0,0,0 --spacing 0.5 --eps 1e-3'

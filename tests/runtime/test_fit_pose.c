@@ -220,7 +220,7 @@ static void test_kept_param(void **state)
         assert_non_null(kept);
         assert_int_equal(r.verdict.grade > SDM_FIT_PASSED, off);
         assert_non_null(strstr(kept->text, off ? "at which ry is kept: free, it goes to 1.8"
-                                               : "free, ry goes to 1.8"));
+                                               : "with 'ry' free the fit goes to ry = 1.8"));
         assert_int_equal(kept->figure > kept->limit, off);
         sdm_fit_dispose(&r);
     }

@@ -131,7 +131,10 @@ sdm_status sdm_fit_judge_kept_params(fit_problem *p, sdm_fit_result *r, sdm_erro
             "correct the value, or do not keep it",
             name, found.value, found.gain);
     else
-        snprintf(f.text, sizeof f.text, "free, %.60s goes to %.4g", name, found.value);
+        snprintf(f.text, sizeof f.text,
+                 "with '%.60s' free the fit goes to %.60s = %.4g, and explains the data better by "
+                 "%.3g (log-likelihood of independent samples)",
+                 name, name, found.value, found.gain);
     sdm_fit_verdict_add(&r->verdict, &f);
     return refused ? sdm_fail(err, SDM_E_QUALITY, "%s", f.text) : SDM_OK;
 }

@@ -495,11 +495,11 @@ static void uses_and_spacing(void **state)
     v.volume_error = v.surface_volume_error = 0.004, v.thickness_mm = 2.9 * v.coarse_mm;
     assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and measurements");
     sdm_verdict_unfit(&v, lines);
-    assert_string_equal(lines,
-                        "exact fits by the network alone: its thinnest part, 2.3 mm thick "
-                        "in a few held-out shapes, has 2.9 voxels across; 5 are safe for "
-                        "fits, fewer may pass: take sdmgen fit --exact --spacing 0.46 (for an image with a blur below "
-                        "0.38 mm: 1.2 times the blur)\n");
+    assert_string_equal(lines, "exact fits by the network alone: its thinnest part, 2.3 mm thick "
+                               "in a few held-out shapes, has 2.9 voxels across; 5 are safe for "
+                               "fits, fewer may pass: take sdmgen fit --exact --spacing 0.46 (for "
+                               "an image with a blur below "
+                               "0.38 mm: 1.2 times the blur)\n");
     // not 4 where there are nearly so many
     v.thickness_mm = 3.96 * v.coarse_mm;
     sdm_verdict_unfit(&v, lines);

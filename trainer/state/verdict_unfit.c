@@ -68,7 +68,8 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
     if (finer > 0 && !sdm_verdict_lacks_part(v))
         add(l,
             "exact fits by the network alone: its thinnest part, %.2g mm thick in a few held-out "
-            "shapes, has %.1f voxels across; %.2g are safe for fits, fewer may pass: take sdmgen fit "
+            "shapes, has %.1f voxels across; %.2g are safe for fits, fewer may pass: take sdmgen "
+            "fit "
             "--exact --spacing %.2g (for an image with a blur below %.2g mm: %.2g times the blur)",
             v->thickness_mm, floor(10 * v->thickness_mm / v->coarse_mm + 1e-9) / 10,
             SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED, finer, finer / blurs, blurs);

@@ -7,10 +7,12 @@
 #include "cohort/cohort.h"
 #include "commands.h"
 #include "fit/fit_command.h"
+#include "inputs/setup.h"
 #include "page/page.h"
 #include "report/json_values.h"
 #include "report/progress_bar.h"
 #include "report/terminal.h"
+#include "survey/report_survey.h"
 
 /* One progress bar for each phase. */
 typedef struct progress_state {
@@ -244,6 +246,10 @@ static sdm_status fit_one(const cli_args *args, const char *json, sdm_error *err
     if (!s) s = cli_fit_check_size(&f, err);
     if (!s) cli_fit_notice_tissues(&f);
     if (!s) cli_fit_notice_kept(&f);
+    // of many cases each has a process of its own: the test of one is enough, which users make
+    // first
+    if (!s && f.shape && !args->cohort.cases && cli_other_process(args, f.registry, f.shape).plugin)
+        cli_warn_repeats(f.shape);
     if (!s) s = cli_fit_check_contrast(&f, err);
     if (!s) s = fit_shape(&f, err);
     if (!s) s = cli_fit_explain_contrast(&f, err);

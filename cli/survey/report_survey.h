@@ -24,3 +24,7 @@ void cli_survey_untested(const cli_survey *s, sdm_text *text);
  * are no notices: what follows meets them again. */
 size_t cli_notice_survey(const sdm_config *c, const sdm_instance *shape,
                          sdm_repeat_process process);
+
+/* Warns in one line if the meshes of a shape depend on the calls before; makes some dozens of them,
+ * and takes a tenth of a second more. Without memory for it nothing is tested. */
+void cli_warn_repeats(const sdm_instance *shape);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen shapes check, and what mesh, exact, config and train say about a shape with faults (tests/shape/faulty_shape.h): one line each.
-# Tests: repeat_process.c report_survey.c teller.c tell_causes.c tell_meshes.c tell_notes.c tell_params.c tell_walls.c report_audit.c part_turns.c grid_hits.c shapes_check.c cmd_mesh.c crash_guard.c callback.c
+# Tests: repeat_process.c report_survey.c teller.c warn_repeats.c tell_causes.c tell_meshes.c tell_notes.c tell_params.c tell_walls.c report_audit.c part_turns.c grid_hits.c shapes_check.c cmd_mesh.c crash_guard.c callback.c
 . "$(dirname "$0")/common.sh"
 plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
 
@@ -231,6 +231,13 @@ told "$cuts"
 expect 0 "^sdmgen: warning: $cuts" sdmgen config good.yaml 'grid.size=[29,33,33]' --plugin "$plugin" -q
 has '^good\.yaml: no mistakes, 1 warning$'
 expect 0 'warning: meshes have other bits when they are made again, .* memory that it has not written' sdmgen config good.yaml shape.options.fault=unset --plugin "$plugin" -q
+# a fit with exact maps of a plug-in, too
+sdmgen phantom --shape faulty --spacing 0.4 -o good.nii --label good-label.nii --plugin "$plugin" -q >out 2>err || bad "good.nii: $(cat err)"
+sdmgen fit --shape faulty -O fault=cache good-label.nii --label 1 --rotation 0,0,0 --max-iterations 1 --plugin "$plugin" -q >out 2>err
+grep -q "^sdmgen: warning: shape 'faulty': mesh() depends on an earlier call: after a call in which only 'reach' differs .* Results of exact maps may be wrong; sdmgen shapes check faulty tells more$" err ||
+    bad "no warning of a fit with a cache: $(cat err)"
+sdmgen fit --shape faulty good-label.nii --label 1 --rotation 0,0,0 --max-iterations 1 --plugin "$plugin" -q >out 2>err
+grep -q 'depends on\|made again' err && bad "a warning of a fit without a cache: $(cat err)"
 expect 0 "warning: mesh\(\) depends on an earlier call: after a call in which only 'reach' differs" sdmgen config good.yaml shape.options.fault=cache --plugin "$plugin" -q
 expect 0 "warning: mesh\(\) depends on an earlier call: after a call in which only 'reach' differs" \
     sdmgen train good.yaml shape.options.fault=cache data='{static: 0, start: 16, online: 0, holdout: 4}' --plugin "$plugin" --out cache -q

@@ -7,29 +7,32 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <vector>
 
 #include "peer.h"
 
 namespace
 {
 
-/* Adapter with the interface that meshToVolume() requires of a mesh: vertices in voxel indices. */
-class adapter
-{
-  public:
-    explicit adapter(const peer::job &j) : job_(j) {}
-    size_t polygonCount() const { return job_.mesh.n_tri; }
-    size_t pointCount() const { return job_.mesh.n_vert; }
-    size_t vertexCount(size_t) const { return 3; }
-    void getIndexSpacePoint(size_t n, size_t v, openvdb::Vec3d &out) const
-    {
-        const double *p = job_.mesh.vert + 3 * size_t{job_.mesh.tri[3 * n + v]};
-        for (int i = 0; i < 3; i++) out[i] = (p[i] - job_.grid.origin[i]) / job_.grid.spacing[i];
-    }
-
-  private:
-    const peer::job &job_;
+/* The mesh as the arrays for which the library holds a compiled meshToVolume(): a type of our own
+ * would take a minute to compile. Vertices in voxel indices. */
+struct index_mesh {
+    std::vector<openvdb::Vec3s> vertices;
+    std::vector<openvdb::Vec3I> triangles;
 };
+
+index_mesh in_voxels(const peer::job &j)
+{
+    index_mesh m;
+    for (size_t v = 0; v < j.mesh.n_vert; v++) {
+        openvdb::Vec3d at;
+        for (int i = 0; i < 3; i++)
+            at[i] = (j.mesh.vert[3 * v + i] - j.grid.origin[i]) / j.grid.spacing[i];
+        m.vertices.emplace_back(at);
+    }
+    for (size_t t = 0; t < j.mesh.n_tri; t++) m.triangles.emplace_back(&j.mesh.tri[3 * t]);
+    return m;
+}
 
 /* Half widths of the band in voxels. */
 struct widths {
@@ -77,8 +80,12 @@ peer::map_function prepare(const peer::job &j)
     const float narrow = static_cast<float>(j.band / h + 0.5);
     const widths w = j.band > 0 ? widths{narrow, narrow} : full_widths(j);
     const auto frame = openvdb::math::Transform::createLinearTransform(h);
+    const index_mesh m = in_voxels(j);
+    const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> mesh(
+        m.vertices, m.triangles);
+    openvdb::util::NullInterrupter never;
     const auto level =
-        openvdb::tools::meshToVolume<openvdb::FloatGrid>(adapter(j), *frame, w.outside, w.inside);
+        openvdb::tools::meshToVolume<openvdb::FloatGrid>(never, mesh, *frame, w.outside, w.inside);
     return [level, &j](float *values) {
         const openvdb::CoordBBox box(0, 0, 0, static_cast<int>(j.grid.n[0]) - 1,
                                      static_cast<int>(j.grid.n[1]) - 1,

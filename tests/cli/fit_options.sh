@@ -92,7 +92,7 @@ grep -q 'warning: --margin 0.1 mm is less than 1.5 voxels of' err || bad "a smal
 expect 2 'error: map.nii is a signed distance map, no image: fit the surface' sdmgen fit $shape map.nii --rotation 0,0,0 --max-iterations 1
 grep -qE 'sdm_fit_(opts|source)' out err && bad "names of C: $(cat out err)"
 # exact maps follow the thinnest part; --spacing decides, and points need no voxels
-thin='--plugin ../../plugins/faulty/faulty.so --shape faulty -O fault=wall -p size=1.8 --rotation 0,0,0'
+thin='--plugin ../../plugins/faulty/faulty.so --shape faulty -O fault=wall -p size=1.8 --rotation 0,0,0 --translation 0,0,0 --keep pose'
 sdmgen phantom ${thin% --rotation*} --spacing 0.4 -o wall.nii --quiet >out 2>err || bad "wall: $(cat err)"
 sdmgen fit $thin wall.nii --max-iterations 1 >out 2>err
 has '^  maps .* by the exact engine, voxels of 0\.0[0-9]* mm, because the thinnest part is 0\.1 mm thick$'

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen train: the run folder and its protection, interrupt and resume. The tests of models use the run made here.
-# Tests: cmd_train.c forecast.c map_time.c model_before.c next_training.c report_verdict.c train_progress.c
+# train_advice.sh: the verdict and the command for the next training. Tests: cmd_train.c map_time.c train_progress.c
 . "$(dirname "$0")/common.sh"
 coarse_grids=yes
 tiny=$source_folder/tests/cli/tiny.yaml
@@ -58,7 +58,7 @@ has '^  error from  bases +[0-9.]+ mm +[0-9]+ %  '
 has '^  (good|usable|poor) \(from 8 shapes only\) +(for|not) '
 has '^  verdict     .*(raise|lower|set) '
 
-# It is told as soon as the pace of the maps is known, also in the trials of auto (below).
+# It is told as soon as the pace of the maps is known.
 sdmgen train "$tiny" --out hurried --force train.steps=0 train.minutes=0.0001 data.holdout=60 >out 2>err || bad "hurried: $(cat err)"
 grep -Eq '^sdmgen: the run will take longer than train.minutes \(0.0001\): the 60 held-out maps, 16 of the static grid and 96 random ones are made in any case, which takes about [0-9]+ s \(raise train.minutes to ' err ||
     bad "no word about the time ahead: $(cat err)"
@@ -102,99 +102,6 @@ mkdir unwritten/model.sdm
 wait $pid && bad 'a model that cannot be written: exit code 0'
 grep -q '^sdmgen: error: .*; a checkpoint is in unwritten: go on with --resume$' err || bad "no word of the checkpoint: $(cat err)"
 present unwritten/checkpoint.sdmc
-
-# The second kind of auto does not fit into memory: --quiet does not hide which one is kept.
-cat >link.yaml <<'YAML'
-shape: {name: linkage, options: {links: 1, motion: planar, limit: 0.5, edge: 0.5}}
-grid: {size: [21, 19, 22], spacing: 0.34, origin: [-2.13, -3.07, -4.98]}
-network: {width: 16, modes: 24, rank: 6, degree: 3}
-data: {static: 0, static_share: 0, start: 100000, online: 20, holdout: 12, memory_gb: 0.0085}
-train: {steps: 60, batch: 16, refine_batch: 8}
-YAML
-expect 0 'warning: auto: template is kept, because pod failed: ' sdmgen train link.yaml --out link --quiet
-# a template keeps held-out maps alone: the others do not count among those that need too much memory
-expect 2 'data.static \(0 maps\), data.start \(0\) and data.holdout \(500\) on .* need 0\.0[0-9]+ GB, data.memory_gb is 0\.001' \
-    sdmgen train link.yaml network.kind=template data.holdout=500 data.memory_gb=0.001 --out vain --quiet
-
-# Fewer maps than data.start fit into the memory: the training begins with these, and says so.
-sdmgen train link.yaml network.kind=pod data.start=700 data.memory_gb=0.012 --out full >out 2>err || bad "full: $(cat err)"
-grep -q '^sdmgen: data.memory_gb is 0.012: of 700 random maps (data.start) on 8.78e+03 voxels the training starts with 659, ' err ||
-    bad "the memory for maps: $(cat err)"
-
-# A template that errs far from the surface alone: nothing to change, or pod, at a price that auto has measured.
-cat >far.yaml <<'YAML'
-shape: {name: linkage, options: {links: 2, length: 1, radius: 1, tip: 1, joint: 1, base: 1}}
-grid: {spacing: 0.2}
-data: {static: 2, start: 64, online: 0, holdout: 12}
-train: {minutes: 4}
-YAML
-pod='^  far away    where distances far from the surface matter: pod; '
-expect 0 - sdmgen train far.yaml --out far --quiet
-has '^  verdict     Far from the surface .*: nothing to change for surfaces, level sets and fits near the surface; where distances far away matter, set network.kind to pod'
-has "${pod}auto has tried it, too: within a voxel of the surface [0-9.]+ mm, [0-9.e+]+ times worse; everywhere [0-9.]+ mm, .* \(a trial, which training improves\)\$"
-has '^              sdmgen train far\.yaml train\.minutes=4 network\.kind=pod --out far-2$'
-expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 --out named --quiet
-has "${pod}this run has not measured it: near the surface it may be worse\$"
-has '^              sdmgen train far\.yaml train\.minutes=0\.02 network\.kind=pod --out named-2$'
-
-# A good model with a small error: the command mends the first use that it leaves out.
-expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 grid.spacing=0.3 --out fine --quiet
-has '^  better      sdmgen train far\.yaml network\.kind=template train\.minutes=0\.02 grid=auto grid\.spacing=0\.1[0-9]+ --out fine-2$'
-has '^              \(for volumes of surfaces, which `not for` leaves out: [0-9.]+ times the voxels; nothing else needs to change: the error at the surface is 0\.01[0-9]* voxels\)$'
-
-# A template that saves little time against exact maps: the line names pod, and what is known of it.
-expect 0 - sdmgen train far.yaml network.kind=template shape.options.edge=2 shape.options.links=1 grid.spacing=0.05 data.holdout=2 --out large --quiet
-if grep -oE '[0-9.]+ times as long' out | head -1 | awk '{ exit !($1 < 2.99) }'; then
-    has '^  slow        exact maps take only [0-9.]+ times as long as this template: the network saves little time; pod may take far less; this run has not measured it$'
-    [ "$(grep -c 'network.kind=pod --out large-2' out)" -eq 1 ] || bad "the command for pod: $(cat out)"
-fi
-
-# auto: the command names the kind that was kept and the cost of its maps; that of the other kind is in its line and in the JSON.
-expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 data.holdout=12 --out both --quiet
-has '^  auto        trained (pod|template), too \((good|usable|poor)\): RMSE .*, [0-9.e-]+ ms a map.*; its model is both/model-(pod|template)\.sdm$'
-other=$(sed -n 's/.*; its model is //p' out)
-present "$other"
-expect 0 - sdmgen info "$other" --quiet
-# each figure of the end stands there once
-sdmgen train link.yaml data.start=300 data.memory_gb=6 data.holdout=12 --out both --force --quiet >out 2>err || bad "both: $(cat err)"
-has '^  held out    12 shapes: RMSE [0-9.]+ mm \([0-9.]+ voxels\), MSE [0-9.e-]+ mm\^2; within a voxel of the surface [0-9.]+ mm \([0-9.]+ voxels\); Dice [0-9.]+, smallest [0-9.]+$'
-has '^  by distance within two voxels \(0\.68 mm\) of the surface [0-9.]+ mm, '
-has '^  derivatives by the parameters, of [0-9]+ shapes: .*, of volumes as `not for` says$'
-has '^  (next|better) +sdmgen train link.yaml .*network.kind=(pod|template) --out both-2$'
-has '^              \(the kind stays (pod|template)(, with which a map takes [0-9.e-]+ ms)?; without network\.kind=(pod|template) the run chooses a kind again[;)]'
-rm -r both
-expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 --out both --quiet --json
-has '"other": \{"kind": "(pod|template)", .*"ms_network": [0-9.e-]+, "grade": "[a-z]+", "model": "both/model-(pod|template)\.sdm"\}'
-sdmgen train link.yaml data.start=300 data.memory_gb=6 train.steps=0 train.minutes=0.0001 --out both --force >out 2>err || bad "hurried: $(cat err)"
-grep -Eq '^sdmgen: [0-9.e+]+ exact maps a second: about 0 fit into their part of train\.minutes \(0\.0001\); [0-9] parameters? asks? for [0-9]+; if too few limit the model, the last lines of the run name the train\.minutes for more$' err ||
-    bad "no word about the pace of maps: $(cat err)"
-grep -Eq '^sdmgen: auto: trials of both kinds would take about [0-9.]+ s, and a fifth of train\.minutes is 0\.0012 s: template alone has one \(for both raise train\.minutes to [0-9.]+\)$' err ||
-    bad "no word about the trials ahead: $(cat err)"
-# the budget is too short for a trial of the other kind: the verdict says so, and the command trains that kind
-has '^  verdict     network\.kind: auto had no time left to train pod, too: pod may be better than template, near the surface, too\. '
-[ "$(grep -c 'nothing to change\|has not measured it' out)" -eq 0 ] || bad "an unfinished comparison: $(cat out)"
-has '^  (next|better) +sdmgen train link\.yaml .*train\.minutes=[0-9.]+ network\.kind=pod --out both-2$'
-grep -q 'train\.minutes=0\.0001 network' out && bad "minutes that did not suffice: $(cat out)"
-has '^              \(auto had no time left for pod; train\.minutes=[0-9.]+ with auto compares both\)$'
-rm -r both
-expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 --out both --quiet --json
-# A model that --force replaces is compared if its shape, ranges and grid are the same. With the kind given, the command names none.
-grep -q before_rmse_mm out && bad 'a model before the first one'
-before=$(json rmse_mm)
-expect 0 - sdmgen train link.yaml network.kind=pod data.start=300 data.memory_gb=6 network.rank=1 --out both --force --quiet
-has "^  before      RMSE $(printf %.5f "$before") -> [0-9.]+ mm \(worse\)$"
-has '^  (next|better) '
-grep -q 'the kind stays' out && bad "the kind was given: $(cat out)"
-expect 0 - sdmgen train link.yaml network.kind=pod data.start=300 data.memory_gb=6 network.rank=1 --out both --force --quiet
-has '^  before      RMSE ([0-9.]+) -> \1 mm \(equal\)$'
-for other in grid.spacing=0.35 'shape.ranges.q1=[-0.4,0.4]' shape.options.edge=0.6; do
-    expect 0 - sdmgen train link.yaml network.kind=pod data.start=300 data.memory_gb=6 network.rank=1 "$other" --out both --force --quiet
-    grep -q '^  before ' out && bad "compared with another shape or grid: $(cat out)"
-done
-
-# Keys that a template without a correction does not need: told, by kind.
-sdmgen train link.yaml network.kind=template --out vain >out 2>err || bad "vain: $(cat err)"
-grep -q '^sdmgen: the template needs no training, so these keys have no effect: network.width, .*, network.degree, data.online, ' err || bad "vain keys: $(cat err)"
 
 # A grid that is fitted to the shapes: an interrupted run goes on with the same one, and the model has its numbers.
 interrupted fitted "$tiny" grid.voxels=16

@@ -31,9 +31,20 @@ static void compare_with_brute_force(const sdm_mesh *m, sdm_grid g, double band_
     const size_t n = sdm_grid_count(&g);
     float *values = malloc(n * sizeof *values);
     uint32_t *triangle = malloc(n * sizeof *triangle);
-    assert_true(values && triangle);
+    double *truth = malloc(n * sizeof *truth), *rounding = malloc(n * sizeof *rounding);
+    assert_true(values && triangle && truth && rounding);
     double largest = 1e-300;
     for (size_t i = 0; i < 3 * m->n_vert; i++) largest = fmax(largest, fabs(m->vert[i]));
+    for (size_t i = 0; i < n; i++) {
+        const size_t nx = (size_t)g.n[0], ny = (size_t)g.n[1];
+        const double index[3] = {(double)(i % nx), (double)(i / nx % ny), (double)(i / nx / ny)};
+        double x[3];
+        sdm_grid_world(&g, index, x);
+        truth[i] = fabs(sdm_naive_point(m, x));
+        rounding[i] = largest;
+        for (int a = 0; a < 3; a++) rounding[i] = fmax(rounding[i], fabs(x[a]));
+        rounding[i] = 32 * DBL_EPSILON * rounding[i] + 1e-7 * truth[i];
+    }
     for (int level = 0; level <= sdm_processor_select(-1); level++) {
         sdm_error err = {0};
         sdm_exact *e;
@@ -44,22 +55,14 @@ static void compare_with_brute_force(const sdm_mesh *m, sdm_grid g, double band_
             .values = values, .triangle = triangle, .band_mm = band_mm};
         if (sdm_exact_map_layers(e, &g, &layers, &err)) fail_msg("%s", err.text);
         for (size_t i = 0; i < n; i++) {
-            const size_t nx = (size_t)g.n[0], ny = (size_t)g.n[1];
-            double x[3], size = largest;
-            sdm_grid_world(
-                &g,
-                (const double[3]){(double)(i % nx), (double)(i / nx % ny), (double)(i / nx / ny)},
-                x);
-            double d = fabs(sdm_naive_point(m, x));
-            for (int a = 0; a < 3; a++) size = fmax(size, fabs(x[a]));
-            const double rounding = 32 * DBL_EPSILON * size + 1e-7 * d;
+            double d = truth[i];
             if (band_mm > 0 && d >= band_mm) {
-                if (d - band_mm > rounding) assert_true(triangle[i] == UINT32_MAX);
+                if (d - band_mm > rounding[i]) assert_true(triangle[i] == UINT32_MAX);
                 d = band_mm;
-            } else if (band_mm > 0 && band_mm - d > rounding) {
+            } else if (band_mm > 0 && band_mm - d > rounding[i]) {
                 assert_true(triangle[i] < sdm_exact_surface(e)->n_tri);
             }
-            if (!(fabs(fabs((double)values[i]) - d) <= rounding))
+            if (!(fabs(fabs((double)values[i]) - d) <= rounding[i]))
                 fail_msg("level %d, voxel %zu: %.9g, brute force %.9g", level, i, (double)values[i],
                          d);
         }
@@ -67,6 +70,8 @@ static void compare_with_brute_force(const sdm_mesh *m, sdm_grid g, double band_
     }
     (void)sdm_processor_select(-1);
     free(values);
+    free(truth);
+    free(rounding);
     free(triangle);
 }
 

@@ -304,7 +304,7 @@ static void test_edt_bound_covers_missed_parts(void **state)
         float *v = map_of(edt, &m, &g, NULL, &unseen);
         assert_non_null(v);
         double worst = 0;
-        for (size_t k = 0; k < sdm_grid_count(&g); k++)
+        for (size_t k = 0; k < sdm_grid_count(&g); k += 7) // places all over the grid of 30^3
             worst = fmax(worst, fabs(fabs((double)v[k]) - fabs(brute_force_at_voxel(&m, &g, k))));
         assert_true(worst <= unseen.error_bound_mm && unseen.error_bound_mm < worst + 0.6);
         assert_true(i == 2 ? unseen.error_bound_mm == seen.error_bound_mm : worst > 1);

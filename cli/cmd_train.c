@@ -214,15 +214,17 @@ static void share_threads(const cli_args *args, sdm_config *config)
     if (args->ranks > 1 && !config->threads) config->threads = n > 1 ? n : 1;
 }
 
-/* Refuses options that do nothing in a plan. */
+/* Refuses options that do nothing in a plan, but --out, which every advised command has. */
 static sdm_status check_plan(const cli_args *args, sdm_error *err)
 {
     const struct {
         const char *name;
         bool given;
-    } options[] = {{"--ranks", args->ranks > 0},       {"--resume", args->resume},
-                   {"--force", args->force},           {"--out", args->out != NULL},
-                   {"--report", args->report != NULL}, {"--dataset", args->dataset != NULL}};
+    } options[] = {{"--ranks", args->ranks > 0},
+                   {"--resume", args->resume},
+                   {"--force", args->force},
+                   {"--report", args->report != NULL},
+                   {"--dataset", args->dataset != NULL}};
     for (size_t i = 0; i < sizeof options / sizeof *options; i++)
         if (options[i].given)
             return sdm_fail(err, SDM_E_ARG, "--plan trains nothing: leave out %s", options[i].name);

@@ -193,8 +193,13 @@ void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_ti
         return;
     }
     // the line `next` has the command
-    if (args->files.n && !r->unfinished && !sdm_verdict_needs_pod(&r->verdict))
-        print_command("              ", args, r, &pod, "pod");
+    if (!args->files.n || r->unfinished || sdm_verdict_needs_pod(&r->verdict) ||
+        !print_command("              ", args, r, &pod, "pod"))
+        return;
+    // the pace of maps was not measured
+    if (!r->chosen)
+        printf("              (pod needs more maps, and may need more train.minutes: this command "
+               "with --plan tells how many)\n");
 }
 
 /* The line `next` of a template that errs near the surface. */
@@ -285,14 +290,15 @@ static double finer_factor(const sdm_verdict *v)
 }
 
 /* The part of a note about a command that leaves the kind open; "": the command names a kind. */
-static const char *open_note(const sdm_train_report *r, char text[160])
+static const char *open_note(const sdm_train_report *r, char text[200])
 {
     *text = '\0';
     if (is_open(r))
-        snprintf(text, 160,
+        snprintf(text, 200,
                  "network.kind stays auto: this run had no time to try %s, too; these "
-                 "train.minutes are enough to try both kinds; ",
-                 r->kind == SDM_NETWORK_POD ? "template" : "pod");
+                 "train.minutes are enough to try both kinds%s; ",
+                 r->kind == SDM_NETWORK_POD ? "template" : "pod",
+                 r->kind == SDM_NETWORK_POD ? ", network.kind=template alone takes less" : "");
     return text;
 }
 
@@ -319,7 +325,7 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
         return true;
     }
     if (!use || !(factor > 1 && factor <= FINER) || !args->files.n || args->dataset) return false;
-    char open[160];
+    char open[200];
     sdm_verdict finer = {.to = spacing,
                          .minutes = r->steps > 0 ? ceil(2 * factor * minutes) / 2 : 0};
     strcpy(finer.key, "grid.spacing");
@@ -336,7 +342,7 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
 static void print_note(const sdm_train_report *r, const char *kind, double ms_map)
 {
     const sdm_verdict *v = &r->verdict;
-    char open[160], unfit[SDM_MODEL_UNFIT], time[60] = "";
+    char open[200], unfit[SDM_MODEL_UNFIT], time[60] = "";
     sdm_text note = {0};
     sdm_verdict_unfit(v, unfit);
     // the maps of another grid take another time

@@ -358,7 +358,7 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
     if (!s) {
         const char *reason = decide(t, &l, &e[0], &e[1], done, out);
         // minutes for a later training of pod; where pod is trained now, its report has them
-        out->pod_minutes = out->kind[0] == SDM_NETWORK_POD || done ? 0 : pod_minutes;
+        out->pod_minutes = out->kind[0] == SDM_NETWORK_POD ? 0 : pod_minutes;
         const entrant *other = out->kind[0] == e[0].kind ? &e[1] : &e[0];
         out->tried_other = other->finished;
         // a kind that the shape does not allow, or that is not needed, has no trial later either

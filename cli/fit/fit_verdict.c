@@ -128,13 +128,31 @@ static bool untested(const sdm_fit_verdict *v)
     return x && x->grade == SDM_FIT_DOUBTFUL && isnan(x->limit);
 }
 
+/* Are all parameters at an end of their range there because the data do not determine them? */
+static bool bounds_are_open(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    for (size_t k = 0; k < f->n_params; k++)
+        if (r->at_bound && r->at_bound[k] && !(r->by_prior && r->by_prior[k])) return false;
+    return true;
+}
+
 /* Is the fit doubtful, and only because the data show a part of the shape? */
 static bool only_a_part(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
-    static const sdm_fit_check_kind part[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA};
+    static const sdm_fit_check_kind part[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA,
+                                              SDM_FIT_CHECK_BOUNDS};
     return v->grade == SDM_FIT_DOUBTFUL &&
-           only(v, SDM_FIT_DOUBTFUL, part, sizeof part / sizeof *part) && cli_fit_knows_usable(f);
+           only(v, SDM_FIT_DOUBTFUL, part, bounds_are_open(f) ? 3 : 2);
+}
+
+/* Does the line `use` name the values that can be used? Through a network it does not: where the
+ * data show nothing, the errors of its map pass for data. */
+static bool tells_usable(const cli_fit *f)
+{
+    const bool network = f->model_path && !f->args->fit.exact && !f->args->fit.polish;
+    return only_a_part(f) && cli_fit_knows_usable(f) && !network;
 }
 
 /* What a verdict that is not `passed` means for the user of the values. */
@@ -142,7 +160,6 @@ static const char *in_short(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
     static const sdm_fit_check_kind end[] = {SDM_FIT_CHECK_CONVERGED},
-                                    part[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA},
                                     few[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA,
                                              SDM_FIT_CHECK_RESIDUALS},
                                     maps[] = {SDM_FIT_CHECK_VOXELS, SDM_FIT_CHECK_NETWORK_ERROR,
@@ -155,10 +172,13 @@ static const char *in_short(const cli_fit *f)
         return only(v, SDM_FIT_FAILED, end, 1)
                    ? "do not use the values: the fit has not come to an end"
                    : "do not use the values: the data contradict them or do not decide";
-    if (only_a_part(f))
+    if (tells_usable(f))
         return "the data show a part of the shape: the line `use` names the values that can be "
                "used";
-    if (only(v, SDM_FIT_DOUBTFUL, part, sizeof part / sizeof *part))
+    if (only_a_part(f) && cli_fit_knows_usable(f))
+        return "the data show a part of the shape; where they show nothing, errors of the network "
+               "may pass for data: --polish tells the values that can be used";
+    if (only_a_part(f))
         return "the data show a part of the shape: do not use what the lines below name, nor what "
                "is `not determined`";
     if (untested(v) && only(v, SDM_FIT_DOUBTFUL, few, sizeof few / sizeof *few))
@@ -209,7 +229,7 @@ void cli_fit_print_verdict(const cli_fit *f)
     if (cli_fit_start_is_suspect(f) && f->opts.turns == SDM_FIT_TURNS_NONE &&
         !isnan(f->args->pose.rotation[0]))
         printf("  --rotation gives one start: without it the fit tries 60 rotations\n");
-    if (only_a_part(f)) cli_fit_print_usable(f);
+    if (tells_usable(f)) cli_fit_print_usable(f);
 }
 
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *j)
@@ -230,7 +250,7 @@ void cli_fit_json_verdict(const cli_fit *f, sdm_json *j)
     }
     sdm_json_close(j, ']');
     if (v->n_findings && v->grade != SDM_FIT_PASSED) sdm_json_text(j, "in_short", in_short(f));
-    if (only_a_part(f)) cli_fit_json_usable(f, j);
+    if (tells_usable(f)) cli_fit_json_usable(f, j);
     sdm_json_close(j, '}');
     if (!f->mirror) return;
     sdm_json_open(j, "mirror", '{');

@@ -166,7 +166,8 @@ static void kind_stays_open(void **state)
         assert_string_equal(text, expected);
         assert_string_equal(second,
                             "              (network.kind stays auto: this run had no time to try "
-                            "template, too; these train.minutes are enough to try both kinds)\n");
+                            "template, too; these train.minutes are enough to try both kinds, "
+                            "network.kind=template alone takes less)\n");
         // a kind that was tried needs no other trial
         r.tried = true;
         next_lines(&r, 2, text, second);
@@ -197,7 +198,7 @@ static void finer_grid_leaves_kind_open(void **state)
                               "train.minutes=84 --out run-2\n");
     assert_string_equal(second, "              (network.kind stays auto: this run had no time to "
                                 "try template, too; these train.minutes are enough to try both "
-                                "kinds; for derivatives "
+                                "kinds, network.kind=template alone takes less; for derivatives "
                                 "of the volume, which `not for` leaves out: 8 times the voxels; "
                                 "nothing else needs to change: the error at the surface is 0.01 "
                                 "voxels)\n");

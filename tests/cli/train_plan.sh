@@ -76,10 +76,13 @@ grep -q '^  refine' out && bad 'steps of a template without a correction'
 expect 2 '--nodes and --cores belong to --plan' sdmgen train "$tiny" --nodes 2
 expect 2 "'0'" sdmgen train "$tiny" --plan --nodes 0
 # Options of a training do nothing here. A grid that cuts the shapes is told, as train does.
-for option in '--ranks 2' --resume --force '--out run' '--report page.html' '--dataset maps'; do
+for option in '--ranks 2' --resume --force '--report page.html' '--dataset maps'; do
     # shellcheck disable=SC2086
     expect 2 "^sdmgen: error: --plan trains nothing: leave out ${option%% *}\$" sdmgen train template.yaml --plan $option
 done
+# but for the folder of an advised command
+expect 0 - sdmgen train template.yaml --plan --out planned -q
+[ ! -e planned ] || bad '--plan makes a folder'
 cuts='warning: over the parameters the shape reaches from .*; the grid covers .* and cuts'
 expect 0 "$cuts" sdmgen train template.yaml 'grid.size=[8,8,8]' --plan -q
 # So does a run that is to go on, but begins, as there is no checkpoint.

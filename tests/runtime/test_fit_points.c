@@ -109,7 +109,9 @@ static double *points_of(const sdm_instance *shape, const double *p, double bump
     return x;
 }
 
-static sdm_fit_result fit_points(const sdm_instance *shape, const double *x, size_t n)
+// kept_sd: the standard deviation of the points as given and kept; 0: it is estimated
+static sdm_fit_result fit_keeping(const sdm_instance *shape, const double *x, size_t n,
+                                  double kept_sd)
 {
     const sdm_fit_source s = {
         .shape = shape,
@@ -119,10 +121,16 @@ static sdm_fit_result fit_points(const sdm_instance *shape, const double *x, siz
     o.start_pose = POSE;
     o.start_pose.translation[0] += 0.4, o.start_pose.rotation[1] += 0.15;
     o.n_threads = 2;
+    if (kept_sd > 0) o.point_sd = kept_sd, o.keep_appearance = true;
     sdm_fit_result r;
     sdm_error err = {0};
     if (sdm_fit(&s, &t, &o, &r, &err)) fail_msg("%s", err.text);
     return r;
+}
+
+static sdm_fit_result fit_points(const sdm_instance *shape, const double *x, size_t n)
+{
+    return fit_keeping(shape, x, n, 0);
 }
 
 static void test_shapes_are_found(void **state)
@@ -278,6 +286,30 @@ static void test_sparse_points_raise_no_doubt(void **state)
     sdm_instance_free(shape);
 }
 
+/* Points of another surface, in a fit that keeps their standard deviation: the fit is doubted where
+ * they lie farther off its surface than that. Without this figure, and with the right surface, it
+ * is not. */
+static void test_given_deviation_tests_the_fit(void **state)
+{
+    (void)state;
+    enum { N = 3000 };
+    const double noise = 0.02;
+    for (int bumpy = 0; bumpy < 2; bumpy++) {
+        double *x = points_of(ellipsoid, TRUTH, bumpy ? 0.04 : 0, N);
+        for (size_t k = 0; k < 3 * N; k++) x[k] += noise * sdm_rng_normal(7, 1, k);
+        sdm_fit_result r = fit_keeping(ellipsoid, x, N, noise);
+        const sdm_fit_finding *f = NULL;
+        for (size_t i = 0; i < r.verdict.n_findings; i++)
+            if (r.verdict.findings[i].kind == SDM_FIT_CHECK_RESIDUALS) f = &r.verdict.findings[i];
+        if (!f || (f->grade == SDM_FIT_PASSED) == bumpy)
+            fail_msg("bumpy %d: %g, limit %g: %s", bumpy, f ? f->figure : 0, f ? f->limit : 0,
+                     f ? f->text : "");
+        assert_true(!bumpy || strstr(f->text, "their standard deviation as given"));
+        sdm_fit_dispose(&r);
+        free(x);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -289,6 +321,7 @@ int main(void)
         cmocka_unit_test(test_sharp_edges_are_met),
         cmocka_unit_test(test_few_points_in_a_neighbourhood_raise_no_doubt),
         cmocka_unit_test(test_sparse_points_raise_no_doubt),
+        cmocka_unit_test(test_given_deviation_tests_the_fit),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

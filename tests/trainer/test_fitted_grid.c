@@ -230,6 +230,13 @@ static int foil_mesh(const void *self, const sdm_host *host, const sdm_option_va
     return scaled_plate(host, p, 20, out);
 }
 
+static int leaf_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                     const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    return scaled_plate(host, p, 2000, out);
+}
+
 // A part that needs over 96 voxels along the longest edge for two voxels across it gets them, up to
 // 400,000 in all; the line says what keeps the grid from being finer, and the key that makes it so.
 static void test_thinner(void **state)
@@ -237,24 +244,30 @@ static void test_thinner(void **state)
     (void)state;
     static const char text[] = "shape: {name: plate}\ntrain: {steps: 1}\n";
     sdm_error e = {0};
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < 3; k++) {
         sdm_shape thin = plate_shape;
         sdm_config c;
         sdm_text line = {0};
         sdm_instance *sheet = NULL;
-        thin.mesh = k ? foil_mesh : sheet_mesh;
+        thin.mesh = k > 1 ? leaf_mesh : k ? foil_mesh : sheet_mesh;
         if (sdm_instance_create(&thin, NULL, 0, NULL, &sheet, &e) ||
             sdm_config_parse("test.yaml", text, strlen(text), NULL, 0, &c, &e) ||
             sdm_train_complete(&c, sheet, &line, &e))
             fail_msg("%s", e.text);
         if (!k) assert_true(c.grid.n[0] > 96 && 2 * c.grid.spacing[0] <= 0.42);
         assert_true(sdm_grid_count(&c.grid) <= 400000);
-        if (!strstr(line.data, k ? "; at most 400,000 voxels in all; still finer with grid: "
-                                   "{spacing: 0.1"
-                                 : "; no more than two voxels across it, as the longest edge has "
-                                   "over 96; still finer with grid: {spacing: 0.1"))
+        const bool none = strstr(line.data, "; no grid shows the thinnest part, which is 0.4");
+        if (k > 1) {
+            if (!none || strstr(line.data, "{spacing: ")) fail_msg("%s", line.data);
+        } else if (!strstr(line.data,
+                           k ? "; at most 400,000 voxels in all; still finer with grid: "
+                               "{spacing: 0.1"
+                             : "; no more than two voxels across it, as the longest edge has "
+                               "over 96; still finer with grid: {spacing: 0.1"))
             fail_msg("%s", line.data);
-        assert_non_null(strstr(line.data, " times as many, which take as many times longer; maps"));
+        const char *price =
+            strstr(line.data, " times as many, which take as many times longer; maps");
+        assert_int_equal(price != NULL, k < 2);
         sdm_text_dispose(&line);
         sdm_instance_free(sheet);
     }

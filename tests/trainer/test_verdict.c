@@ -267,6 +267,7 @@ static void static_grid_took_the_time(void **state)
         trainer_verdict_decide(&in, &v);
         if (!strstr(v.sentence, cases[i].change)) fail_msg("case %zu: %s", i, v.sentence);
         assert_int_equal(strstr(v.sentence, "The static grid took most") == v.sentence, i < 5);
+        assert_int_equal(strstr(v.sentence, "fewer than 500 steps") != NULL, cases[i].steps < 500);
     }
 }
 

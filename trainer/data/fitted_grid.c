@@ -133,6 +133,25 @@ static sdm_status check_spacing(const sdm_config *config, const family *f, sdm_e
                     config->file, finest, longest, voxels, COUNT_LIMIT, metres);
 }
 
+/* Appends the spacing for the thinnest part, `thick` mm, with its price; or that no grid shows it.
+ * limit: what keeps the grid coarser; finer: it has become finer for this part. */
+static void propose_finer(const sdm_config *config, size_t n_params, const sdm_grid *grid,
+                          const char *limit, bool finer, double thick, sdm_text *line)
+{
+    const double advised = thick / SDM_GRID_THIN_VOXELS,
+                 voxels = pow(grid->spacing[0] / advised, 3) * (double)sdm_grid_count(grid);
+    if (!(voxels <= COUNT_LIMIT)) {
+        sdm_text_add(line,
+                     "; %s; no grid shows the thinnest part, which is %.2g mm thick: is one of its "
+                     "lengths 0, or not in mm?",
+                     limit, thick);
+        return;
+    }
+    sdm_text_add(line, "; %s; %s with grid: {spacing: %.2g}", limit,
+                 finer ? "still finer" : "finer for the thinnest part", advised);
+    sdm_train_add_price(config, n_params, grid, advised, line);
+}
+
 sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm_text *line,
                               sdm_error *err)
 {
@@ -170,10 +189,7 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
                      "; voxels of %.3g mm in place of %.3g, because the thinnest part of %d random "
                      "shapes is %.2g mm thick (grid.voxels: %d for the coarser grid)",
                      grid.spacing[0], usual, THIN_SAMPLES, thick, SDM_GRID_VOXELS);
-    if (limit)
-        sdm_text_add(line, "; %s; %s with grid: {spacing: %.2g}", limit,
-                     finer ? "still finer" : "finer for the thinnest part", advised);
-    if (limit) sdm_train_add_price(config, n_params, &grid, advised, line);
+    if (limit) propose_finer(config, n_params, &grid, limit, finer, thick, line);
     return line->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
 }
 

@@ -71,7 +71,10 @@ static const char *advise_static(const verdict_input *in, sdm_verdict *v)
     int64_t fewer = most - 1;
     while (fewer > 1 && pow((double)fewer, in->n_params) > in->maps / 3) fewer--;
     advise(v, "data.static", (double)most, fewer > 1 ? (double)fewer : 0);
-    return "The static grid took most of the time for maps. This limits the model";
+    return in->steps < FEW_STEPS ? "The static grid took most of the time for maps, so that the "
+                                   "training made fewer than 500 steps. This limits the model"
+                                 : "The static grid took most of the time for maps. This limits "
+                                   "the model";
 }
 
 /* The network leaves much of training maps: it was trained too shortly or is too small. */

@@ -120,6 +120,37 @@ sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, do
     return SDM_OK;
 }
 
+/* The distances of the points from the surface beside their standard deviation as given. */
+typedef struct given_scatter {
+    double rms;         /* mm */
+    double over, limit; /* mean square over that variance, and what chance gives */
+} given_scatter;
+
+/* together: so many points share their error. */
+static given_scatter scatter_of(const fit_problem *p, double together)
+{
+    const sdm_model *model = fit_maps_direct(&p->maps) ? NULL : p->source->model;
+    // the errors of a network belong to the distances, too
+    const double network = model ? sdm_model_get_info(model)->accuracy.rmse_near_mm : 0;
+    // the sum of the squares of n - unknowns normal errors
+    double sum = 0;
+    for (size_t i = 0; i < p->samples.n; i++) sum += p->samples.field[i] * p->samples.field[i];
+    const double free = fmax((double)p->samples.n - (double)free_unknowns(p), 1);
+    return (given_scatter){
+        .rms = sqrt(sum / free),
+        .over = sum / free / (p->state.point_sd * p->state.point_sd + network * network),
+        .limit = 1 + BY_CHANCE * sqrt(2 * together / free)};
+}
+
+static void add_scatter(given_scatter g, sdm_fit_verdict *v)
+{
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, g.over <= g.limit, SDM_FIT_DOUBTFUL, g.over,
+                      g.limit,
+                      "the points lie %.2g mm off the surface, %.2g times their standard deviation "
+                      "as given: another shape, or it is larger",
+                      g.rms, sqrt(g.over));
+}
+
 void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v)
 {
     if (!p->opts->keep_appearance) {
@@ -130,16 +161,15 @@ void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v)
                           "(sdm_fit_opts.keep_appearance)");
         return;
     }
-    // the sum of the squares of n - unknowns normal errors
-    double sum = 0;
-    for (size_t i = 0; i < p->samples.n; i++) sum += p->samples.field[i] * p->samples.field[i];
-    const double free = fmax((double)p->samples.n - (double)free_unknowns(p), 1),
-                 over = sum / free / (p->state.point_sd * p->state.point_sd),
-                 limit = 1 + BY_CHANCE * sqrt(2 / free);
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, over <= limit, SDM_FIT_DOUBTFUL, over, limit,
-                      "the points lie %.2g mm off the surface, %.2g times their standard deviation "
-                      "as given: another shape, or it is larger",
-                      sqrt(sum / free), sqrt(over));
+    add_scatter(scatter_of(p, 1), v);
+}
+
+bool sdm_fit_doubt_given_scatter(const fit_problem *p, sdm_fit_verdict *v)
+{
+    const given_scatter g = scatter_of(p, fmax(p->noise_factor, 1));
+    if (!p->opts->keep_appearance || g.over <= g.limit) return false;
+    add_scatter(g, v);
+    return true;
 }
 
 /* What the fitted shape needs: measured at the shape itself, where it is known. */

@@ -295,7 +295,7 @@ static const char *open_note(const sdm_train_report *r, char text[200])
     *text = '\0';
     if (is_open(r))
         snprintf(text, 200,
-                 "network.kind stays auto: this run had no time to try %s, too; these "
+                 "network.kind stays auto: this run had no time to try %s, too; at its pace these "
                  "train.minutes are enough to try both kinds%s; ",
                  r->kind == SDM_NETWORK_POD ? "template" : "pod",
                  r->kind == SDM_NETWORK_POD ? ", network.kind=template alone takes less" : "");

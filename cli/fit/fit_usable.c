@@ -75,7 +75,10 @@ static bool is_usable(const cli_fit *f, size_t k)
     const sdm_fit_result *r = &f->result;
     size_t length = 0;
     const char *list = covered_names(f, &length);
-    return !r->by_prior[k] && !r->at_bound[k] &&
+    // the range alone says as much: this is the standard deviation of a uniform distribution over
+    // it
+    const bool vague = r->sd[k] > (f->params[k].max - f->params[k].min) / sqrt(12);
+    return !r->by_prior[k] && !r->at_bound[k] && !vague &&
            !(list && is_among(f->params[k].name, list, length));
 }
 

@@ -4,7 +4,7 @@
 # Tests: check.c cmd_generate.c
 . "$(dirname "$0")/common.sh"
 coarse_grids=yes
-model=../files-of-train/run/model.sdm
+model=../files-of-trained/run/model.sdm
 present $model
 grid=(--size 16,14,12 --spacing 0.9)
 

@@ -3,7 +3,7 @@
 # make_labyrinth. Third argument: the build folder to install from.
 build=$3
 . "$(dirname "$0")/common.sh"
-model=../files-of-train/run/model.sdm
+model=../files-of-trained/run/model.sdm
 
 cmake --install "$build" --prefix "$PWD/prefix" >log 2>&1 || bad "install: $(tail -n 3 log)"
 present prefix/bin/sdmgen prefix/share/man/man1/sdmgen.1 prefix/share/bash-completion/completions/sdmgen \

@@ -2,7 +2,7 @@
 # sdmgen generate on other grids than the model's: size, spacing, origin, direction, bands without whole maps, grids that leave the box.
 # Tests: bench_field.c cmd_generate.c model_grid.c
 . "$(dirname "$0")/common.sh"
-model=../files-of-train/run/model.sdm
+model=../files-of-trained/run/model.sdm
 present $model
 
 # crc OPTION...: the checksum of the values of the map

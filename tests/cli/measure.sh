@@ -3,7 +3,7 @@
 # Tests: fit_measures.c measures.c
 . "$(dirname "$0")/common.sh"
 export OMP_WAIT_POLICY=passive
-model=../files-of-train/run/model.sdm
+model=../files-of-trained/run/model.sdm
 present $model
 
 # Removes lines of progress from stderr; they appear only when the machine is slow.

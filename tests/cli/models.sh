@@ -2,7 +2,7 @@
 # sdmgen generate, info, eval and verify on a trained model: outputs, parameters, tables of parameters, damaged files.
 # Tests: cmd_eval.c cmd_generate.c cmd_info.c cmd_verify.c evaluate.c evaluate_time.c median.c model_grade.c other_file.c param_rows.c
 . "$(dirname "$0")/common.sh"
-model=../files-of-train/run/model.sdm
+model=../files-of-trained/run/model.sdm
 present $model
 
 expect 0 - sdmgen info $model

@@ -80,7 +80,7 @@ expect 4 - host_without_notices SdmgenFit image=ct.nrrd surface=no.ply inside=50
 grep -q 'the image shows no such shape' errors || bad "no reason: $(cat errors)"
 absent no.ply
 
-model=../files-of-train/run/model.sdm
+model=../files-of-trained/run/model.sdm
 present $model
 expect 0 'warning: c.vtp: the surface encloses .* less than the shape' host SdmgenGenerate model=$model param=a=4.2 surface=c.vtp distances=c.nrrd
 has '^parameters: *a=4\.2 '

@@ -164,10 +164,10 @@ static void kind_stays_open(void **state)
         snprintf(expected, sizeof expected, "  next        sdmgen train can.yaml %s --out run-2\n",
                  cases[i].changes);
         assert_string_equal(text, expected);
-        assert_string_equal(second,
-                            "              (network.kind stays auto: this run had no time to try "
-                            "template, too; these train.minutes are enough to try both kinds, "
-                            "network.kind=template alone takes less)\n");
+        assert_string_equal(
+            second, "              (network.kind stays auto: this run had no time to try "
+                    "template, too; at its pace these train.minutes are enough to try both kinds, "
+                    "network.kind=template alone takes less)\n");
         // a kind that was tried needs no other trial
         r.tried = true;
         next_lines(&r, 2, text, second);
@@ -196,12 +196,13 @@ static void finer_grid_leaves_kind_open(void **state)
     next_lines(&r, 2, text, second);
     assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.5 "
                               "train.minutes=84 --out run-2\n");
-    assert_string_equal(second, "              (network.kind stays auto: this run had no time to "
-                                "try template, too; these train.minutes are enough to try both "
-                                "kinds, network.kind=template alone takes less; for derivatives "
-                                "of the volume, which `not for` leaves out: 8 times the voxels; "
-                                "nothing else needs to change: the error at the surface is 0.01 "
-                                "voxels)\n");
+    assert_string_equal(second,
+                        "              (network.kind stays auto: this run had no time to "
+                        "try template, too; at its pace these train.minutes are enough to try both "
+                        "kinds, network.kind=template alone takes less; for derivatives "
+                        "of the volume, which `not for` leaves out: 8 times the voxels; "
+                        "nothing else needs to change: the error at the surface is 0.01 "
+                        "voxels)\n");
 }
 
 // A key that the verdict names for the error may leave the uses in `not for` as they are: the note

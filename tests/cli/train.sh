@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# sdmgen train: the run folder and its protection, interrupt and resume. The tests of models use the run made here.
+# sdmgen train: the run folder and its protection, interrupt and resume.
 # train_advice.sh: the verdict and the command for the next training. Tests: cmd_train.c map_time.c train_progress.c
 . "$(dirname "$0")/common.sh"
 coarse_grids=yes

@@ -136,10 +136,10 @@ static given_scatter scatter_of(const fit_problem *p, double together)
     double sum = 0;
     for (size_t i = 0; i < p->samples.n; i++) sum += p->samples.field[i] * p->samples.field[i];
     const double free = fmax((double)p->samples.n - (double)free_unknowns(p), 1);
-    return (given_scatter){
-        .rms = sqrt(sum / free),
-        .over = sum / free / (p->state.point_sd * p->state.point_sd + network * network),
-        .limit = 1 + BY_CHANCE * sqrt(2 * together / free)};
+    return (given_scatter){.rms = sqrt(sum / free),
+                           .over = sum / free /
+                                   (p->state.point_sd * p->state.point_sd + network * network),
+                           .limit = 1 + BY_CHANCE * sqrt(2 * together / free)};
 }
 
 static void add_scatter(given_scatter g, sdm_fit_verdict *v)

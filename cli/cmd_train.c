@@ -162,7 +162,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         printf("  warnings    %zu, at the beginning of the output%s\n", cli_warnings(),
                v->cut > 0 || v->inside_out > 0 || v->triangles_by[0] || sdm_verdict_lacks_part(v)
                    ? ""
-                   : ": the verdict does not know what they name, mend it first");
+                   : ": mend what they name first, the lines above leave it out");
     return SDM_OK;
 }
 

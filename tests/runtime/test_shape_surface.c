@@ -336,7 +336,7 @@ static void network_error_text(const sdm_fit_result *r)
         return;
     }
     assert_true(fabs(r->network_error / alone / r->network_error_sd - 1) < 1e-6);
-    snprintf(by, sizeof by, "by about %.2g mm, %.2g times its standard deviation without this",
+    snprintf(by, sizeof by, "by about %.2g mm, %.2g times the standard deviation by the data alone",
              r->network_error, r->network_error_sd);
     if (!strstr(x->text, by)) fail_msg("not '%s': %s", by, x->text);
 }

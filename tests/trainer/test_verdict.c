@@ -209,9 +209,9 @@ static void patience_left_time(void **state)
                                  "number limits the model (100 % of the mean square error): raise "
                                  "train.minutes from 2 to 4"),
                          early);
-        assert_int_equal(strstr(v.sentence, "Half of the budget is for maps and ended before "
-                                            "data.start of them were made; the steps did not need "
-                                            "all of theirs (train.patience). The number of maps "
+        assert_int_equal(strstr(v.sentence, "Half of the budget is for maps, too little for "
+                                            "data.start of them; the steps ended before the other "
+                                            "half did (train.patience). The number of maps "
                                             "limits the model (100 % of the mean square error): "
                                             "raise train.minutes") != NULL,
                          early);

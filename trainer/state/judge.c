@@ -123,9 +123,9 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
     if (in->cut) {
         advise_budget(in, v);
         return in->ended_early
-                   ? "Half of the budget is for maps and ended before data.start of them were "
-                     "made; the steps did not need all of theirs (train.patience). The number of "
-                     "maps limits the model"
+                   ? "Half of the budget is for maps, too little for data.start of them; the "
+                     "steps ended before the other half did (train.patience). The number of maps "
+                     "limits the model"
                    : "The time for maps was too short for data.start of them. Their number limits "
                      "the model";
     }

@@ -381,7 +381,7 @@ static void check_network_error(const fit_problem *p, fit_coarseness coarse, sdm
     char by[120] = ", which is at the end of its range";
     if (known)
         snprintf(by, sizeof by,
-                 " by about %.2g%s%s, %.2g times its standard deviation without this",
+                 " by about %.2g%s%s, %.2g times the standard deviation by the data alone",
                  r->network_error, *param->unit ? " " : "", param->unit, r->network_error_sd);
     char remedy[120] = "a polish with exact maps (sdm_fit_opts.max_polish_iterations) ends it";
     // a polish of points has exact distances, no maps
@@ -393,8 +393,8 @@ static void check_network_error(const fit_problem *p, fit_coarseness coarse, sdm
     }
     sdm_fit_judge_add(v, SDM_FIT_CHECK_NETWORK_ERROR, passed, SDM_FIT_DOUBTFUL,
                       known ? r->network_error_sd : NAN, known ? NETWORK_ERROR_MAX : NAN,
-                      "exact maps would move '%s'%s: the error of the network limits this fit, "
-                      "and the standard deviations contain an estimate of it; %s",
+                      "exact maps would move '%s'%s: the error of the network limits this fit; "
+                      "the printed standard deviations contain an estimate of it; %s",
                       param->name, by, remedy);
 }
 

@@ -87,8 +87,8 @@ has '^  in short +the data show a part of the shape; .*: --polish tells the valu
 grep -q '^  use ' out && bad "values to use by a network alone: $(cat out)"
 expect 0 - sdmgen fit link/model.sdm upper-arm.csv --rotation 0,0,0 --polish -o upper-arm.json --quiet
 has '^  in short +the data show a part of the shape: the line `use` names '
-has '^  use +q2; do not use q1$'
-tr -d '\n ' <upper-arm.json | grep -q '"usable":\["q2"\]' || bad "upper-arm.json: $(head -c 2000 upper-arm.json)"
+has '^  use +no parameter$'
+tr -d '\n ' <upper-arm.json | grep -q '"usable":\[\]' || bad "upper-arm.json: $(head -c 2000 upper-arm.json)"
 
 # Points of an arm of another thickness: voxels that pass their own check are no cause of residuals, and no other ones are advised.
 sdmgen phantom --shape linkage -O links=2 -O edge=0.5 -O radius=1.05 -O tip=0.5 --spacing 1 -o arm.nii --surface thick-arm.csv --surface-points 1000 \

@@ -4,7 +4,9 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -36,6 +38,20 @@ static void values_that_the_data_do_not_tell(void **state)
     cli_fit_json_usable(&f, &json);
     if (!strstr(json.text.data, "[\"radius\"]")) fail_msg("%s", json.text.data);
     sdm_json_dispose(&json);
+    // the line `use`
+    char line[128] = "";
+    FILE *file = tmpfile();
+    fflush(stdout);
+    const int before = dup(STDOUT_FILENO);
+    assert_true(file && before >= 0 && dup2(fileno(file), STDOUT_FILENO) >= 0);
+    cli_fit_print_usable(&f);
+    fflush(stdout);
+    dup2(before, STDOUT_FILENO);
+    close(before);
+    rewind(file);
+    if (!fgets(line, sizeof line, file)) line[0] = '\0';
+    fclose(file);
+    assert_string_equal(line, "  use          radius; do not use wall, neck, height, reach\n");
 }
 
 int main(void)

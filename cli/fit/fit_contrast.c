@@ -188,10 +188,7 @@ sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err)
     if (f->target.kind != SDM_FIT_IMAGE || f->args->fit.find) return SDM_OK;
     // the fit itself tells what a shape lacks that has no map
     if (measure_start(f, &in, &around, NULL)) return SDM_OK;
-    if (!(in.n > 0) || !(around.n > 0)) {
-        check_border(f);
-        return SDM_OK;
-    }
+    // NaN, of which no comparison holds, where the start lies beside the image
     const double a = in.sum / in.n, b = around.sum / around.n;
     const bool other = fabs(a - outside) < fabs(a - inside) && fabs(b - inside) < fabs(b - outside),
                clear = fabs(a - outside) < CLEARLY * fabs(a - inside) &&

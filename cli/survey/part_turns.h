@@ -13,7 +13,8 @@ typedef enum cli_turn_cause {
  * it is inside out. */
 typedef struct cli_turn_param {
     size_t param;
-    /* Around `value` it turns: above it the part is inside out, or (above: false) below. */
+    /* The part is inside out where the parameter is above `value`; above is false: below `value`.
+     */
     double value;
     bool above;
     /* Where it turns back, on the way from `value` to the end of the surveyed range. NaN: nowhere

@@ -89,7 +89,8 @@ void tell_params(teller *t)
     }
 }
 
-/* Meshes beside a value of a parameter that depend on the calls before. */
+/* Tells that the meshes just below and just above a value of parameter k depend on the calls of
+ * mesh() before them. */
 static void tell_state(teller *t, const sdm_survey_jump *j, size_t k)
 {
     sdm_text text = {0};

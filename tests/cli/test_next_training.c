@@ -6,11 +6,11 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <cmocka.h>
 
 #include "next_training.h"
+#include "oracle/captured.h"
 
 typedef struct printer {
     const sdm_train_report *r;
@@ -23,18 +23,13 @@ static void lines_of(printer p, char text[512], char second[512])
 {
     const char *words[] = {"can.yaml", "train.minutes=1"};
     const cli_args args = {.files = {.items = words, .n = 2}};
-    FILE *file = tmpfile();
-    fflush(stdout);
-    const int before = dup(STDOUT_FILENO);
-    assert_true(file && before >= 0 && dup2(fileno(file), STDOUT_FILENO) >= 0);
+    int before;
+    FILE *file = captured_begin(&before);
     if (p.times)
         cli_print_pod(&args, p.r, p.times, p.minutes);
     else
         cli_print_next(&args, p.r, "template", 1, p.minutes);
-    fflush(stdout);
-    dup2(before, STDOUT_FILENO);
-    close(before);
-    rewind(file);
+    captured_end(file, before);
     if (!fgets(text, 512, file)) text[0] = '\0';
     if (!fgets(second, 512, file)) second[0] = '\0';
     fclose(file);

@@ -6,11 +6,11 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <cmocka.h>
 
 #include "fit/fit_command.h"
+#include "oracle/captured.h"
 
 enum { N = 5 };
 
@@ -40,15 +40,10 @@ static void values_that_the_data_do_not_tell(void **state)
     sdm_json_dispose(&json);
     // the line `use`
     char line[128] = "";
-    FILE *file = tmpfile();
-    fflush(stdout);
-    const int before = dup(STDOUT_FILENO);
-    assert_true(file && before >= 0 && dup2(fileno(file), STDOUT_FILENO) >= 0);
+    int before;
+    FILE *file = captured_begin(&before);
     cli_fit_print_usable(&f);
-    fflush(stdout);
-    dup2(before, STDOUT_FILENO);
-    close(before);
-    rewind(file);
+    captured_end(file, before);
     if (!fgets(line, sizeof line, file)) line[0] = '\0';
     fclose(file);
     assert_string_equal(line, "  use          radius; do not use wall, neck, height, reach\n");

@@ -287,8 +287,7 @@ static void test_sparse_points_raise_no_doubt(void **state)
 }
 
 /* Points of another surface, in a fit that keeps their standard deviation: the fit is doubted where
- * they lie farther off its surface than that. Without this figure, and with the right surface, it
- * is not. */
+ * they lie farther off its surface than that. With the right surface it is not. */
 static void test_given_deviation_tests_the_fit(void **state)
 {
     (void)state;

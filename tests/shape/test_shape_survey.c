@@ -449,11 +449,12 @@ static void state_is_no_jump(void **state)
     sdm_shape_survey_dispose(&s);
 }
 
-/* A shape of three parameters that compares with some of them what it has kept. */
+/* A shape of three parameters whose mesh() keeps its last mesh, and gives it again if some of the
+ * parameters are those of the call before. */
 static const sdm_param KEPT_PARAMS[] = {
     {"a", "mm", 1, 2, 1.5, "x"}, {"b", "mm", 1, 2, 1.5, "y"}, {"c", "mm", 1, 2, 1.5, "z"}};
 static unsigned kept_compares; // bits of the parameters that are compared
-static double kept_near;       // a smaller difference is none
+static double kept_near;       // parameters that differ by less pass for equal
 static size_t kept_copies = 1; // of every triangle
 
 static int kept_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
@@ -476,8 +477,8 @@ static int kept_mesh(const void *self, const sdm_host *host, const sdm_option_va
 }
 
 // Of a cache the survey names a parameter that is not compared, whichever are, and finds one that
-// compares with a tolerance. A cache that compares all values is right. Of large meshes, of which
-// it makes fewer, it names the parameter, too.
+// compares with a tolerance. A cache that compares all values is right. The survey makes fewer of
+// large meshes, and names the parameter of their caches, too.
 static void caches_of_meshes(void **state)
 {
     (void)state;

@@ -10,7 +10,8 @@
 sdm_status sdm_survey_line(const shape_family *f, const double *p, size_t k, double size,
                            sdm_survey_jump *out, sdm_error *err);
 
-/* Sets *same: are the meshes on both sides of the break the same again when they are made in other
- * orders, and after the shape other[n_params]? p: as above. [one thread] */
+/* Makes the meshes just below and just above `value` of parameter k again: in the other order, and
+ * after the mesh of the shape other[n_params]. *same: all have the bits of the first time. p: as
+ * above. [one thread] */
 sdm_status sdm_survey_line_again(const shape_family *f, const double *p, size_t k,
                                  const double *other, double value, bool *same, sdm_error *err);

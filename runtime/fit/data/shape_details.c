@@ -98,7 +98,8 @@ static sdm_status shrink_balls(const details_places *p, double largest, double *
     return SDM_OK;
 }
 
-// Moves the centres of the largest balls to where they lie deepest. Returns the largest depth, mm.
+// Moves the centres of the largest balls step by step to places deeper inside the shape. *deepest:
+// the largest distance of one from the surface, mm.
 static sdm_status move_balls(const details_places *p, const double *radius, double *deepest,
                              sdm_error *err)
 {

@@ -20,7 +20,8 @@
 #define VOXEL_DIAGONAL 1.4142
 // from this edge on, over the radius of the largest ball inside, voxels miss the shape
 #define VOXEL_OVER_RADIUS_FAR 2
-// narrowest sd of the point spread that counts, over the voxels of the image
+// the point spread of an image has at least this standard deviation, in voxels of the image: a fit
+// may find a narrower one
 #define BLUR_OVER_IMAGE_VOXEL 0.5
 // parts that are thicker than this many voxels of the limit do not ask for it
 #define FINER_THAN_THIN 16
@@ -122,8 +123,9 @@ sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, do
 
 /* The distances of the points from the surface beside their standard deviation as given. */
 typedef struct given_scatter {
-    double rms;         /* mm */
-    double over, limit; /* mean square over that variance, and what chance gives */
+    double rms;   /* root mean square of the distances, mm */
+    double over;  /* mean square of the distances over the given variance */
+    double limit; /* of `over`: a right fit exceeds it once in a thousand times */
 } given_scatter;
 
 /* together: so many points share their error. */
@@ -166,8 +168,9 @@ void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v)
 
 bool sdm_fit_doubt_given_scatter(const fit_problem *p, sdm_fit_verdict *v)
 {
+    if (!p->opts->keep_appearance) return false;
     const given_scatter g = scatter_of(p, fmax(p->noise_factor, 1));
-    if (!p->opts->keep_appearance || g.over <= g.limit) return false;
+    if (g.over <= g.limit) return false;
     add_scatter(g, v);
     return true;
 }

@@ -14,8 +14,8 @@ sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, do
  * deviation that the options keep, else doubtful. */
 void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v);
 
-/* The same for points that lie near enough to each other, where the options keep their standard
- * deviation: adds the finding if they lie farther off the surface than that. Returns whether it
+/* Of any fit to points whose options keep the standard deviation of the points: adds the finding
+ * "residuals", doubtful, if the points lie farther off the surface than that. Returns whether it
  * did. */
 bool sdm_fit_doubt_given_scatter(const fit_problem *p, sdm_fit_verdict *v);
 

@@ -295,10 +295,10 @@ static const char *open_note(const sdm_train_report *r, char text[200])
     *text = '\0';
     if (is_open(r))
         snprintf(text, 200,
-                 "network.kind stays auto: this run had no time to try %s, too; at its pace these "
-                 "train.minutes are enough to try both kinds%s; ",
+                 "network.kind stays auto: this run had no time to try %s; at the pace of this run "
+                 "these train.minutes are enough to try both kinds%s; ",
                  r->kind == SDM_NETWORK_POD ? "template" : "pod",
-                 r->kind == SDM_NETWORK_POD ? ", network.kind=template alone takes less" : "");
+                 r->kind == SDM_NETWORK_POD ? "; network.kind=template alone needs less" : "");
     return text;
 }
 
@@ -317,11 +317,11 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
     sdm_verdict_unfit(v, unfit);
     if (v->grade != SDM_GRADE_GOOD || !(voxels < SMALL) || !strncmp(v->key, "grid.", 5))
         return false;
-    if (*named) snprintf(wait, sizeof wait, "%s, named by the verdict, can wait", named);
+    if (*named) snprintf(wait, sizeof wait, "%s can wait", named);
     if (!unfit[0]) {
-        printf(
-            "  better      %s: the error at the surface is %.2g voxels, and no use is left out\n",
-            *named ? wait : "nothing needs to change", voxels);
+        printf("  better      %s: the error at the surface is %.2g voxels, and there is no line "
+               "`not for`\n",
+               *named ? wait : "nothing needs to change", voxels);
         return true;
     }
     if (!use || !(factor > 1 && factor <= FINER) || !args->files.n || args->dataset) return false;
@@ -332,8 +332,8 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
     if (is_open(r)) finer = with_trials(r, &finer, factor);
     if (!print_command("  better      ", args, r, &finer, is_open(r) ? NULL : kind)) return false;
     printf(
-        "              (%sfor %s, which `not for` leaves out: %.2g times the voxels; %s: the error "
-        "at the surface is %.2g voxels)\n",
+        "              (%sthe finer grid is for %s, see `not for`; it has %.2g times the voxels; "
+        "%s, because the error at the surface is only %.2g voxels)\n",
         open_note(r, open), use, factor, wait, voxels);
     return true;
 }
@@ -347,16 +347,15 @@ static void print_note(const sdm_train_report *r, const char *kind, double ms_ma
     sdm_verdict_unfit(v, unfit);
     // the maps of another grid take another time
     if (strncmp(v->key, "grid.", 5))
-        snprintf(time, sizeof time, ", with which a map takes %.3g ms", ms_map);
+        snprintf(time, sizeof time, ", whose maps take %.3g ms", ms_map);
     if (is_open(r))
         sdm_text_add(&note, "%s", open_note(r, open));
     else if (kind && isfinite(ms_map))
-        sdm_text_add(&note,
-                     "the kind stays %s%s; without network.kind=%s the run chooses a kind again; ",
+        sdm_text_add(&note, "the kind stays %s%s; without network.kind=%s auto chooses again; ",
                      kind, time, kind);
     if (unfit[0] && strncmp(v->key, "grid.", 5))
-        sdm_text_add(&note, "this lowers the error of distances; the uses that `not for` names may "
-                            "need another change; ");
+        sdm_text_add(&note, "this change lowers the error of distances; the uses in `not for` may "
+                            "need another one; ");
     else if (v->derivatives_bad[0])
         sdm_text_add(&note, "derivatives of maps may need another change; ");
     if (!note.failed && note.size > 2)

@@ -454,11 +454,11 @@ sdm_status cli_check_trained(const cli_args *args, const sdm_model *m, const sdm
     for (size_t i = 0; i < n; i++)
         if (*sdm_unit_question(values[i], params[i].min, params[i].max, params[i].unit))
             return s; // the unit is to be mended, not the policy
-    const char *exact = exact_allows(args, m, values, &known)
-                            ? ", --policy exact computes exact maps"
-                        : known ? "; the range of the shape itself does not hold it either"
-                                : ", --policy exact computes exact maps if the shape is loaded "
-                                  "(--plugin FILE)";
+    const char *exact =
+        exact_allows(args, m, values, &known) ? ", --policy exact computes exact maps"
+        : known ? "; --policy exact does not help: the shape itself does not allow the value"
+                : ", --policy exact computes exact maps if the shape is loaded "
+                  "(--plugin FILE)";
     snprintf(err->text + strlen(err->text), sizeof err->text - strlen(err->text),
              "; --policy clamp moves it into the range%s", exact);
     return s;

@@ -52,7 +52,7 @@ for file in exact polished; do
 done
 
 # Ranges: the network's, or the shape's.
-expect 5 "parameter 'a' = 5.5 mm, allowed 2 .. 5 mm; --policy clamp .*the range of the shape itself does not hold it" sdmgen fit $model ct.nii $start -p a=5.5 -o no.nrrd
+expect 5 "parameter 'a' = 5.5 mm, allowed 2 .. 5 mm; --policy clamp .*the shape itself does not allow the value" sdmgen fit $model ct.nii $start -p a=5.5 -o no.nrrd
 sdmgen fit $model ct.nii $start -p a=5.5 --keep parameters --policy clamp --json >out 2>err # may fail, but must pass the check of ranges
 [ "$(json start_clamped)" = true ] || bad 'a start that was moved must be marked'
 grep -q 'the start parameters were clamped to their range: ' err || bad "no notice of the start: $(cat err)"

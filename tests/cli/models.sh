@@ -46,7 +46,7 @@ if sdmgen generate $model -o m.vdb --quiet 2>err; then
 fi
 
 # Parameters: given by name, in range or treated by the chosen policy, and always reported.
-expect 5 "parameter 'a' = 7 mm, allowed .*; --policy clamp moves it into the range; the range of the shape itself does not hold it either\$" sdmgen generate $model -p a=7 -o x.npy
+expect 5 "parameter 'a' = 7 mm, allowed .*; --policy clamp moves it into the range; --policy exact does not help: the shape itself does not allow the value\$" sdmgen generate $model -p a=7 -o x.npy
 expect 5 'nan' sdmgen generate $model -p a=nan -o x.npy
 expect 5 'inf' sdmgen generate $model -p a=1e999 --policy clamp -o x.npy
 expect 5 'a' sdmgen generate $model -p a=5.000000000000001 -o x.npy

@@ -79,7 +79,7 @@ static void template_that_errs_near_the_surface(void **state)
     next_lines(&good, 2, text, second);
     assert_string_equal(text,
                         "  better      nothing needs to change: the error at the surface is 0 "
-                        "voxels, and no use is left out\n");
+                        "voxels, and there is no line `not for`\n");
 }
 
 // A grid for the first use in `not for` comes before the key of the verdict, and says so. The time
@@ -104,22 +104,22 @@ static void grid_or_key(void **state)
     next_lines(&r, 1, text, second);
     assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.2 "
                               "train.minutes=16 network.kind=template --out run-2\n");
-    assert_string_equal(second, "              (for fits by the network alone, which `not for` "
-                                "leaves out: 16 times the voxels; network.rank, named by the "
-                                "verdict, can wait: the error at the surface is 0.008 voxels)\n");
+    assert_string_equal(second, "              (the finer grid is for fits by the network alone, "
+                                "see `not for`; it has 16 times the voxels; network.rank can wait, "
+                                "because the error at the surface is only 0.008 voxels)\n");
     r.verdict.thickness_mm = 30;
     next_lines(&r, 1, text, second);
-    assert_string_equal(text, "  better      network.rank, named by the verdict, can wait: the "
-                              "error at the surface is 0.008 voxels, and no use is left out\n");
+    assert_string_equal(text, "  better      network.rank can wait: the error at the surface is "
+                              "0.008 voxels, and there is no line `not for`\n");
     r.verdict.rmse_voxel_mm = 0.1;
     next_lines(&r, 1, text, second);
     assert_string_equal(second,
-                        "              (the kind stays template, with which a map takes 1 ms; "
-                        "without network.kind=template the run chooses a kind again)\n");
+                        "              (the kind stays template, whose maps take 1 ms; without "
+                        "network.kind=template auto chooses again)\n");
     strcpy(r.verdict.key, "grid.spacing");
     next_lines(&r, 1, text, second);
     assert_string_equal(second, "              (the kind stays template; without "
-                                "network.kind=template the run chooses a kind again)\n");
+                                "network.kind=template auto chooses again)\n");
 }
 
 // auto had no time for a trial of template: no command fixes the kind, whatever the key is, and its
@@ -161,8 +161,8 @@ static void kind_stays_open(void **state)
         assert_string_equal(text, expected);
         assert_string_equal(
             second, "              (network.kind stays auto: this run had no time to try "
-                    "template, too; at its pace these train.minutes are enough to try both kinds, "
-                    "network.kind=template alone takes less)\n");
+                    "template; at the pace of this run these train.minutes are enough to try both "
+                    "kinds; network.kind=template alone needs less)\n");
         // a kind that was tried needs no other trial
         r.tried = true;
         next_lines(&r, 2, text, second);
@@ -193,11 +193,11 @@ static void finer_grid_leaves_kind_open(void **state)
                               "train.minutes=84 --out run-2\n");
     assert_string_equal(second,
                         "              (network.kind stays auto: this run had no time to "
-                        "try template, too; at its pace these train.minutes are enough to try both "
-                        "kinds, network.kind=template alone takes less; for derivatives "
-                        "of the volume, which `not for` leaves out: 8 times the voxels; "
-                        "nothing else needs to change: the error at the surface is 0.01 "
-                        "voxels)\n");
+                        "try template; at the pace of this run these train.minutes are enough to "
+                        "try both kinds; network.kind=template alone needs less; the finer grid is "
+                        "for derivatives of the volume, see `not for`; it has 8 times the voxels; "
+                        "nothing else needs to change, because the error at the surface is only "
+                        "0.01 voxels)\n");
 }
 
 // A key that the verdict names for the error may leave the uses in `not for` as they are: the note
@@ -221,8 +221,8 @@ static void uses_are_not_promised(void **state)
                                       .from = 128,
                                       .to = 256}};
     next_lines(&r, 2, text, second);
-    assert_non_null(strstr(second, "; this lowers the error of distances; the uses that `not for` "
-                                   "names may need another change)\n"));
+    assert_non_null(strstr(second, "; this change lowers the error of distances; the uses in "
+                                   "`not for` may need another one)\n"));
     strcpy(r.verdict.key, "grid.spacing");
     next_lines(&r, 2, text, second);
     assert_non_null(strstr(second, "; derivatives of maps may need another change)\n"));
@@ -247,11 +247,11 @@ static void finer_grid_alone(void **state)
                                       .thickness_mm = 30}};
     next_lines(&r, 1, text, second);
     assert_string_equal(text, "  better      nothing needs to change: the error at the surface is "
-                              "0.01 voxels, and no use is left out\n");
+                              "0.01 voxels, and there is no line `not for`\n");
     r.verdict.limited = true, r.verdict.limit = SDM_CAUSE_ROUNDING;
     next_lines(&r, 1, text, second);
-    assert_string_equal(text, "  better      network.weights, named by the verdict, can wait: the "
-                              "error at the surface is 0.01 voxels, and no use is left out\n");
+    assert_string_equal(text, "  better      network.weights can wait: the error at the surface is "
+                              "0.01 voxels, and there is no line `not for`\n");
     // derivatives of the volume, to which voxels leave no other way
     r.verdict.limited = false;
     strcpy(r.verdict.volume_derivatives_bad, "height: off by 28 %");
@@ -259,9 +259,10 @@ static void finer_grid_alone(void **state)
     next_lines(&r, 1, text, second);
     assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.5 "
                               "train.minutes=8 network.kind=template --out run-2\n");
-    assert_string_equal(second, "              (for derivatives of the volume, which `not for` "
-                                "leaves out: 8 times the voxels; nothing else needs to change: "
-                                "the error at the surface is 0.01 voxels)\n");
+    assert_string_equal(second,
+                        "              (the finer grid is for derivatives of the volume, see "
+                        "`not for`; it has 8 times the voxels; nothing else needs to "
+                        "change, because the error at the surface is only 0.01 voxels)\n");
     // a network that errs needs no finer grid
     r.verdict.volume_derivative_voxels = 0.04;
     next_lines(&r, 1, text, second);

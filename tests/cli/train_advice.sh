@@ -41,7 +41,7 @@ has '^              sdmgen train far\.yaml train\.minutes=0\.02 network\.kind=po
 # A good model with a small error: the command mends the first use that it leaves out.
 expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 grid.spacing=0.3 --out fine --quiet
 has '^  better      sdmgen train far\.yaml network\.kind=template train\.minutes=0\.02 grid=auto grid\.spacing=0\.1[0-9]+ --out fine-2$'
-has '^              \(for volumes of surfaces, which `not for` leaves out: [0-9.]+ times the voxels; nothing else needs to change: the error at the surface is 0\.01[0-9]* voxels\)$'
+has '^              \(the finer grid is for volumes of surfaces, see `not for`; it has [0-9.]+ times the voxels; nothing else needs to change, because the error at the surface is only 0\.01[0-9]* voxels\)$'
 
 # A template that saves little time against exact maps: the line names pod, and what is known of it.
 expect 0 - sdmgen train far.yaml network.kind=template shape.options.edge=2 shape.options.links=1 grid.spacing=0.05 data.holdout=2 --out large --quiet
@@ -58,7 +58,7 @@ has '^  held out    12 shapes: RMSE [0-9.]+ mm \([0-9.]+ voxels\), MSE [0-9.e-]+
 has '^  by distance within two voxels \(0\.68 mm\) of the surface [0-9.]+ mm, '
 has '^  derivatives by the parameters, of [0-9]+ shapes: .*, of volumes as `not for` says$'
 has '^  (next|better) +sdmgen train link.yaml .*network.kind=(pod|template) --out both-2$'
-has '^              \(the kind stays (pod|template)(, with which a map takes [0-9.e-]+ ms)?; without network\.kind=(pod|template) the run chooses a kind again[;)]'
+has '^              \(the kind stays (pod|template)(, whose maps take [0-9.e-]+ ms)?; without network\.kind=(pod|template) auto chooses again[;)]'
 other=$(sed -n 's/.*; its model is //p' out)
 present "$other"
 expect 0 - sdmgen info "$other" --quiet

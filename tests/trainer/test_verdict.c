@@ -496,15 +496,14 @@ static void uses_and_spacing(void **state)
     v.volume_error = v.surface_volume_error = 0.004, v.thickness_mm = 2.9 * v.coarse_mm;
     assert_string_equal(sdm_grade_text(&v, text), "for level sets, surfaces and measurements");
     sdm_verdict_unfit(&v, lines);
-    assert_string_equal(lines, "exact fits by the network alone: its thinnest part, 2.3 mm thick "
-                               "in a few held-out shapes, has 2.9 voxels across; 5 are safe for "
-                               "fits, fewer may pass: take sdmgen fit --exact --spacing 0.46 (for "
-                               "an image with a blur below "
-                               "0.38 mm: 1.2 times the blur)\n");
+    assert_string_equal(lines, "fits by the network alone: the thinnest part, 2.3 mm in a few "
+                               "held-out shapes, has 2.9 voxels across it, and 5 or more are safe; "
+                               "use sdmgen fit --exact --spacing 0.46, or 1.2 times the blur of "
+                               "the image if its blur is below 0.38 mm\n");
     // not 4 where there are nearly so many
     v.thickness_mm = 3.96 * v.coarse_mm;
     sdm_verdict_unfit(&v, lines);
-    assert_non_null(strstr(lines, " has 3.9 voxels across; "));
+    assert_non_null(strstr(lines, " has 3.9 voxels across it, "));
     // the promise holds for fits of all shapes: the check `map voxels` asks for four voxels across
     // the largest ball in one, and the fitted shape may be thinner
     v.thickness_mm = 4.9 * v.coarse_mm;

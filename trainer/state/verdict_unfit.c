@@ -67,12 +67,11 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
                  blurs = SDM_GRID_FIT_ADVISED * SDM_GRID_FIT_DATA; // voxels by the blur
     if (finer > 0 && !sdm_verdict_lacks_part(v))
         add(l,
-            "exact fits by the network alone: its thinnest part, %.2g mm thick in a few held-out "
-            "shapes, has %.1f voxels across; %.2g are safe for fits, fewer may pass: take sdmgen "
-            "fit "
-            "--exact --spacing %.2g (for an image with a blur below %.2g mm: %.2g times the blur)",
+            "fits by the network alone: the thinnest part, %.2g mm in a few held-out shapes, has "
+            "%.1f voxels across it, and %.2g or more are safe; use sdmgen fit --exact --spacing "
+            "%.2g, or %.2g times the blur of the image if its blur is below %.2g mm",
             v->thickness_mm, floor(10 * v->thickness_mm / v->coarse_mm + 1e-9) / 10,
-            SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED, finer, finer / blurs, blurs);
+            SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED, finer, blurs, finer / blurs);
 }
 
 /* text[160] = what causes the error of derivatives of the volume, and what mends it; "": not

@@ -123,16 +123,15 @@ static const sdm_field GRID[] = {
      .def = "60",
      .unit = "voxels",
      .has = has_voxels,
-     .help = "grid: auto, i.e. a grid that is fitted to the shapes: at most so many voxels along "
-             "its longest edge; not together with other keys of grid"},
+     .help = "largest number of voxels along the longest edge of a grid that is fitted to the "
+             "shapes; not together with other keys of grid"},
 };
 
 static const sdm_field NETWORK[] = {
     CHOICE("kind", network.kind, SDM_KIND_CHOICES, "auto",
-           "auto: pod or template, or one after the other, and the better one is kept; template: "
-           "exact "
-           "maps of the shape's parts, carried along with the parts, and a correction by pod; pod: "
-           "basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
+           "auto: pod or template, by short trials, or both, and the better one is kept; template: "
+           "exact maps of the shape's parts, which move with the parts, and a correction by pod; "
+           "pod: basis functions per block, with coefficients from polynomials and an MLP; sdmnn: "
            "3-D convolutional encoder-decoder; deepsdf, imnet: one distance per point, evaluated "
            "at every voxel"),
     BY_KIND(
@@ -210,9 +209,9 @@ static const sdm_field DATA[] = {
      .shown_type = "integer or list",
      .shown_range = "auto, 0 .. 1000",
      .unit = "points",
-     .help = "points of the static grid, a regular grid of parameters, along each parameter: one "
-             "number for all or a list with one per parameter; 0: no static grid; auto: 5 to 2, by "
-             "the number of parameters and the minutes (docs/configuration.md)"},
+     .help = "number of points along each parameter of the static grid, a regular grid over the "
+             "ranges: one number for all or a list with one per parameter; 0: no static grid; "
+             "auto: 5 to 2, by the number of parameters and the minutes (docs/configuration.md)"},
     ROW("online", INT64, data.online, 0, 1e7, "4096", "shapes",
         "random shapes generated during training"),
     ROW("start", INT64, data.start, 0, 1e6, "3456", "shapes",
@@ -287,13 +286,13 @@ static const sdm_field TRAIN[] = {
     OF_KIND(BASES, REAL, "refine_rate", train.refine_rate, 1e-9, 1, "3e-4", "",
             "learning rate during refinement"),
     ROW("patience", REAL, train.patience, 0, 1, "0.3", "",
-        "a phase of the training ends when for this fraction of its budget the error on held-out "
-        "shapes has not fallen by 1 %; 0: never"),
+        "a phase of the training ends early when the error on held-out shapes has not fallen by 1 "
+        "% during this fraction of the phase's budget; 0: never"),
     ROW("average", REAL, train.average, 0, 0.99999, "0.998", "",
         "decay of the moving average of the weights; 0: no average"),
     ROW("evaluate_seconds", REAL, train.evaluate_seconds, 0.001, 1e6, "20", "s",
-        "longest time between evaluations; if the budget is not a time, they are at the steps 10, "
-        "20, 50, 100, 200 and every 500 steps"),
+        "longest time between evaluations on held-out shapes; without train.minutes they are at "
+        "the steps 10, 20, 50, 100, 200 and every 500 steps"),
     ROW("checkpoint_seconds", REAL, train.checkpoint_seconds, 0.001, 1e6, "60", "s",
         "time between checkpoints"),
 };

@@ -1,18 +1,23 @@
 /* The shape `pebble`: an egg-shaped pebble along the z axis, a plug-in of sdmgen in one file.
  *
  * The program calls pebble_mesh() with values of the parameters and gets a closed triangle mesh.
- * Everything else (distances, training, fits, files) is the program's work. To make a shape of your
- * own, change the parameters, the number of vertices and what pebble_mesh() writes.
+ * The program does everything else: distances, training, fits, files. To make a shape of your own,
+ * change three things: the table of parameters, the numbers of vertices and triangles, and the mesh
+ * that pebble_mesh() writes.
  *
- * Rules: triangles run counter-clockwise seen from outside; vertices are smooth functions of the
- * parameters; the numbers of vertices and triangles do not depend on them; the result depends on
- * the arguments alone, because many threads call at once. */
+ * Rules:
+ * - triangles run counter-clockwise seen from outside;
+ * - vertices are continuous functions of the parameters, without jumps;
+ * - the numbers of vertices and triangles do not depend on the parameters;
+ * - the mesh depends on the arguments alone, because many threads call at once: no static
+ *   variables. */
 #include <math.h>
 
 #include <sdm/shape.h> // the only header that a shape needs
 
 /* ---- the parameters ---- */
 
+// A new parameter: a name here, a row in PARAMS, and its use in pebble_mesh() as p[NAME].
 enum { LENGTH, WIDTH, TAPER };
 
 static const sdm_param PARAMS[] = {
@@ -40,8 +45,8 @@ static const sdm_param PARAMS[] = {
 
 #define PI 3.14159265358979323846
 
-/* A closed tube is a vertex at its lower end, rings of AROUND vertices, and a vertex at its upper
- * end. More rings and vertices follow the smooth surface more closely. */
+/* A closed tube: a vertex at its lower end, rings of AROUND vertices, a vertex at its upper end.
+ * More rings and more vertices in a ring follow the smooth surface more closely. */
 enum { RINGS = 23, AROUND = 32 };
 #define TUBE_VERTICES(rings) ((rings)*AROUND + 2)
 #define TUBE_TRIANGLES(rings) (2 * (rings)*AROUND)
@@ -60,9 +65,10 @@ static uint32_t *face(uint32_t *tri, uint32_t a, uint32_t b, uint32_t c)
     return tri + 3;
 }
 
-/* Writes the TUBE_TRIANGLES(rings) triangles of a closed tube, whose vertices begin with number
- * `first`. Rings must turn from x to y where the tube runs along z (right-handed): then the
- * triangles are counter-clockwise seen from outside. Returns the place of the next triangle. */
+/* Writes the TUBE_TRIANGLES(rings) triangles of a closed tube. `first` is the number of its first
+ * vertex. Each ring must turn right-handed about the direction of the tube (from x to y where the
+ * tube runs along z): then the triangles are counter-clockwise seen from outside. Returns the place
+ * of the next triangle. */
 static uint32_t *tube_faces(uint32_t *tri, uint32_t first, uint32_t rings)
 {
     const uint32_t ring0 = first + 1, top = ring0 + (rings - 1) * AROUND, end = top + AROUND;
@@ -115,6 +121,6 @@ static const sdm_shape SHAPE = {
     .mesh = pebble_mesh,
 };
 
-/* The only function that the program looks for: shape 0, 1, ... of this file, NULL after the
- * last. */
+/* The only function that the program looks for. Returns shape 0, 1, ... of this file, NULL after
+ * the last. */
 const sdm_shape *sdm_plugin_shape(uint32_t index) { return index == 0 ? &SHAPE : NULL; }

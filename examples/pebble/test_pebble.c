@@ -6,7 +6,8 @@
 
 enum { MESHES = 200 };
 
-/* Every value is the lower end of its range, the upper end, or between them. */
+/* p[n] = random parameters: each is the lower end of its range, the upper end, or a value between
+ * them. */
 static void draw_parameters(const sdm_param *params, size_t n, double *p)
 {
     for (size_t i = 0; i < n; i++) {
@@ -17,8 +18,8 @@ static void draw_parameters(const sdm_param *params, size_t n, double *p)
     }
 }
 
-/* SDM_E_MESH says what is wrong with the mesh at p. n_vert: number of vertices that it must have;
- * 0: any, which is stored. */
+/* Makes the mesh at p and tests it. *n_vert: the number of vertices that it must have; 0: any
+ * number, which is then stored. SDM_E_MESH: err says what is wrong. */
 static sdm_status check_mesh(const sdm_instance *shape, const double *p, sdm_mesh *mesh,
                              size_t *n_vert, sdm_error *err)
 {
@@ -36,6 +37,7 @@ static sdm_status check_mesh(const sdm_instance *shape, const double *p, sdm_mes
     if (*n_vert > 0 && *n_vert != mesh->n_vert)
         return sdm_fail(err, SDM_E_MESH, "%zu vertices, elsewhere %zu", mesh->n_vert, *n_vert);
     *n_vert = mesh->n_vert;
+    // add what you know about your shape, such as its volume at p
     return SDM_OK;
 }
 

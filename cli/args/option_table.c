@@ -182,9 +182,9 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
     {"export", "MODEL -o FILE.onnx | --shape NAME -o FILE.glb",
      "write a network or a shape for other programs",
      "MODEL: the network as ONNX (opset 13): input `params` [N][P] in the units of the\n"
-     "parameters, output `sdm` [N][nz][ny][nx] in mm. Networks of kind pod, sdmnn, deepsdf\n"
-     "and imnet. --shape: the mesh as binary glTF 2.0; if it is linear in its parameters, as a\n"
-     "statistical shape is, with a morph target for each of its first eight parameters.",
+     "parameters, output `sdm` [N][nz][ny][nx] in mm. Networks of all kinds. --shape: the mesh\n"
+     "as binary glTF 2.0; if it is linear in its parameters, as a statistical shape is, with a\n"
+     "morph target for each of its first eight parameters.",
      "sdmgen export runs/cochlea/model.sdm -o cochlea.onnx", 0, 1},
     {"import", "ssm SOURCE -o FILE.ssm", "turn a statistical shape model into a file of sdmgen",
      "SOURCE is a model of Scalismo or Statismo (.h5, or .h5.json), a folder of meshes whose\n"

@@ -43,7 +43,7 @@ double sdm_fit_shortest_half(double *x, size_t n, double *sd)
 
 double sdm_fit_robust_correlation(double *d, size_t n)
 {
-    if (n < DIFFERENCES_MIN) return 0;
+    if (n < DIFFERENCES_MIN) return NAN;
     const double sd = sdm_fit_robust_sd(d, n, 0);
     return fmin(fmax(1 - 0.5 * sd * sd, 0), 1);
 }

@@ -19,5 +19,5 @@ double sdm_fit_shortest_half(double *x, size_t n, double *sd);
 
 /* Correlation of two neighbours whose values have the sd 1, from their n differences d: 1 - var(d)
    / 2, with a robust variance of the differences (a robust variogram: Cressie and Hawkins 1980,
-   Genton 1998), but 0 .. 1. Overwrites d[n]; 0 for few values. */
+   Genton 1998), but 0 .. 1. Overwrites d[n]; NaN for fewer than 30 of them. */
 double sdm_fit_robust_correlation(double *d, size_t n);

@@ -290,7 +290,8 @@ static void correlations_measure(fit_residuals *r, const lookup *l, double *list
         for (int lag = 1; lag <= FIT_RESIDUAL_LAGS; lag++) {
             const size_t n = differences(r, l, axis, lag, -1, list);
             const double c = sdm_fit_robust_correlation(list, n);
-            if (c < CORRELATION_MIN) break;
+            if (lag == 1 && isnan(c) && l->size[axis] > 1) r->unmeasured = true;
+            if (!(c >= CORRELATION_MIN)) break;
             r->correlation[axis][lag] = c;
         }
 }
@@ -401,6 +402,7 @@ sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sd
 double sdm_fit_residual_correlation(const fit_residuals *r)
 {
     double product = 1;
+    if (r->unmeasured) return 0;
     for (int a = 0; a < 3; a++) {
         double sum = 1;
         if (r->correlation[a][FIT_RESIDUAL_LAGS] > CORRELATION_LAST_MAX) return 0;

@@ -38,12 +38,22 @@ uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size)
     return ~crc;
 }
 
+uint64_t sdm_content_checksum(const void *data, size_t size)
+{
+    const uint64_t crc = sdm_crc64(0, data, size);
+    if (crc != SDM_CRC64_WITH_OWN || size < 8) return crc;
+    const uint8_t *end = (const uint8_t *)data + size;
+    uint64_t own = 0;
+    for (int i = 1; i <= 8; i++) own = own << 8 | end[-i];
+    return own;
+}
+
 sdm_status sdm_file_checksum(const char *path, uint64_t *crc, sdm_error *err)
 {
     uint8_t *data;
     size_t size;
     const sdm_status s = sdm_file_read(path, UINT64_MAX, &data, &size, err);
-    if (!s) *crc = sdm_crc64(0, data, size);
+    if (!s) *crc = sdm_content_checksum(data, size);
     sdm_free(data);
     return s;
 }

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include "sdm/internal/checksum.h"
+#include "sdm/internal/file.h"
 #include "sdm/internal/model_mesh.h"
 #include "sdm/memory.h"
 #include "sdm/runtime.h"
@@ -37,6 +38,16 @@ static sdm_status check_agreement(const sdm_model_info *info, const sdm_instance
     return SDM_OK;
 }
 
+static bool ends_with_own_checksum(const char *path)
+{
+    uint8_t *data = NULL;
+    size_t size = 0;
+    const bool own = !sdm_file_read(path, UINT64_MAX, &data, &size, NULL) &&
+                     sdm_crc64(0, data, size) == SDM_CRC64_WITH_OWN;
+    sdm_free(data);
+    return own;
+}
+
 /* SDM_E_FORMAT unless the file has checksum `wanted`: a different file would silently give a
    different shape. */
 static sdm_status check_file(const char *path, const char *option, const char *wanted,
@@ -48,6 +59,9 @@ static sdm_status check_file(const char *path, const char *option, const char *w
     if (s) return s;
     snprintf(found, sizeof found, "%016llx", (unsigned long long)crc);
     if (!strcmp(found, wanted)) return SDM_OK;
+    // earlier versions recorded the CRC-64 of all bytes, which is the same for all such files
+    snprintf(found, sizeof found, "%016llx", (unsigned long long)SDM_CRC64_WITH_OWN);
+    if (!strcmp(found, wanted) && ends_with_own_checksum(path)) return SDM_OK;
     return sdm_fail(err, SDM_E_FORMAT,
                     "%s: not the file '%s' of the training: its CRC-64 is not %.16s", path, option,
                     wanted);

@@ -85,6 +85,9 @@ rm "ct's.nii.gz"
 expect 0 "its image 'ct's\.nii\.gz' is gone: the page shows none" sdmgen report fit.json --no-model -o page.html
 figures page.html
 ! grep -q '"image": *{' out || bad 'an image that is gone is in the page'
+cp "$source_folder/tests/golden/pod_i8.sdm" model.sdm # whole, but another one
+expect 3 'its model model\.sdm has changed since the fit, or is another file' sdmgen report fit.json --no-model -o page.html
+cp ../$model model.sdm
 printf x >>model.sdm
 expect 3 'its model model\.sdm has changed since the fit, or is another file.*--changed-files takes it' sdmgen report fit.json --no-model -o page.html
 sdmgen report fit.json --changed-files --no-model -o page.html >out 2>err && bad 'a damaged model makes a page'

@@ -297,6 +297,18 @@ static void files_are_written_whole_or_not(void **state)
     assert_true(crc == sdm_crc64(0, "42", 2));
     assert_int_equal(sdm_file_checksum(folder, &crc, &e), SDM_E_IO);
 
+    // files that end with their own CRC-64: it tells them apart, the CRC-64 of all bytes does not
+    for (uint64_t k = 0; k < 3; k++) {
+        uint8_t whole[20] = "content ....";
+        whole[9] = (uint8_t)k;
+        const uint64_t own = sdm_crc64(0, whole, 12);
+        for (int i = 0; i < 8; i++) whole[12 + i] = (uint8_t)(own >> (8 * i));
+        assert_true(sdm_crc64(0, whole, 20) == SDM_CRC64_WITH_OWN);
+        assert_true(sdm_content_checksum(whole, 20) == own);
+        whole[12] ^= 1;
+        assert_true(sdm_content_checksum(whole, 20) == sdm_crc64(0, whole, 20));
+    }
+
     // Two writers of the same name: both files are whole, and the last commit wins.
     for (int last = 0; last < 2; last++) {
         sdm_outfile *two[2];

@@ -52,7 +52,7 @@ static sdm_status copy_file(const char *from, const char *to, uint64_t wanted, s
     size_t size = 0;
     if (!sdm_file_checksum(to, &there, NULL) && there == wanted) return SDM_OK;
     sdm_status s = sdm_file_read(from, UINT64_MAX, &bytes, &size, err);
-    if (!s && sdm_crc64(0, bytes, size) != wanted)
+    if (!s && sdm_content_checksum(bytes, size) != wanted)
         s = sdm_fail(err, SDM_E_FORMAT, "%s: changed since the training began: start again", from);
     if (!s) s = sdm_file_write(to, bytes, size, err);
     sdm_free(bytes);

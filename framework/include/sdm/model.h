@@ -1,5 +1,6 @@
-/* A trained network and its file. The file holds everything that is needed to use the network: no
-   plug-in and no configuration. */
+/* A model: a trained network, read from its file. The network needs no plug-in and no
+   configuration; exact distances need the shape (sdm_runtime_instance()). sdm/runtime.h computes
+   maps. */
 #ifndef SDM_MODEL_H
 #define SDM_MODEL_H
 
@@ -14,8 +15,8 @@ extern "C" {
 
 #define SDM_MODEL_NAME_MAX 64
 
-/* A shape parameter: its name, its unit (e.g. "mm"), the range min < max on which the network was
-   trained, the default value, and the distribution of the random shapes of the training. */
+/* A parameter of the shape: name, unit ("mm", ...), the range min < max on which the network was
+   trained, the default value, and the distribution from which the training drew it. */
 typedef struct sdm_model_param {
     char name[SDM_MODEL_NAME_MAX], unit[16];
     double min, max, def;
@@ -36,43 +37,40 @@ typedef struct sdm_accuracy {
 /* Size of the text sdm_model_quality.unfit. */
 #define SDM_MODEL_UNFIT 1600
 
-/* The verdict of the training on the model. Earlier versions stored none: grade "", numbers NaN. */
+/* The verdict of the training on the model. In models of earlier versions `grade` is "". A number
+   that is not known is NaN. */
 typedef struct sdm_model_quality {
     char grade[16]; /* "good", "usable" or "poor" */
     /* fraction of the held-out shapes that do not fit into the grid: their surfaces end open at its
        border */
     double cut;
-    /* Error of interpolation: how far exact maps, interpolated linearly, miss the surface of
-       held-out shapes, root mean square, mm. sdm_accuracy holds errors at the voxels alone */
+    /* Error of interpolation, which sdm_accuracy does not contain: how far exact maps, interpolated
+       linearly between the voxels, miss the surface of held-out shapes; root mean square, mm */
     double between_mm;
-    /* thickness of the thinnest part of a few held-out shapes, mm; NaN: not known. On voxels longer
-       than about 0.7 of it, surfaces lack this part or show it broken */
+    /* thickness of the thinnest part of a few held-out shapes, mm. On voxels longer than about 0.7
+       times this thickness, surfaces lack the part or show it broken */
     double thickness_mm;
-    /* of the mesh at the default parameters, sums over its triangles; NaN: not known. A shape with
-       another volume or area is not the shape of the training (sdm_runtime_instance()) */
+    /* volume and area of the mesh at the default parameters, sums over its triangles. By them
+       sdm_runtime_instance() recognises a shape that was changed after the training */
     double mesh_volume_mm3, mesh_area_mm2;
-    /* an integral over this mesh that changes where a part is moved; NaN: not known, as in models
-       of earlier versions */
+    /* an integral over the same mesh that changes where a part is moved or mirrored */
     double mesh_moment_mm3;
-    /* Relative errors on held-out shapes: root mean square of the error over that of the right
-       values; NaN: not known.
+    /* Relative errors on held-out shapes: root mean square of the error over that of the exact
+       values.
        volume_error: of the volume of a map (sdm_map_volume()); up to 20 shapes.
-       derivative_error: of the derivatives of the map by a parameter, at voxels within half a voxel
-       of the surface; the largest of all parameters; up to 32 shapes, fewer with more than twelve
-       parameters or in a short training.
-       volume_derivative_error: the same of the derivative of the volume. A parameter that changes
-       the volume by less than 5 % over its range has a small derivative, over which every error is
-       large: it counts as if it changed it by 5 %. `unfit` names such a parameter, with the error
-       over its own derivative, if this is above 20 % */
+       derivative_error: of the derivatives of the map at voxels within half a voxel of the surface,
+       by the worst parameter; up to 32 shapes, fewer with more than twelve parameters or in a short
+       training.
+       volume_derivative_error: of the derivatives of the volume, by the worst parameter. One that
+       changes the volume by less than 5 % over its range counts as if it changed it by 5 %. `unfit`
+       names it if the error is above 20 % of its own derivative */
     double volume_error, derivative_error, volume_derivative_error;
-    /* as volume_error, of the volume inside the surface of a map (sdm_isosurface()), which cuts
-       edges and thin walls between the voxels */
+    /* as volume_error, of the volume inside the surface of a map (sdm_isosurface()). This surface
+     * cuts off edges and thin walls between the voxels */
     double surface_volume_error;
-    /* largest error of a distance farther than sdm_accuracy.near_mm from the surface, mm; NaN: not
-       known */
+    /* largest error of distances farther than sdm_accuracy.near_mm from the surface, mm */
     double far_error_mm;
-    /* as mesh_volume_mm3, mesh_area_mm2 and mesh_moment_mm3, at three other parameter vectors; NaN:
-       not known */
+    /* as mesh_volume_mm3, mesh_area_mm2 and mesh_moment_mm3, at three other parameter vectors */
     double probe_volume_mm3[SDM_MODEL_PROBES], probe_area_mm2[SDM_MODEL_PROBES];
     double probe_moment_mm3[SDM_MODEL_PROBES];
     /* the uses for which the training found the model not good enough, in words: lines that end
@@ -84,8 +82,8 @@ typedef struct sdm_model_quality {
 #define SDM_VOLUME_BAD 0.02
 #define SDM_DERIVATIVE_BAD 0.2
 
-/* Uses of a model, for sdm_model_check_use(). Behind each: when the model is not good enough for
-   it, by a figure of sdm_model_quality. */
+/* Uses of a model, for sdm_model_check_use(). Behind each: the condition, in members of
+   sdm_model_quality, under which the model is not good enough for it. */
 typedef enum sdm_model_use {
     SDM_USE_SURFACE = 0,           /* surfaces and level sets: the grade is "poor" */
     SDM_USE_VOLUME = 1,            /* of maps: volume_error > SDM_VOLUME_BAD */
@@ -105,9 +103,9 @@ typedef struct sdm_model_info {
     char version[16]; /* version of the program that trained the network */
     size_t n_params;
     const sdm_model_param *params; /* [n_params] */
-    /* Options of the shape as text; exact distances need them. If the value of an option NAME is a
-       file, it is the name of a copy in the folder of the model; the option NAME.crc64 that follows
-       is the CRC-64 of the content of the file at the time of training. */
+    /* Options of the shape as text, for exact distances. If the value of an option NAME is a file,
+       the text is the name of a copy in the folder of the model, and the next option, NAME.crc64,
+       is the CRC-64 of its content at the time of training. */
     size_t n_options;
     const char *const *option_names, *const *option_values; /* [n_options] */
     sdm_grid grid;                                          /* grid of every map of the model */
@@ -127,11 +125,11 @@ typedef struct sdm_model_info {
 /* Immutable after opening: any number of threads may use one model at the same time. */
 typedef struct sdm_model sdm_model;
 
-/* *out = the model of a file, to be freed with sdm_model_free(); NULL on error. All checksums are
-   verified, and all sizes are compared with the length of the file before memory is allocated.
-   SDM_E_IO: the file cannot be read. SDM_E_FORMAT: it is not a model, is damaged or truncated, is a
-   checkpoint, or has another format version. SDM_E_ARG: path or out is NULL. SDM_E_NOMEM.
-   [any thread] */
+/* *out = the model of a file; free it with sdm_model_free(). On error *out is NULL. All checksums
+   are verified, and all sizes are compared with the length of the file before memory is allocated.
+   SDM_E_IO: the file cannot be read. SDM_E_FORMAT: it is no model (a checkpoint is none), is
+   damaged, or has another format version. SDM_E_ARG: path or out is NULL. SDM_E_NOMEM. [any thread]
+ */
 SDM_API sdm_status sdm_model_open(const char *path, sdm_model **out, sdm_error *err);
 
 /* The same for the content of a file, bytes[size], which is copied. `name` stands for the file in
@@ -145,22 +143,24 @@ SDM_API void sdm_model_free(sdm_model *m);
 /* The description, owned by the model. [any thread] */
 SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
 
-/* SDM_OK: the training found the model good enough for this use. SDM_E_QUALITY: it did not; *err
-   holds the figure, as in "derivatives of volumes of its maps are off by 165 % for alpha, more than
-   20 %". SDM_E_UNSUPPORTED: not measured (slow kinds of network, earlier versions). SDM_E_ARG: m is
-   NULL, or there is no such use. The functions that compute maps, volumes and derivatives do not
-   ask. [any thread] */
+/* SDM_OK: the training found the model good enough for this use. SDM_E_QUALITY: not good enough;
+   the message has the figure, as in "derivatives of volumes of its maps are off by 165 % for alpha,
+   more than 20 %". SDM_E_UNSUPPORTED: the training did not measure it (slow kinds of network,
+   earlier versions). SDM_E_ARG: m is NULL, or there is no such use. Functions that compute maps,
+   volumes and derivatives do not call this function: call it before you use their results. [any
+   thread] */
 SDM_API sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error *err);
 
 /* Index of a parameter in the parameter vectors of the model; -1 if there is none of this name, or
    if the model or the name is NULL. [any thread] */
 SDM_API int sdm_model_param_index(const sdm_model *m, const char *name);
 
-/* The functions below evaluate the network in the calling thread, without allocation. `scratch` is
-   memory of the caller, 64-byte aligned, of at least the size that the function's
-   ..._scratch_bytes() returns. Concurrent calls need separate scratch memory. Parameters are in the
-   order and the units of sdm_model_info.params; it is not checked that they are finite and within
-   their ranges. Maps are signed distances in mm, negative inside, values[nz][ny][nx] with x
+/* Low-level functions: most programs call sdm_generate() and its relatives (sdm/runtime.h), which
+   check the parameters. The functions below evaluate the network in the calling thread, without
+   allocation and without checks: parameters must be finite and within their ranges, in the order
+   and the units of sdm_model_info.params. `scratch` is memory of the caller, 64-byte aligned, of at
+   least the size that the function's ..._scratch_bytes() returns; concurrent calls need separate
+   scratch memory. Maps are signed distances in mm, negative inside, values[nz][ny][nx] with x
    fastest. */
 
 /* Bytes of scratch memory of sdm_model_forward() for n maps. [any thread] */

@@ -1,4 +1,11 @@
-/* Status codes and error messages of all functions that can fail. */
+/* Status codes and error messages.
+
+   A function that can fail returns an sdm_status. Its argument `err` receives the status and
+   the message of a failure; err may be NULL. Test the returned status, not *err: a function that
+   succeeds may leave the message of an earlier failure in *err.
+
+       sdm_error err = {0};
+       if (sdm_model_open("model.sdm", &model, &err)) fprintf(stderr, "%s\n", err.text); */
 #ifndef SDM_STATUS_H
 #define SDM_STATUS_H
 
@@ -8,7 +15,7 @@
 extern "C" {
 #endif
 
-/* Return value of functions that can fail: 0 is success. Values are fixed and never reused. */
+/* Result of a function: 0 is success. Values are fixed and never reused. */
 typedef enum sdm_status {
     SDM_OK = 0,
     SDM_E_ARG = 1,         /* invalid argument, name or command-line value from the caller */
@@ -27,8 +34,8 @@ typedef enum sdm_status {
 
 #define SDM_ERROR_TEXT_MAX 4096
 
-/* Error message, owned by the caller (usually on its stack), so no lock is needed. `text` is one
- * line; errors of a configuration have one line for each mistake. */
+/* The message of a failure. Each thread needs an sdm_error of its own. `text` is one line without a
+ * line feed; errors of a configuration have one line for each mistake. */
 typedef struct sdm_error {
     sdm_status status;
     char text[SDM_ERROR_TEXT_MAX];
@@ -39,9 +46,8 @@ typedef struct sdm_error {
 SDM_API sdm_status sdm_fail(sdm_error *err, sdm_status status, const char *fmt, ...)
     SDM_PRINTF(3, 4);
 
-/* Inserts "prefix: " (prefix: printf format) before the text of *err, sets err->status and returns
- * `status`. err may be NULL. For callers that can add context such as the file or the shape. [any
- * thread] */
+/* Writes "PREFIX: " before the text of *err, stores `status` in it and returns `status`; err may be
+ * NULL. PREFIX is a printf format and names, for example, the file or the shape. [any thread] */
 SDM_API sdm_status sdm_fail_in(sdm_error *err, sdm_status status, const char *fmt, ...)
     SDM_PRINTF(3, 4);
 

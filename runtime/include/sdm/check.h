@@ -1,4 +1,4 @@
-/* A-posteriori check of a distance map: its error at voxels near the true surface. */
+/* Check of a distance map: its error at voxels near the exact surface. */
 #ifndef SDM_CHECK_H
 #define SDM_CHECK_H
 
@@ -12,20 +12,20 @@ extern "C" {
 #define SDM_CHECK_POINTS 1000
 
 /* Error = value of the map minus exact distance, mm, at the voxels nearest to SDM_CHECK_POINTS
-   points spread evenly over the true surface. These voxels lie within about half a voxel of the
-   surface and decide where the zero surface of the map is. Nothing is interpolated: an exact map
+   points spread evenly over the exact surface. These voxels lie within about half a voxel of the
+   surface and decide where the zero surface of the map is. Nothing is interpolated, so an exact map
    has rounding errors only. The check is a sample: the largest error over all voxels is somewhat
-   larger than max_mm, and a false surface far from the true one is not found. All errors are NaN if
-   used == 0. */
+   larger than max_mm, and the check does not find a false surface far from the exact one. All
+   errors are NaN if used == 0. */
 typedef struct sdm_check {
     /* abs(error): mean, root mean square, 95 % quantile (nearest rank), largest. */
     double mean_mm, rmse_mm, q95_mm, max_mm;
-    double bias_mm; /* mean error; > 0: the map's surface lies inside the true one */
+    double bias_mm; /* mean error; > 0: the map's surface lies inside the exact one */
     size_t used;    /* points inside the grid */
     size_t outside; /* points outside the grid, not checked */
 } sdm_check;
 
-/* The statistic of the error that a bound applies to. */
+/* A statistic of the error, for sdm_generate_opts.max_error_of. */
 typedef enum sdm_check_stat {
     SDM_CHECK_MAX = 0,
     SDM_CHECK_Q95 = 1,

@@ -1,7 +1,7 @@
-/* Phantoms: test images with known truth, as a CT scanner would show a shape in a given pose.
+/* Phantoms: test images of a shape with known parameters and pose, as a CT scanner would show it.
 
    The exact distance gives the share of every tissue in a voxel (partial volume). The shares
-   determine mean and texture of the image, a Gaussian point spread G (over the box of the voxel)
+   determine mean and texture of the image. A Gaussian point spread G (over the box of the voxel)
    blurs it, and noise is added:
 
        image = G * (sum of share_k mean_k) + sqrt(G * (sum of share_k sd_k^2)) xi + noise eta
@@ -63,11 +63,10 @@ SDM_API sdm_phantom_opts sdm_phantom_defaults(void);
 /* values[nz][ny][nx] = the image; label[nz][ny][nx] = 1 where the signed distance at the voxel's
    centre is negative, else 0. One of the two may be NULL. The shape at p[n_params] (NULL: its
    defaults) is placed in the world by `pose` (NULL: identity); opts may be NULL.
-   Air cells, and what the point spread collects from beyond the grid, depend on world positions
-   only: a part of a grid shows the same part of the image, except for the random fields, which are
-   numbered by voxel. The result depends on the arguments only. SDM_E_ARG names the option,
-   SDM_E_RANGE the parameter; also the errors of sdm_instance_mesh() and sdm_exact_create(). [any
-   thread] */
+   Shape, air cells and blur depend on world positions only, so a part of a grid shows the same part
+   of the image. The random fields are numbered by voxel and differ. The same arguments give the
+   same image. SDM_E_ARG names the option, SDM_E_RANGE the parameter; also the errors of
+   sdm_instance_mesh() and sdm_exact_create(). [any thread] */
 SDM_API sdm_status sdm_phantom_make(const sdm_instance *shape, const double *p,
                                     const sdm_pose *pose, const sdm_phantom_opts *opts,
                                     const sdm_grid *grid, float *values, uint8_t *label,

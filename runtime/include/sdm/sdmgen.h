@@ -1,6 +1,6 @@
 // clang-format off
-/* All of the C interface of sdmgen in one header, and its table of contents, in the order in which
- * data pass through a program:
+/* The whole C interface of sdmgen in one header. Its headers, in the order in which data pass
+ * through a program:
  *
  *   errors, memory        sdm/status.h          sdm_status, sdm_error: the result of a function
  *                         sdm/memory.h          sdm_alloc(), sdm_free()
@@ -28,11 +28,12 @@
  *                         sdm/fit.h             fits a shape to an image, labels or points
  *   training              sdm/train_file.h      a model from a configuration [sdmgen::training]
  *
- * In brackets: the CMake target of the library with the functions; all others are in
- * sdmgen::sdmgen. sdm/vdb.h and sdm/train_file.h are included where they are installed.
+ * Functions are in the library sdmgen::sdmgen (CMake target); in brackets: those in another one.
+ * sdm/vdb.h and sdm/train_file.h are included where they are installed. A comment that ends with
+ * [any thread] is of a function that several threads may call at the same time.
  *
- * For many points of one map, sdm_field_create() computes the map once and sdm_field_points() reads
- * it. The map of a trained network, and the distance at a point:
+ * For many points of one map: sdm_field_create() and sdm_field_set_params() compute it once,
+ * sdm_field_points() reads it. The map of a trained network, and the distance at a point:
  *
  *   sdm_error err = {0};
  *   sdm_model *model = NULL;

@@ -28,8 +28,8 @@ typedef struct sdm_vdb_opts {
     /* Called now and then; true: SDM_E_CANCELLED and no file. May be NULL. */
     bool (*cancelled)(void *user);
     /* Makes the same map on another grid: values[nz][ny][nx]. Called at most once, with a larger
-       grid, where the band leaves the grid but the surface does not; the values beyond the grid
-       are then those of this map. NULL: they are estimated from the values at its border. */
+       grid, if the band leaves the grid and the surface does not: it gives the values of the band
+       beyond the grid. NULL: they are estimated from the values at its border. */
     sdm_status (*map)(void *user, const sdm_grid *grid, float *values, sdm_error *err);
     void *user; /* passed to cancelled() and map() */
 } sdm_vdb_opts;
@@ -55,13 +55,13 @@ typedef struct sdm_vdb_report {
    accepts it, else SDM_E_QUALITY. The map itself (`dense`) may have voxels of any shape.
 
    checkLevelSet demands 0.5 <= |grad|^2 <= 1.5 at zero crossings. The finite differences of an
-   exact distance violate this in voxels next to a sharp edge or crease, or where a part is thinner
-   than a voxel. Only there, values are changed, each time by the smallest change that brings a
-   gradient back (Kaczmarz 1937), until the check passes; SDM_E_QUALITY if that fails. Signs stay,
-   so no voxel changes between inside and outside; zero crossings move by a fraction of a voxel.
+   exact distance violate this next to a sharp edge or crease, or where a part is thinner than a
+   voxel. Only there, values are changed, each time by the smallest change that brings a gradient
+   back (Kaczmarz 1937), until the check passes; SDM_E_QUALITY if it never does. Signs stay: no
+   voxel changes between inside and outside. Zero crossings move by a fraction of a voxel.
 
    A surface that leaves the grid is closed at the grid's border (half a voxel beyond the outermost
-   centres), and where the band leaves the grid it continues outside: by opts->map(), else by
+   centres). Where only the band leaves the grid, it continues outside: by opts->map(), else by
    estimates (report->estimated_voxels).
 
    SDM_E_ARG: nothing is inside; voxels of a level set are not uniform (the message names the

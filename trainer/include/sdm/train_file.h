@@ -1,5 +1,5 @@
-/* Trains a network as a configuration file says: the same run as that of `sdmgen train`. A library
- * of its own, since it needs libyaml and, for pictures, cairo. */
+/* Trains a network from a configuration file, as `sdmgen train` does. The functions are in a
+ * library of their own, which needs libyaml and, for pictures, cairo. */
 #ifndef SDM_TRAIN_FILE_H
 #define SDM_TRAIN_FILE_H
 
@@ -31,7 +31,7 @@ typedef struct sdm_training_opts {
     const char *const *settings;
     size_t n_settings;
     /* folder of the run; NULL: output.folder of the configuration. If it holds a model or a
-     * checkpoint, either of the two flags must be set */
+     * checkpoint, `resume` or `force` must be set */
     const char *folder;
     bool resume; /* continue from the checkpoint in the folder */
     bool force;  /* start again; the files of the older run are replaced as soon as the new run has

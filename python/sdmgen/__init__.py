@@ -1,8 +1,8 @@
 """Signed distance maps of parametric shapes: exact, and by networks; fits to images.
 
 Distances are in mm and NEGATIVE INSIDE. Coordinates are LPS (x to the left, y to the back, z to the
-head), mm. Arrays are C-contiguous with the axes [z, y, x]. Results are the same bits as those of the
-program sdmgen, for any number of threads.
+head), mm. Arrays are C-contiguous with the axes [z, y, x]. Results have the same bits as those of the
+program sdmgen, for any number of threads. docs/python.md is the guide.
 
     import sdmgen
     model = sdmgen.Model("runs/cochlea/model.sdm")

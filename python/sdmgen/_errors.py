@@ -12,8 +12,9 @@ from . import _abi
 
 
 class Error(Exception):
-    """An error of sdmgen. `status` is its name, as in sdm/status.h ("range", "format", ...), and
-    `text` the message."""
+    """An error of sdmgen. `status` names its kind, as the subclasses do: "argument", "memory", "io",
+    "format", "config", "mesh", "plugin", "range", "unsupported", "cancelled", "quality" or "internal".
+    `text` is the message."""
 
     def __init__(self, status: str, text: str) -> None:
         super().__init__(text)
@@ -71,8 +72,8 @@ class CancelledError(Error, RuntimeError):
 
 
 class QualityError(Error, ArithmeticError):
-    """Completed, but the result is below the required quality. `result` holds it where there is
-    one: a map for a bound on the error, a FitResult for a fit that is not to be trusted."""
+    """Completed, but the result is below the required quality. `result` holds the result, or None: a
+    Map or Batch with a larger error than `max_error`, the FitResult of a fit that failed."""
 
     result: Any = None
 

@@ -81,13 +81,16 @@ def write(
     half: bool = False,
     metadata: Optional[Mapping[str, str]] = None,
 ) -> None:
-    """Writes a map, an image, a band or a mesh; the ending of the name selects the format: .nii
-    .nii.gz .nrrd .mha (image), .npy (a map's array), .vdb (a map or band as an OpenVDB level set),
-    .ply .stl .obj .off .vtk .vtp (a mesh, or the zero surface of a map). The file appears under its name only
-    when it is complete.
+    """Writes a map, an image, a band or a mesh. The ending of the name selects the format:
 
-    .vdb: `band`, the half width of the band in voxels (default 3); `dense`, the whole map; `half`,
-    16-bit values; `metadata`, texts by name. text: a description of one line for images."""
+    .nii .nii.gz .nrrd .mha              an image or map
+    .npy                                 the array of a map (float32), without its grid
+    .vdb                                 a map or band as an OpenVDB level set
+    .ply .stl .obj .off .vtk .vtp        a mesh, or the zero surface of a map
+
+    The file appears under its name only when it is complete. text: a description of one line, for
+    images. For .vdb: band, the half width of the band in voxels (default 3); dense=True writes the
+    whole map; half=True 16-bit values; metadata, texts by name."""
     if _ends(path, (".vdb",)):
         _write_vdb(path, what, band, dense, half, metadata or {})
     elif isinstance(what, Mesh):

@@ -37,8 +37,9 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class FitProgress:
-    """State after an iteration. `phase`: "search", "fit", "polish" or, once, when the steps are over, "judge". In a search with several starts
-    `start` of `starts` in `round` 1 (all of them) or 2 (the best ones); else 0."""
+    """State after an iteration. `phase`: "search", "fit", "polish" or, once after the last step,
+    "judge". In a search with several starts: start number `start` of `starts`, in `round` 1 (all of
+    them) or 2 (the best ones); else these three are 0."""
 
     phase: str
     iteration: int
@@ -62,45 +63,48 @@ class Tissue:
 
 @dataclass(frozen=True)
 class Finding:
-    """One check of a fit, as in docs/fitting-reference.md."""
+    """One check of a fit; docs/fitting-reference.md#the-checks describes all of them."""
 
-    #: its name ("residuals")
+    #: name of the check, such as "residuals"
     check: str
     #: "passed", "doubtful" or "failed"
     grade: str
     #: the figure, and the limit that separates passed from the rest; NaN: none
     figure: float
     limit: float
-    #: why it did not pass or has no figure; else empty
+    #: why the check did not pass or has no figure; else empty
     text: str
 
 
 @dataclass(frozen=True)
 class FitResult:
-    """Result of a fit. The unknowns are the parameters, the rotation (rad: a small turn about the axes
-    of the world, after the pose) and the translation (mm), in the order of `unknowns`."""
+    """Result of a fit. The unknowns are the parameters, then the rotation (rad: a small turn about the
+    axes of the world, after the pose), then the translation (mm). `sd`, `cov` and `correlation` are in
+    this order."""
 
     #: names of the unknowns
     unknowns: tuple[str, ...]
-    #: the estimated parameters
+    #: the estimated parameters, in their order; `values` has them by name
     params: Float64
     #: the estimated pose: world = R x + translation
     pose: Pose
-    #: standard deviations of the unknowns; those of the pose contain rotations that the target leaves open
+    #: standard deviations of the unknowns; large for a pose with `open_motions`
     sd: Float64
-    #: the same of the pose without these rotations, [6]; the command line prints these
+    #: standard deviations of the pose [6] without `open_motions`; the command line prints these
     pose_sd_determined: Float64
-    #: the motions of the pose that the target leaves open, in words; "": none
+    #: rigid motions that the target does not determine, such as a turn about the axis of a cup, in
+    #: words; "": none
     open_motions: str
     #: covariance of the unknowns
     cov: Float64
     #: correlation of the unknowns
     correlation: Float64
-    #: names of the parameters at an end of their range
+    #: names of the parameters at an end of their range: their sd is not reliable
     at_bound: tuple[str, ...]
     #: names of the parameters that the target does not determine
     not_determined: tuple[str, ...]
-    #: standard deviations of the parameters before the fit: of the priors or the ranges
+    #: standard deviations of the parameters before the fit: of their priors or, without priors, of
+    #: uniform distributions over their ranges
     prior_sd: Float64
     #: overlap with the labels or the reference (Dice coefficient); NaN: none were given
     dice: float
@@ -114,7 +118,7 @@ class FitResult:
     iterations: int
     #: how often a refused fit went on from another pose or value of a parameter
     restarts: int
-    #: with a network: the last iterations took exact maps
+    #: True: the fit began with a network and ended with exact maps (polish=True)
     polished: bool
     #: log-posterior density after each iteration, up to a constant
     objective: Float64
@@ -125,9 +129,9 @@ class FitResult:
     inside_share: float
     #: number of voxels or points used
     used: int
-    #: number of voxels near the shape that were skipped: NaN, or in a space wider than `cavity=`
+    #: number of voxels near the shape that were skipped: NaN, or left out by `cavity=`
     nan: int
-    #: number of voxels of the whole image in such spaces
+    #: number of voxels of the whole image that `cavity=` left out
     cavity: int
     #: sum of the correlations of a residual with all residuals (1: independent)
     noise_factor: float
@@ -157,7 +161,8 @@ class FitResult:
 
     def measures(self, depths: ArrayLike = ()) -> list[Measure]:
         """The measures of the fitted shape (Shape.measures()) with standard deviations, by the
-        covariance of the fit. After a fit with a model its shape must be known."""
+        covariance of the fit. After a fit with a model, the shape of the model must be known: built
+        in, or given by plugin= or shape= of Model."""
         source = self._source
         shape = source.shape if source.shape is not None else instance(source.model, Model, "model").shape
         c = make("sdm_fit_result", n_params=len(self.params))
@@ -509,23 +514,27 @@ def fit(
     threads: int = 0,
     progress: Optional[Callable[[FitProgress], Any]] = None,
 ) -> FitResult:
-    """Fits a shape to a target: estimates parameters and pose with their uncertainty, with the network
-    of a model or, for a Shape or with exact=True, with the exact engine.
+    """Fits a shape to a target: estimates parameters and pose, with their uncertainty.
 
-    target: an Image or the path of one (with `label`, a value, the name of a segment, or several, it is
-    a label map); points [n, 3], LPS mm, or a .csv or .npy file of them; a Mesh or the path of one.
+    source: a Model, whose network makes the maps (exact=True: the exact engine), or a Shape, with the
+    exact engine.
+    target: an Image or its path; with `label` (a value, the name of a segment, or a list of them) a
+    label map; points [n, 3], LPS mm, or a .csv or .npy file of them; a Mesh or its path.
     params: start values of the parameters (default: those of the shape).
+    rotation, start_axis or start_points: the start rotation; without one, 60 rotations are tried.
     start_points: pairs of points, in the frame of the shape [n, 3] and in the image [n, 3].
+    inside, outside, air: (mean, standard deviation) of the values of the tissues of an image; the
+    defaults are fluid, bone and air in CT.
     region: two corners of a box. reference: labels to compare with (FitResult.dice).
-    tolerance: share of its volume by which the organ may differ from the shape (default 0: residuals
+    tolerance: share of the volume of the shape that the target may contradict (default 0: residuals
     must be noise; labels and points 0.05). beside: volume of the inside's material beside the shape
     that an image may hold, over the volume of the shape (default 0.3).
-    The other arguments are the options of `sdmgen fit`, with its defaults, but for spacing: exact maps
-    have 64 voxels along the longest edge. Places and directions are LPS, mm.
+    spacing: voxel edge of exact maps, mm (default: 64 voxels along the longest edge).
+    Every other argument is the option of `sdmgen fit` with its name (l_ref: --l-ref) and its default.
+    Places and directions are LPS, mm; rotations are rotation vectors, rad.
 
-    A fit is judged (FitResult.verdict, FitResult.findings). If it failed or is not to be trusted,
-    QualityError is raised; its `result` is the FitResult, or None. An exception in `progress`, or
-    Ctrl-C, stops the fit."""
+    A fit is judged (FitResult.verdict, FitResult.findings). If it failed, QualityError is raised; its
+    `result` is the FitResult, or None. An exception in `progress`, or Ctrl-C, stops the fit."""
     from_where, start_params, clamped = _open_source(source, params, exact, polish, policy, spacing)
     start = _Start(rotation, translation, start_centre, start_axis, start_points, turns, turns_sphere)
     start.check()

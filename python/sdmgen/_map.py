@@ -152,7 +152,7 @@ class MapInfo:
     reason: str = ""
     #: the check of the network's map; None: it was not checked
     check: Optional[Check] = None
-    #: the surface leaves the grid: the map of a model holds a part of the shape only
+    #: the surface leaves the grid, so the map holds a part of the shape only (maps of a model)
     cut: bool = False
 
 
@@ -218,18 +218,17 @@ class Map(Image):
 
     @property
     def volume(self) -> float:
-        """the volume of the shape, mm^3, from the distances near the surface (`sdm_map_volume` in
-        sdm/map.h tells the method); warns once if the training of its model found volumes to be off
-        by over 2 %"""
+        """the volume of the shape, mm^3, from the distances near the surface (method: `sdm_map_volume`
+        in sdm/map.h). Warns once if the training of the model found volumes off by over 2 %"""
         self._doubts.warn("volume")
         result = c_double()
         call("sdm_map_volume", self.grid, address(self.values), 0, byref(result))
         return result.value
 
     def volume_adjoint(self) -> Float32:
-        """derivatives of `volume` by the values, mm^3 per mm, [z, y, x]: `model.vjp(...)` of them are
-        the derivatives of the volume by the parameters; warns once if the training of its model found
-        these to be off by over 20 %"""
+        """derivatives of `volume` by the values, mm^3 per mm, [z, y, x]. `model.vjp(map.volume_adjoint())`
+        gives the derivatives of the volume by the parameters. Warns once if the training of the model
+        found these off by over 20 %"""
         self._doubts.warn("volume_derivative")
         result = np.empty_like(self.values)
         call("sdm_map_volume_adjoint", self.grid, address(self.values), 0, address(result))

@@ -24,8 +24,10 @@ SIGNS = ("auto", "crossings", "pseudonormal", "winding")
 
 @dataclass(frozen=True)
 class Audit:
-    """What a mesh is like; vertices with equal coordinates count as one. `volume` is signed, mm^3;
-    `low` and `high` are the corners of the bounding box, mm."""
+    """Findings on a mesh; vertices with equal coordinates count as one. `volume` is signed, mm^3;
+    `low` and `high` are the corners of the bounding box, mm. `closed`: on every edge as many triangles
+    run in one direction as in the other. `manifold`: closed, and every edge has two triangles.
+    `inverted`: closed, and the whole mesh is inside out. sdm/mesh.h describes the numbers."""
 
     vertices: int
     triangles: int
@@ -82,14 +84,15 @@ class Report:
     turned: bool
     #: number of parts that were inside out and were turned, apart from `turned`
     parts_turned: int
-    #: volume outside, mm^3, that parts enclose which are inside out and meet others: they are subtracted
-    #: from these; by counting voxels, 64 along the longest edge, so smaller parts may be missed; NaN in
-    #: the report of a map: not measured, because the mesh or its shape was examined before
+    #: volume, mm^3, of parts that are inside out and meet others: they are subtracted from these.
+    #: Counted by voxels, 64 along the longest edge, so a small part may be missed. NaN in the report
+    #: of a map: not measured, because the mesh or its shape was examined before
     subtracted: float
     #: surface inside the union was removed
     unioned: bool
+    #: number of triangles of the surface to which distances are measured
     triangles_used: int
-    #: bound on the error of the distances that this causes, mm
+    #: bound on the error of distances that the removal of inner surface causes, mm
     union_error_mm: float
 
 
@@ -247,7 +250,7 @@ class Mesh:
         call("sdm_mesh_write", path_bytes(path), byref(self._c))
 
     def audit(self) -> Audit:
-        """What the mesh is like: closed, overlapping, inside out as a whole; report() tells of its parts."""
+        """Findings on the mesh as a whole: closed, overlapping, inside out. report() has those on its parts."""
         result = make("sdm_audit")
         call("sdm_mesh_audit", byref(self._c), byref(result))
         return _audit_of(result)
@@ -341,14 +344,15 @@ def exact(
     narrow: Optional[float] = None,
     threads: int = 0,
 ) -> ExactMap:
-    """The exact signed distance map, mm, NEGATIVE INSIDE, of a shape at parameters (default: its
-    own), of a mesh, or of a pair (vertices, triangles). A mesh that overlaps itself counts as the
-    union of the solids that it encloses.
+    """The exact signed distance map, mm, NEGATIVE INSIDE, of a Shape at `params` (default: its
+    defaults), of a Mesh, or of a pair (vertices, triangles). A mesh that overlaps itself counts as
+    the union of the solids that it encloses.
 
     grid, or size, spacing and origin: as for `sdmgen exact`; by default 64 voxels along the longest
     edge of the bounding box with a margin of a tenth of it on every side. layers: any of "closest",
-    "normal", "triangle" and, for shapes, "jacobian". narrow: clamps distances to this many voxels.
-    keep_overlap: measures to all triangles, also to those inside the union."""
+    "normal", "triangle" and, for shapes, "jacobian": the members of ExactMap. narrow: clamps
+    distances to this many voxels. keep_overlap: measures distances to all triangles, also to those
+    inside the union. sign: the sign method (sdm/exact.h)."""
     layers = words(layers, _LAYERS, "layers")
     shape = source if not isinstance(source, (Mesh, tuple, list)) else None
     if "jacobian" in layers and shape is None:

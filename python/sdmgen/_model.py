@@ -47,16 +47,17 @@ def accuracy_of(c: Any) -> Accuracy:
 
 @dataclass(frozen=True)
 class Quality:
-    """What the training found; numbers are NaN if not known. The errors of volumes and derivatives are
-    relative: root mean square of the error over that of the right values (0.1: 10 %)."""
+    """Quality of a model, as its training measured it on held-out shapes; NaN: not known. The errors of
+    volumes and derivatives are relative: root mean square of the error over that of the exact values
+    (0.1: 10 %)."""
 
     #: "good", "usable" or "poor"; "": trained by an earlier version
     grade: str
     #: share of the shapes that the grid cuts
     cut: float
-    #: how far exact maps, interpolated between the voxels, miss the surface
+    #: how far exact maps, interpolated between the voxels, miss the surface, mm
     between_mm: float
-    #: thickness of the thinnest part
+    #: thickness of the thinnest part, mm
     thickness_mm: float
     #: of the volume of maps
     volume_error: float
@@ -66,9 +67,9 @@ class Quality:
     volume_derivative_error: float
     #: of the volume inside surfaces of maps
     surface_volume_error: float
-    #: largest error of distances farther than `Accuracy.near_mm` from the surface
+    #: largest error of distances farther than `Accuracy.near_mm` from the surface, mm
     far_error_mm: float
-    #: the uses that the model is not for, with their figures, in words
+    #: the uses for which the model is not good enough, with their figures, in words
     unfit: tuple[str, ...]
 
 
@@ -132,12 +133,14 @@ class Samples:
 
 
 class Model:
-    """A trained network, from a model file. Any number of threads may use it.
+    """A trained network, from a model file (its path, or its content as bytes). Any number of threads
+    may use it.
 
-    model(a=4.2) computes the map at these parameters; the others have their defaults. `policy` says
-    what happens to parameters outside of the trained range: "refuse" raises RangeError, "clamp" moves
-    them to the nearest allowed value, "exact" computes the map with the exact engine, which needs the
-    shape: a built-in one, one of `plugin`, or `shape` (for example one written in Python)."""
+    model(a=4.2) computes the map with a = 4.2 and the other parameters at their defaults. `policy` is
+    for parameters outside of the trained range: "refuse" raises RangeError, "clamp" moves them to the
+    nearest allowed value, "exact" computes the map with the exact engine. The exact engine needs the
+    shape: a built-in one, that of `plugin` (the path of its .so file), or `shape` (for example one
+    written in Python)."""
 
     def __init__(self, path: Any, *, shape: Optional[Shape] = None, plugin: Any = None) -> None:
         self._handle = Handle("sdm_model_free")
@@ -158,7 +161,7 @@ class Model:
         self.grid = Grid._of(info.grid)
         #: errors on shapes that the training did not use
         self.accuracy = accuracy_of(info.accuracy)
-        #: the grade of the training, and what its grid leaves out
+        #: the grade of the training, and the uses for which the model is not good enough
         self.quality = _quality_of(info.quality, "model" if self.path is None else str(self.path))
         self._doubts = _doubts_of(self)
         #: name of the shape
@@ -207,10 +210,10 @@ class Model:
             return self._shape
 
     def check_use(self, use: str) -> None:
-        """Tells whether the training found the model good enough for a use: "surface", "volume" (of
-        maps), "derivative" (of maps by the parameters), "volume_derivative", "distance" (far from the
-        surface) or "surface_volume" (inside surfaces of maps). Raises QualityError, whose text has the
-        measured figure, if it did not, and UnsupportedError if it measured none."""
+        """Raises QualityError, with the measured figure, if the training found the model not good
+        enough for a use: "surface", "volume" (of maps), "derivative" (of maps by the parameters),
+        "volume_derivative", "distance" (far from the surface) or "surface_volume" (inside surfaces of
+        maps). Raises UnsupportedError if the training did not measure it. Else returns None."""
         call("sdm_model_check_use", self, choice(use, USES, "use"))
 
     def values(self, params: Params = None, **named: float) -> Float64:
@@ -280,11 +283,11 @@ class Model:
         """The signed distance map, mm, NEGATIVE INSIDE, at parameters.
 
         grid, or size, spacing, origin and direction: another grid than the model's, as for `sdmgen
-        generate`; `outside` says what happens to voxels outside of the box of the model's voxel
-        centres: "refuse", "bound" (a lower bound of the distance) or "exact". check: compares the
-        network's map with exact distances (map.info.check). max_error: a map whose error near the
-        surface (the statistic error_of: "max", "q95", "rmse", "mean") is larger is replaced by an
-        exact one; with policy="clamp" it raises QualityError."""
+        generate`. outside: for voxels outside of the box of the model's voxel centres: "refuse"
+        (RangeError), "bound" (a lower bound of the distance) or "exact". check: compares the network's
+        map with exact distances (map.info.check). max_error: bound, mm, on the error of the map near
+        the surface (error_of: its statistic, "max", "q95", "rmse" or "mean"). A map beyond the bound
+        is replaced by an exact one; with policy="clamp" QualityError is raised."""
         p = self.values(params, **named)
         opts = self._opts(policy, threads, check, max_error, error_of, outside)
         self._bounded(opts, p[None])
@@ -356,8 +359,8 @@ class Model:
         return Map(values, self.grid, info)._of(self._doubts)
 
     def jacobian(self, params: Params = None, *, policy: str = "refuse", threads: int = 0, **named: float) -> Jacobian:
-        """The map and its derivatives by all parameters, mm per unit of the parameter. Warns once, as jvp(),
-        vjp() and slopes do, if the training found derivatives to be off by over 20 %."""
+        """The map and its derivatives by all parameters, mm per unit of the parameter. Like jvp(), vjp() and
+        slopes it warns once if the training found derivatives off by over 20 %."""
         p = self.values(params, **named)
         opts, result = self._opts(policy, threads), make("sdm_result")
         values = np.empty(self.grid.shape, np.float32)
@@ -400,10 +403,10 @@ class Model:
     def vjp(
         self, adjoint: ArrayLike, params: Params = None, *, policy: str = "refuse", threads: int = 0, **named: float
     ) -> Float64:
-        """The transposed Jacobian times `adjoint` [z, y, x]: if the adjoint is the derivative of a
-        function of the map by the voxels, the result [k] is that by the parameters. Warns once if
-        the training found derivatives to be off by over 20 %: those of the volume for an adjoint of
-        `Map.volume_adjoint`, else those of maps."""
+        """The transposed Jacobian times `adjoint` [z, y, x]. If the adjoint is the derivative of a
+        function of the map by the voxels, the result [k] is the derivative of this function by the
+        parameters. Warns once if the training found derivatives off by over 20 %: those of the volume
+        for an adjoint of `Map.volume_adjoint`, else those of maps."""
         p = self.values(params, **named)
         w = float32(adjoint, self.grid.shape, "adjoint")
         opts, slopes, result = self._opts(policy, threads), np.empty(len(p)), make("sdm_result")
@@ -413,7 +416,7 @@ class Model:
         return slopes
 
     def check(self, params: Params = None, *, threads: int = 0, **named: float) -> Check:
-        """The error of the network's map near the surface, mm, against exact distances. It needs the shape."""
+        """The error of the network's map near the surface, mm, against exact distances. Needs the shape."""
         info = self(self.values(params, **named), check=True, threads=threads).info
         assert info.check is not None
         return info.check
@@ -451,8 +454,9 @@ class Model:
         threads: int = 0,
         **named: float,
     ) -> Samples:
-        """Signed distances (mm, NEGATIVE INSIDE) at points [n, 3], LPS mm, and their derivatives. Warns once
-        of points far from the surface, if the training found distances there to be wrong."""
+        """Signed distances (mm, NEGATIVE INSIDE) at points [n, 3], LPS mm, and their derivatives. Computes the
+        whole map at each call; field() computes it once. Warns once of points far from the surface if the
+        training found distances there wrong by over a voxel."""
         field = self.field(
             self.values(params, **named), derivatives=slopes, policy=policy, outside=outside, threads=threads
         )

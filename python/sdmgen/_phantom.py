@@ -28,8 +28,8 @@ class Phantom:
 
 
 def random_pose(degrees: float, mm: float, seed: int = 1) -> Pose:
-    """A random pose: a rotation about a random axis by up to this angle, and a translation in the ball
-    of this radius: the angle is in degrees, the radius in mm."""
+    """A random pose: a rotation about a random axis by up to `degrees`, and a translation in the ball of
+    radius `mm`."""
     angle = np.arccos(-1.0) / 180 * number(degrees, "degrees")
     return Pose._of(function("sdm_phantom_random_pose")(angle, number(mm, "mm"), whole(seed, "seed", 0, 2**53)))
 
@@ -55,9 +55,9 @@ def phantom(
     seed: int = 1,
     threads: int = 0,
 ) -> Phantom:
-    """A CT-like image (float32, HU) of a shape in a pose, with partial volume, texture, blur and
-    noise; the arguments are the options of `sdmgen phantom`, with its defaults. Without grid, size
-    and spacing the grid is fitted to the shape, 64 voxels along the longest edge."""
+    """A CT-like image (float32, HU) of a shape in a pose, with partial volume, texture, blur and noise,
+    for tests of fits. The arguments are the options of `sdmgen phantom`, with its defaults. Without
+    grid, size and spacing the grid has 64 voxels along the longest edge of the shape."""
     p = instance(shape, Shape, "shape").values(params)
     at = Pose() if pose is None else instance(pose, Pose, "pose")
     if grid is None:

@@ -41,9 +41,10 @@ class Param:
 
 @dataclass(frozen=True)
 class Measure:
-    """A measure of a shape. `depth`: where it was taken, mm; None: it belongs to no depth. `value` is
-    NaN where a depth lies beyond the end of the shape. Of a fit: `sd`, the standard deviation (NaN:
-    unknown), and `not_determined`: the target says no more about it than the priors; else None."""
+    """A measure of a shape, such as a length. `depth`: where it was taken, mm; None: it belongs to no
+    depth. `value` is NaN where a depth lies beyond the end of the shape. FitResult.measures() also sets
+    `sd`, the standard deviation (NaN: unknown), and `not_determined`: the target says no more about the
+    measure than the priors. Else both are None."""
 
     name: str
     value: float
@@ -119,11 +120,11 @@ class Shape:
     Shape("cochlea", edge=0.3) is a built-in shape with its options; plugin="gear.so" loads others.
 
     Shape(function, params) is a shape written in Python: function(a, b, ...) takes a number for each
-    Param and returns (vertices [n, 3] in mm, triangles [m, 3]), counter-clockwise seen from outside,
-    whose numbers should not depend on the parameters. velocity(a, b, ...) may return the derivatives
-    of the vertices by each parameter, [len(params), n, 3]; without it they are differences. The
-    library calls the function from one thread at a time. Its mesh must depend on the parameters
-    alone."""
+    Param and returns (vertices [n, 3] in mm, triangles [m, 3]). The mesh must be closed, its triangles
+    counter-clockwise seen from outside, and depend on the parameters alone. The numbers n and m should
+    not depend on them. velocity(a, b, ...) may return the derivatives of the vertices by each
+    parameter, [len(params), n, 3]; without it they are computed by differences. The library calls the
+    functions from one thread at a time. name: default the name of the function."""
 
     def __init__(
         self,
@@ -209,8 +210,8 @@ class Shape:
         return result.value
 
     def measures(self, params: Params = None, depths: ArrayLike = (), **named: float) -> list[Measure]:
-        """The measures of the shape at parameters: its own, then volume, area and extents. Measures of
-        a depth, such as the frequency along the cochlea, are taken at `depths`, mm."""
+        """The measures of the shape at parameters: its own, then volume, area and extents. Measures that
+        depend on a depth, such as the frequency along the cochlea, are taken at each of `depths`, mm."""
         return measures_by(self.call, "sdm_shape_measure", (self, address(self.values(params, **named))), depths, False)
 
     def random(self, seed: int) -> Float64:

@@ -17,8 +17,8 @@ from ._shape import Registry, Shape
 
 @dataclass(frozen=True)
 class Progress:
-    """State of a training. `phase`: "trial", "data", "bases", "fit", "refine" or "evaluate"; `fraction` of the
-    budget, 0 .. 1; numbers that are not known are NaN."""
+    """State of a training. `phase`: "trial", "data", "bases", "fit", "refine" or "evaluate". `fraction`: the
+    used part of the budget, 0 .. 1. Numbers that are not known are NaN."""
 
     phase: str
     fraction: float
@@ -44,9 +44,9 @@ class TrainResult:
     seconds: float
     #: "good", "usable" or "poor"
     grade: str
-    #: what limits the model and what to do
+    #: what limits the model and what to do, in words; "": nothing that was measured
     sentence: str
-    #: notices of the run
+    #: the notices that `sdmgen train` prints
     messages: tuple[str, ...]
 
 
@@ -61,12 +61,13 @@ def train(
     force: bool = False,
     progress: Optional[Callable[[Progress], Any]] = None,
 ) -> TrainResult:
-    """Trains a network as the YAML file `config` says, like `sdmgen train`. settings replace keys of
-    the file: {"network.depth": 4} or ["network.depth=4"]. out: the folder of the run (default: that
-    of the configuration). shape: a shape written in Python, whose name the configuration has.
-    A folder that holds a model or a checkpoint stays unchanged unless resume (continues from the
-    checkpoint) or force (starts again) is given. progress is called a few times a second; an
-    exception in it, or Ctrl-C, writes a checkpoint and stops the training."""
+    """Trains a network from the YAML file `config`, as `sdmgen train` does.
+
+    settings: values in place of those of the file: {"network.depth": 4} or ["network.depth=4"]. out: the
+    folder of the run (default: that of the configuration). shape: a shape written in Python; its name
+    must be the shape.name of the configuration. A folder that holds a model or a checkpoint is refused,
+    unless resume=True continues from the checkpoint or force=True starts again. progress: called a few
+    times a second. An exception in it, or Ctrl-C, writes a checkpoint and stops the training."""
     if shape is not None:
         instance(shape, Shape, "shape")
     if shape is not None and plugin is not None:

@@ -19,7 +19,11 @@ KINDS: dict[str, Callable[[Any], Network]] = {
 
 
 def load(path: Any) -> Network:
-    """The network of a model file as a module: Pod, Template, Point or Sdmnn."""
+    """The network of a model file as a module: Pod, Template, Point or Sdmnn.
+
+    The range of the parameters is not checked. Derivatives of a Template are those of its interpolation;
+    the library interpolates the gradients at the nodes, and the two differ where the template has edges.
+    Derivatives of the warp of a Template are exact up to the third order."""
     file = File(path)
     if file.model.kind not in KINDS:
         raise UnsupportedError("unsupported", f"networks of the kind '{file.model.kind}' are not modules; use Sdm(model)")

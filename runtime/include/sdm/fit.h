@@ -1,11 +1,12 @@
 /* Fits a shape to an image, labels or points: estimates the parameters and the rigid pose of the
    shape, with their standard deviations, and judges the result.
 
-   A fit in C: fill an sdm_fit_source (what makes the maps) and an sdm_fit_target (the data); take
-   the options of sdm_fit_defaults_for(); set the start (start_params, start_pose or turns) and, for
-   an image, the values of its tissues (appearance); call sdm_fit(). SDM_OK: the result is to be
-   trusted, or `doubtful` with a reason. SDM_E_QUALITY: it is not; sdm_fit_result.verdict says why.
-   examples/consume/fit_points.c is a complete program; docs/fitting.md is the guide.
+   A fit in C (examples/consume/fit_points.c is a complete program, docs/fitting.md the guide):
+   - Fill an sdm_fit_source (what makes the maps) and an sdm_fit_target (the data).
+   - Take the options of sdm_fit_defaults_for(). Set the start: start_params, and start_pose or
+     turns; for an image also the values of its tissues, appearance.
+   - Call sdm_fit(). SDM_OK: nothing refutes the fit; sdm_fit_result.verdict may still be doubtful,
+     with a reason. SDM_E_QUALITY: the fit is not to be trusted; the verdict says why.
 
    Words: the world is the space of the data (LPS, mm), the shape's frame that of its mesh
    (sdm/pose.h). sd: standard deviation. A tissue: a material inside or outside the shape.
@@ -28,11 +29,10 @@
    averaged over a motion of the surface of 3 % of a map voxel (Ermoliev, Norkin and Wets 1995), so
    that every nearby start leads to the same maximum.
 
-   The covariance is the sandwich H^-1 J H^-1
-   (Huber 1967): H is the observed information (labels: Louis 1982), J the covariance of the
-   gradient of the log-likelihood with the spatial correlation of the residuals (Conley 1999),
-   corrected for the part of the residuals that the fit has explained. So correlated noise and small
-   errors of the model widen it. */
+   The covariance is the sandwich H^-1 J H^-1 (Huber 1967): H is the observed information (labels:
+   Louis 1982), J the covariance of the gradient of the log-likelihood with the spatial correlation
+   of the residuals (Conley 1999), corrected for the part of the residuals that the fit has
+   explained. So correlated noise and small errors of the model widen it. */
 #ifndef SDM_FIT_H
 #define SDM_FIT_H
 
@@ -109,6 +109,7 @@ typedef struct sdm_fit_appearance {
     sdm_fit_law inside[SDM_FIT_LAWS], outside[SDM_FIT_LAWS];
 } sdm_fit_appearance;
 
+/* What explains the value of a voxel; the head of this file describes both. */
 typedef enum sdm_fit_model { SDM_FIT_PARTIAL_VOLUME = 0, SDM_FIT_LABELS = 1 } sdm_fit_model;
 
 /* Rotations to try at the start. */

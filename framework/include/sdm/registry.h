@@ -1,4 +1,8 @@
-/* Host side of the shape plug-ins: registry of shapes, loader, instances. */
+/* Shapes by name: a registry holds the shapes, an instance is a shape with fixed options, whose
+ * mesh and measures can be computed at parameters.
+ *
+ * Order of calls: sdm_registry_create(); sdm_builtin_shapes_add() or sdm_registry_load();
+ * sdm_registry_find(); sdm_instance_create(); sdm_instance_mesh(). */
 #ifndef SDM_REGISTRY_H
 #define SDM_REGISTRY_H
 
@@ -14,8 +18,10 @@ extern "C" {
 /* A set of shapes. Fill it from one thread; after that any thread may read it. */
 typedef struct sdm_registry sdm_registry;
 
+/* *out = an empty registry; free it with sdm_registry_free(). SDM_E_NOMEM. */
 SDM_API sdm_status sdm_registry_create(sdm_registry **out, sdm_error *err);
-/* Also unloads the plug-ins that were loaded: free all instances first. NULL is allowed. */
+/* Frees the registry and unloads the plug-ins that were loaded: free all instances first. NULL is
+ * allowed. */
 SDM_API void sdm_registry_free(sdm_registry *r);
 
 /* Checks ABI version, size, names, ranges and required callbacks of the table *shape and stores a
@@ -63,16 +69,19 @@ typedef struct sdm_named_text {
 SDM_API sdm_status sdm_shape_check_option(const sdm_shape *shape, const char *name,
                                           const char *value, sdm_error *err);
 
-/* Creates an instance with the given options; all others have their defaults. The shape must stay
- * valid as long as the instance. base_dir (may be NULL): folder for relative paths in FILE options.
- * SDM_E_CONFIG: unknown option (with "did you mean") or bad value; SDM_E_PLUGIN: the plug-in's
- * create() failed, or its describe() or distributions() gave values that are not allowed. */
+/* Creates an instance with the given options; all others have their defaults. Free it with
+ * sdm_instance_free(), before the registry. base_dir (may be NULL): folder for relative paths in
+ * FILE options. SDM_E_CONFIG: unknown option (with "did you mean") or bad value; SDM_E_PLUGIN: the
+ * plug-in's create() failed, or its describe() or distributions() gave values that are not allowed.
+ */
 SDM_API sdm_status sdm_instance_create(const sdm_shape *shape, const sdm_named_text *options,
                                        size_t n_options, const char *base_dir, sdm_instance **out,
                                        sdm_error *err);
 SDM_API void sdm_instance_free(sdm_instance *s);
 
 SDM_API const sdm_shape *sdm_instance_shape(const sdm_instance *s);
+/* The *n parameters (n may be NULL), in the order of parameter vectors. Valid as long as the
+ * instance. */
 SDM_API const sdm_param *sdm_instance_params(const sdm_instance *s, size_t *n);
 /* The distributions of the parameters, [n_params] as of sdm_instance_params(); uniform unless the
  * shape states others. Owned by the instance. */

@@ -106,8 +106,7 @@ static void print_blur(const cli_fit *f)
     const double blur = f->result.blur, voxel = cli_fit_map_voxel(f);
     printf("  point spread %.3g mm", blur);
     if (!f->opts.keep_blur && blur <= 0.5 * voxel * (1 + 1e-6))
-        printf(": the maps, with voxels of %.3g mm, show no smaller one; the image may be "
-               "sharper",
+        printf(", the smallest that maps with voxels of %.3g mm show; the image may be sharper",
                voxel);
     printf("\n");
 }

@@ -187,7 +187,8 @@ static const char *in_short(const cli_fit *f)
                      "not use what the lines below name, nor what is `not determined`"
                    : "the points are too few to test the fit: its values may be right or wrong";
     if (only(v, SDM_FIT_DOUBTFUL, maps, sizeof maps / sizeof *maps))
-        return "the maps limit the fit: the values are near, but their +- may be too small";
+        return "the maps limit the fit: the values are near the right ones; for their +- see the "
+               "lines below";
     if (cli_fit_found(f, SDM_FIT_CHECK_VOXELS, SDM_FIT_DOUBTFUL, -INFINITY) &&
         only(v, SDM_FIT_DOUBTFUL, coarse, sizeof coarse / sizeof *coarse))
         return "the maps are too coarse for these data: fit with finer ones before you judge the "

@@ -14,13 +14,13 @@
 
 #include "fit/data/observation.h"
 #include "fit/judge/rival.h"
-#include "fit/judge/unknowns_cost.h"
 #include "fit/solver/anderson.h"
 #include "fit/solver/averaged_gradient.h"
 #include "fit/solver/newton.h"
 #include "fit/solver/objective.h"
 #include "fit/solver/prior.h"
 #include "fit/solver/solve.h"
+#include "fit/solver/unknowns_cost.h"
 #include "oracle/fit_tools.h"
 #include "sdm/internal/rng.h"
 

@@ -15,6 +15,7 @@
 #include "fit/data/surface_places.h"
 #include "fit/solver/prior.h"
 #include "noise.h"
+#include "outlying.h"
 #include "sdm/internal/hardly_known.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
@@ -22,8 +23,6 @@
 
 // points and places of the surface that are compared; of more, every second, third ... one
 #define MOST 2000
-// the golden ratio less 1: its multiples fill 0 .. 1 evenly
-#define GOLDEN 0.61803398874989485
 // neighbours that define the spacing of points, and that show whether points form a layer
 #define FEW 4
 #define MANY 10
@@ -169,15 +168,12 @@ static void judge_patches(const fit_problem *p, const patches *found, size_t n_p
                       d < 0 ? "inside" : "outside", refused);
 }
 
-/* Splits points into those on the surface and strays, at most MOST in all: of `step` points that
-   follow each other one, not always the same, since points in the order of a scan or of triangles
-   would leave stripes bare. */
+/* Splits points into those on the surface and strays, at most MOST in all. */
 static void split_points(const fit_problem *p, cloud *on, cloud *strays)
 {
     const size_t step = (p->samples.n + MOST - 1) / MOST;
-    for (size_t first = 0, number = 0; first < p->samples.n; first += step, number++) {
-        const double turn = GOLDEN * (double)number;
-        const size_t i = first + (size_t)((turn - floor(turn)) * (double)step);
+    for (size_t k = 0; k * step < p->samples.n; k++) {
+        const size_t i = fit_pick(step, k);
         if (i >= p->samples.n) break;
         cloud *c = sdm_fit_point_belongs(&p->observation, p->samples.field[i]) < 0.5 ? strays : on;
         for (size_t a = 0; a < 3; a++) c->x[c->n][a] = p->samples.world[3 * i + a];

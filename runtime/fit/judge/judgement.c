@@ -12,13 +12,14 @@
 #include "coverage.h"
 #include "far_labels.h"
 #include "finding.h"
+#include "fit/solver/unknowns_cost.h"
 #include "offset.h"
+#include "outlying.h"
 #include "rival.h"
 #include "sdm/internal/fit_finding.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/shared.h"
 #include "suffice.h"
-#include "unknowns_cost.h"
 
 // the sd of a tissue may exceed the robust sd by this factor where the shape is right; the sd of
 // the texture and the tails of a distribution that is not Gaussian make up the difference
@@ -450,6 +451,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     }
     if (!s && points) s = sdm_fit_check_points(p, &residuals, r->noise_factor, v, err);
     if (!s && points) s = sdm_fit_check_coverage(p, r, coarse, v, err);
+    if (!s && points && has_passed(v, SDM_FIT_CHECK_PATCH)) s = sdm_fit_check_outlying(p, v, err);
     // strays that form a surface belong to the data: they show how long these are
     if (!s && points && !has_passed(v, SDM_FIT_CHECK_PATCH))
         s = sdm_fit_measure_beyond(p, r, &bounds, err);

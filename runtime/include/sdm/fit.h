@@ -336,7 +336,8 @@ typedef enum sdm_fit_check_kind {
        fit; left out where the pose is kept or a check failed */
     SDM_FIT_CHECK_NEXT_POSE,
     /* points: share of those that lie on no surface of the shape but form one: neighbours as near
-       as those on the shape, or in a thin layer */
+       as those on the shape, or in a thin layer; or share of the points that lie together on one
+       side of the surface, 5 sd or more from it */
     SDM_FIT_CHECK_PATCH,
     /* points: share of the fitted surface, or of the part that a parameter moves, without points
        near it */

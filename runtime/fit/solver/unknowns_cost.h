@@ -1,7 +1,7 @@
 /* How much the unknowns of a shape cost its evidence. */
 #pragma once
 
-#include "fit/solver/problem.h"
+#include "problem.h"
 
 /* The logarithm by which the likelihood of the best values exceeds its mean over all values of the
    unknowns that were likely before the fit. r: with its covariance; n_independent: the number of

@@ -5,8 +5,8 @@
 
 #include <math.h>
 
-#include "fit/solver/prior.h"
-#include "fit/solver/solve.h"
+#include "prior.h"
+#include "solve.h"
 
 // what the parameters list[n] cost, each at most `most`
 static double params_cost(const fit_problem *p, const sdm_fit_result *r, size_t n,

@@ -160,7 +160,8 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     cli_print_next(args, r, r->chosen ? kind_name(r->kind) : NULL, times->ms_network, minutes);
     if (cli_warnings() > 0)
         printf("  warnings    %zu, at the beginning of the output%s\n", cli_warnings(),
-               v->cut > 0 || v->inside_out > 0 || v->triangles_by[0] || sdm_verdict_lacks_part(v)
+               v->cut > 0 || v->inside_out > 0 || v->triangles_by[0] || sdm_verdict_lacks_part(v) ||
+                       !strncmp(v->key, "grid.", 5)
                    ? ""
                    : ": mend what they name first, the lines above leave it out");
     return SDM_OK;
@@ -180,6 +181,7 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
 {
     const char *folder = config->output.folder;
     const bool first = sdm_comm_rank(comm) == 0;
+    double thin_spacing = NAN;
     cli_progress progress;
     sdm_train_hooks hooks = cli_train_hooks(&progress);
     hooks.store = store;
@@ -188,7 +190,8 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     sdm_model *before = first && args->force ? cli_model_before(folder) : NULL;
     // a run that goes on has told it at its beginning
     if (first && !(args->resume && has_checkpoint(folder)))
-        (void)cli_notice_survey(config, shape, cli_other_process(args, registry, shape));
+        (void)cli_notice_survey(config, shape, cli_other_process(args, registry, shape),
+                                &thin_spacing);
     if (first) cli_progress_start(&progress);
     sdm_status s = sdm_train(config, shape, folder, args->resume, &hooks, &report, err);
     if (first) cli_progress_end(&progress, !s);
@@ -199,6 +202,7 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     if (!s) s = look_at_model(report.model_path, shape, folder, &times, err);
     const double old_mm = s ? NAN : cli_before_rmse(before, report.model_path);
     sdm_model_free(before);
+    if (!s) cli_show_part_first(&report, thin_spacing, config->train.minutes);
     if (!s) s = print_summary(args, &report, &times, &use, old_mm, config->train.minutes, err);
     sdm_free(use.memory);
     return s || !args->report
@@ -238,6 +242,7 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     sdm_instance *shape = NULL;
     sdm_comm *comm = NULL;
     sdm_map_store *store = NULL;
+    double thin_spacing;
     sdm_status s = cli_page_check_option(args, err);
     if (!s && (args->nodes || args->cores) && !args->plan)
         s = sdm_fail(err, SDM_E_ARG, "--nodes and --cores belong to --plan");
@@ -249,7 +254,8 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
     if (!s && !trains)
-        (void)cli_notice_survey(config, shape, cli_other_process(args, registry, shape));
+        (void)cli_notice_survey(config, shape, cli_other_process(args, registry, shape),
+                                &thin_spacing);
     if (!s && !trains) s = cli_plan_training(args, config, shape, err);
     if (!s && trains && !sdm_comm_rank(comm))
         s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);

@@ -202,6 +202,26 @@ void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_ti
                "with --plan tells how many)\n");
 }
 
+void cli_show_part_first(sdm_train_report *r, double thin_spacing, double minutes)
+{
+    sdm_verdict *v = &r->verdict;
+    const double factor = pow(v->coarse_mm / thin_spacing, 3);
+    char time[80] = "";
+    if (!(factor > 1) || v->inside_out > 0 || sdm_verdict_lacks_part(v)) return;
+    v->limited = true, v->limit = SDM_CAUSE_GRID, v->at_best_mm = NAN;
+    strcpy(v->key, "grid.spacing");
+    v->from = v->coarse_mm, v->to = thin_spacing;
+    v->minutes = r->steps > 0 ? ceil(2 * factor * minutes) / 2 : 0;
+    if (v->minutes > 0)
+        snprintf(time, sizeof time, ", and train.minutes from %.3g to %.6g for more voxels",
+                 minutes, v->minutes);
+    snprintf(v->sentence, sizeof v->sentence,
+             "The grid is too coarse for the thinnest part of some shapes, as a warning at the "
+             "beginning says: lower grid.spacing from %.6g to %.6g (and raise grid.size in "
+             "proportion, if it is given)%s.",
+             v->from, v->to, time);
+}
+
 /* The line `next` of a template that errs near the surface. */
 static void print_next_pod(const cli_args *args, const sdm_train_report *r, double minutes)
 {

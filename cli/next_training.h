@@ -19,6 +19,12 @@
 void cli_print_next(const cli_args *args, const sdm_train_report *r, const char *kind,
                     double ms_map, double minutes);
 
+/* thin_spacing: that which a warning at the beginning asks for, because the grid is too coarse for
+   the thinnest part of a shape; NaN: there is none. Puts it in place of what the verdict advises,
+   with more minutes in proportion to the voxels, unless its sentence tells of this part or of parts
+   that are inside out. */
+void cli_show_part_first(sdm_train_report *r, double thin_spacing, double minutes);
+
 /* Prints the line `far away` where the template errs far from the surface alone, and `slow` where
    it takes over a third of the time of an exact map: what `auto` has measured of `pod`, and where
    its model is, or the command that trains it with so many minutes (0: the configuration gives

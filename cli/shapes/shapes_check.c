@@ -69,6 +69,7 @@ static sdm_status open_config(check *c, sdm_error *err)
     c->opts.distribution = c->distribution;
     c->opts.grid = c->survey.grid = &c->config->grid;
     c->survey.config = c->config;
+    c->opts.grid_fitted = c->config->grid_fitted;
     c->opts.seed = c->config->seed;
     return SDM_OK;
 }

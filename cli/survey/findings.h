@@ -23,5 +23,9 @@ typedef void cli_tell(void *user, sdm_status weight, const char *line);
 /* The weight of the findings of sdm_survey_mend_first(). */
 sdm_status cli_survey_cause(const cli_survey *s);
 
+/* The spacing, mm, with which the line about the thinnest part says that the grid shows it; NaN: no
+ * such line is told. */
+double cli_survey_thin_spacing(const cli_survey *s);
+
 /* Appends "flat faces lie exactly on planes of voxel centres along x and z, ..." to `text`. */
 void cli_describe_hits(const sdm_face_hits *h, sdm_text *text);

@@ -2,6 +2,8 @@
 #include "teller.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 
 #include "report/report_audit.h"
 #include "sdm/internal/box.h"
@@ -104,16 +106,29 @@ static void tell_hits(teller *t)
     teller_tell(t, SDM_OK, &text);
 }
 
+/* Is the thinnest part told? tell_tiny() and tell_unit() explain parts and shapes in another unit,
+ * tell_inside_out() parts that take away from others. */
+static bool is_thin(const cli_survey *s)
+{
+    const sdm_shape_survey *f = &s->found;
+    return f->thin.shapes && !f->inside_out.shapes && f->tiny.shapes < f->thin.shapes &&
+           !f->scale.odd_size && !f->scale.odd_speed;
+}
+
+double cli_survey_thin_spacing(const cli_survey *s)
+{
+    char text[32];
+    if (!is_thin(s) || sdm_survey_mend_first(&s->found)) return NAN;
+    snprintf(text, sizeof text, "%.2g", 0.5 * sdm_grid_coarsest(s->grid) / s->found.thin.amount);
+    return strtod(text, NULL);
+}
+
 /* One line about the thinnest part of the shape in which it is thinnest. */
 static void tell_thin(teller *t)
 {
     const sdm_survey_count *c = &t->s->found.thin;
     sdm_text text = {0};
-    // tell_tiny() and tell_unit() explain parts and shapes in another unit, tell_inside_out() parts
-    // that take away from others
-    if (!c->shapes || t->s->found.inside_out.shapes || t->s->found.tiny.shapes >= c->shapes ||
-        t->s->found.scale.odd_size || t->s->found.scale.odd_speed)
-        return;
+    if (!is_thin(t->s)) return;
     const sdm_part_audit *audit = teller_audit(t, c->worst);
     if (!audit) {
         teller_tell_count(t, SDM_E_QUALITY, c, "parts too thin for the grid");
@@ -125,12 +140,17 @@ static void tell_thin(teller *t)
     sdm_text_add(&text, "; parts are too thin ");
     teller_add_share(t->s, c, &text);
     sdm_text_add(&text, ")");
+    const bool fitted = t->s->config && t->s->config->grid_fitted;
+    if (fitted)
+        sdm_text_add(&text, "; grid: auto makes up to 1,000,000 voxels to show a part, as far as "
+                            "data.memory_gb holds their maps");
     if (t->s->config) {
         const double spacing = 0.5 * sdm_part_audit_thickness(audit);
         sdm_text_add(&text, "; use grid: {spacing: %.2g}", spacing);
         sdm_train_add_price(t->s->config, t->s->found.n_params, t->s->grid, spacing, &text);
     }
-    teller_tell(t, SDM_E_QUALITY, &text);
+    // a check of a grid that cannot be finer passes; a training warns
+    teller_tell(t, fitted && !t->s->brief ? SDM_OK : SDM_E_QUALITY, &text);
 }
 
 void tell_grid(teller *t)

@@ -78,7 +78,7 @@ void sdm_config_set_grid(sdm_config *c, const sdm_grid *grid)
 {
     c->grid = *grid;
     c->grid_voxels = 0;
-    c->grid_auto = false;
+    c->grid_auto = c->grid_fitted = false;
     derive_lengths(c);
 }
 

@@ -187,6 +187,20 @@ expect 0 "^sdmgen: $grid" sdmgen shapes check rod.yaml --samples 8
 has '^fine: the shape can be trained$'
 expect 0 'voxels of 0\.13 mm in place of .*; no more than two voxels across it, as the longest edge has over 96; still finer with grid: \{spacing: 0\.087\} \(about 0\.2 million voxels, 3\.3 times as many, .* GB in memory\)$' sdmgen config rod.yaml
 
+# A longer one would be missing with 400,000 voxels, and gets more of them; one that a million do not show is a note, so that the test of a new shape passes.
+long() { # QMAX: a rod that turns up to QMAX
+    printf 'shape: {name: linkage, options: {links: 1, length: 100, radius: 0.15, tip: 0.15, base: 0.1}, ranges: {q1: [0, %s]}}\ntrain: {minutes: 0.02}\n' "$1" >long.yaml
+}
+long 0.2
+expect 0 '^sdmgen: grid: 565 x 120 x 10 voxels of 0\.18 mm' sdmgen shapes check long.yaml --samples 8
+has '^fine: the shape can be trained$'
+if grep -q 'too thin' out; then bad "grid: auto does not show a rod that a million voxels show: $(cat out)"; fi
+long 0.7
+expect 0 '^sdmgen: grid: [0-9x ]+ voxels of 0\.4 mm' sdmgen shapes check long.yaml --samples 8
+has '^note +part 2 of 2 .* too thin for voxels of 0\.4 mm: .*; grid: auto makes up to 1,000,000 voxels to show a part, as far as data\.memory_gb holds their maps; use grid: \{spacing: 0\.13\} \(about 11 million voxels'
+sdmgen shapes check long.yaml grid.spacing=0.4 --samples 8 >out 2>err && bad 'a grid of its own that shows no rod passes'
+has '^warning +part 2 of 2 .* too thin for voxels of 0\.4 mm: '
+
 # More maps than the memory for them holds: refused, or a warning where a template may do with fewer.
 expect 2 'good.yaml: data.static .* need [0-9.]+ GB, data.memory_gb is 0.002' sdmgen config good.yaml network.kind=pod data.memory_gb=0.002 --plugin "$plugin"
 expect 2 'need [0-9.]+ GB, data.memory_gb is 0.002' sdmgen shapes check good.yaml network.kind=pod data.memory_gb=0.002 --plugin "$plugin" --samples 16

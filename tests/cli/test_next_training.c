@@ -1,5 +1,6 @@
 /* The lines `next`, `better` and `faster` below the verdict on a training. Tests: next_training.c
  */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -200,6 +201,38 @@ static void finer_grid_leaves_kind_open(void **state)
                         "0.01 voxels)\n");
 }
 
+// A warning about a part that is too thin for the grid comes before what the verdict advises.
+static void thin_part_comes_first(void **state)
+{
+    (void)state;
+    char text[512], second[512];
+    sdm_train_report r = {.model_path = "run/model.sdm",
+                          .steps = 1000,
+                          .verdict = {.limited = true,
+                                      .limit = SDM_CAUSE_BASES,
+                                      .grade = SDM_GRADE_USABLE,
+                                      .voxel_mm = 3,
+                                      .coarse_mm = 3,
+                                      .rmse_voxel_mm = 0.4,
+                                      .dice = 0.97,
+                                      .thickness_mm = 30,
+                                      .key = "network.rank",
+                                      .from = 9,
+                                      .to = 18}};
+    const sdm_train_report before = r;
+    cli_show_part_first(&r, NAN, 2);
+    cli_show_part_first(&r, 3, 2);
+    assert_memory_equal(&r, &before, sizeof r);
+    cli_show_part_first(&r, 1.5, 2);
+    next_lines(&r, 2, text, second);
+    assert_string_equal(text, "  next        sdmgen train can.yaml grid=auto grid.spacing=1.5 "
+                              "train.minutes=16 network.kind=template --out run-2\n");
+    if (strstr(r.verdict.sentence, "network.rank") ||
+        !strstr(r.verdict.sentence, "lower grid.spacing from 3 to 1.5") ||
+        !strstr(r.verdict.sentence, "train.minutes from 2 to 16"))
+        fail_msg("%s", r.verdict.sentence);
+}
+
 // A key that the verdict names for the error may leave the uses in `not for` as they are: the note
 // does not promise them.
 static void uses_are_not_promised(void **state)
@@ -306,6 +339,7 @@ int main(void)
                                        cmocka_unit_test(kind_stays_open),
                                        cmocka_unit_test(finer_grid_leaves_kind_open),
                                        cmocka_unit_test(uses_are_not_promised),
+        cmocka_unit_test(thin_part_comes_first),
                                        cmocka_unit_test(finer_grid_alone),
                                        cmocka_unit_test(faster_pod)};
     return cmocka_run_group_tests(tests, NULL, NULL);

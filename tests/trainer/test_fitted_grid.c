@@ -260,7 +260,8 @@ static void test_thinner(void **state)
         if (k > 1) {
             if (!none || strstr(line.data, "{spacing: ")) fail_msg("%s", line.data);
         } else if (!strstr(line.data,
-                           k ? "; at most 400,000 voxels in all; still finer with grid: "
+                           k ? "; 1,000,000 voxels, the most for a part that would be missing, "
+                               "do not show it; still finer with grid: "
                                "{spacing: 0.1"
                              : "; no more than two voxels across it, as the longest edge has "
                                "over 96; still finer with grid: {spacing: 0.1"))
@@ -270,6 +271,51 @@ static void test_thinner(void **state)
         assert_int_equal(price != NULL, k < 2);
         sdm_text_dispose(&line);
         sdm_instance_free(sheet);
+    }
+}
+
+static int film_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                     const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    return scaled_plate(host, p, 8, out);
+}
+
+// A part that would be missing gets up to a million voxels in all, also where it is thin at an end
+// of its range alone, as far as the memory for maps allows. The thinnest plate is as thick as the
+// range begins.
+static void test_missing(void **state)
+{
+    (void)state;
+    static const struct {
+        double from, to, memory_gb;
+        int (*mesh)(const void *, const sdm_host *, const sdm_option_value *, const double *,
+                    sdm_mesh_out *);
+    } cases[] = {{0.4, 0.5, 40, film_mesh}, {0.1, 2, 40, plate_mesh}, {0.4, 0.5, 4, film_mesh}};
+    sdm_error e = {0};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        const sdm_param thick = {"thick", "mm", cases[k].from, cases[k].to, cases[k].to, ""};
+        sdm_shape thin = plate_shape;
+        sdm_config c;
+        sdm_text line = {0};
+        sdm_instance *plate = NULL;
+        char text[128];
+        thin.params = &thick, thin.mesh = cases[k].mesh;
+        snprintf(text, sizeof text, "shape: {name: plate}\ndata: {memory_gb: %g}\n"
+                 "train: {steps: 1}\n", cases[k].memory_gb);
+        if (sdm_instance_create(&thin, NULL, 0, NULL, &plate, &e) ||
+            sdm_config_parse("test.yaml", text, strlen(text), NULL, 0, &c, &e) ||
+            sdm_train_complete(&c, plate, &line, &e))
+            fail_msg("%s", e.text);
+        const double h = c.grid.spacing[0];
+        const bool shown = cases[k].from >= sqrt(2) * h;
+        assert_true(c.grid_fitted && sdm_grid_count(&c.grid) <= 1000000);
+        if (shown == (k == 2) || (k < 2) == !strstr(line.data, "also at the ends of the ranges, is "))
+            fail_msg("case %zu, voxels of %g mm: %s", k, h, line.data);
+        if (k == 2 && !strstr(line.data, "; data.memory_gb does not hold maps of the voxels that "))
+            fail_msg("%s", line.data);
+        sdm_text_dispose(&line);
+        sdm_instance_free(plate);
     }
 }
 
@@ -425,7 +471,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_around),   cmocka_unit_test(test_capsule),
         cmocka_unit_test(test_metres),   cmocka_unit_test(test_thin),
-        cmocka_unit_test(test_thinner),  cmocka_unit_test(test_hardly_finer),
+        cmocka_unit_test(test_thinner),  cmocka_unit_test(test_missing),
+        cmocka_unit_test(test_hardly_finer),
         cmocka_unit_test(test_faces),    cmocka_unit_test(test_surplus),
         cmocka_unit_test(test_proposal), cmocka_unit_test(test_faces_on_planes),
     };

@@ -3,10 +3,15 @@
 #include <stdio.h>
 
 #include "sdm/internal/shape_box.h"
+#include "sdm/internal/part_audit.h"
+#include "sdm/internal/shape_survey.h"
 #include "sdm/internal/text.h"
 #include "sdm/internal/train.h"
 
 enum { BOX_SAMPLES = 256, THIN_SAMPLES = 8, FACE_SAMPLES = 8, BOX_SEED = 1 };
+
+/* Of the random shapes of `shapes check` so many are looked at here. */
+enum { CHECK_SAMPLES = 32 };
 
 /* `grid: auto` makes SDM_GRID_THIN_VOXELS voxels across the thinnest part of the shapes, as long as
  * the longest edge has at most VOXELS_MOST of them and the grid at most COUNT_MOST: maps and
@@ -14,6 +19,10 @@ enum { BOX_SAMPLES = 256, THIN_SAMPLES = 8, FACE_SAMPLES = 8, BOX_SEED = 1 };
  * thinner parts are missing. */
 enum { VOXELS_MOST = 96, VOXELS_END = 4096, LEAST_ACROSS = 2 };
 static const double COUNT_MOST = 4e5;
+
+/* So many voxels at most where the thinnest part would be missing with fewer: where sdm_too_thin()
+ * holds, and `shapes check` warns. SHOWN: the voxels across it then. */
+static const double COUNT_SHOWN = 1e6, SHOWN = 1.42;
 
 /* A spacing that is finer by less than this factor is not proposed: it hardly shows more. */
 static const double FINER_MIN = 1.1;
@@ -74,6 +83,47 @@ static sdm_status refine_for_thin(const sdm_config *config, const sdm_instance *
         *grid = finer;
     }
     return s;
+}
+
+/* *thick = the thickness of the thinnest part, mm, of the shapes that `shapes check` looks at first;
+ * NaN: the grid shows it. */
+static sdm_status find_missing(const sdm_config *config, const sdm_instance *shape,
+                               const family *f, const sdm_grid *grid, double *thick, sdm_error *err)
+{
+    double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
+    sdm_distribution distribution[SDM_MAX_PARAMS];
+    size_t n;
+    *thick = NAN;
+    sdm_instance_params(shape, &n);
+    for (size_t i = 0; i < n; i++) min[i] = f->range[i][0], max[i] = f->range[i][1];
+    sdm_status s = sdm_train_distributions(config, shape, min, max, distribution, err);
+    if (s) return s;
+    s = sdm_shape_thickness_ends(shape, (const double(*)[2])f->range, distribution,
+                                 CHECK_SAMPLES, config->seed, (int)config->threads, thick, err);
+    if (!sdm_too_thin(*thick, sdm_grid_coarsest(grid))) *thick = NAN;
+    return s;
+}
+
+/* Replaces *grid by one that shows a part which is `thick` mm thick and too thin for it, if
+ * COUNT_SHOWN voxels and the memory for maps are enough. Returns what keeps it from this; NULL:
+ * nothing. */
+static const char *show_part(const sdm_config *config, const sdm_instance *shape, const family *f,
+                             double thick, sdm_grid *grid)
+{
+    size_t n_params;
+    double longest = 0;
+    sdm_instance_params(shape, &n_params);
+    for (int i = 0; i < 3; i++) longest = fmax(longest, f->high[i] - f->low[i]);
+    sdm_grid finer = *grid;
+    for (int n = 8 + (int)(longest / sdm_grid_coarsest(grid)); SHOWN * sdm_grid_coarsest(&finer) > thick;
+         n += 4)
+        if (n > VOXELS_END || sdm_grid_around(f->low, f->high, n, NULL, &finer, NULL) ||
+            (double)sdm_grid_count(&finer) > COUNT_SHOWN)
+            return "1,000,000 voxels, the most for a part that would be missing, do not show it";
+    if (!sdm_train_fits_memory(config, n_params, &finer))
+        return "data.memory_gb does not hold maps of the voxels that show it";
+    *grid = finer;
+    return NULL;
 }
 
 /* Moves the grid off the planes of faces that have the same place in all shapes. */
@@ -152,6 +202,19 @@ static void propose_finer(const sdm_config *config, size_t n_params, const sdm_g
     sdm_train_add_price(config, n_params, grid, advised, line);
 }
 
+/* Appends why the voxels are smaller than usual. ends: the shapes were also those at the ends of
+ * the ranges. */
+static void add_reason(sdm_text *line, double spacing, double usual, bool ends, double thick)
+{
+    char shapes[80];
+    snprintf(shapes, sizeof shapes, ends ? "the shapes, also at the ends of the ranges,"
+                                         : "%d random shapes", THIN_SAMPLES);
+    sdm_text_add(line,
+                 "; voxels of %.3g mm in place of %.3g, because the thinnest part of %s is %.2g mm "
+                 "thick (grid.voxels: %d for the coarser grid)",
+                 spacing, usual, shapes, thick, SDM_GRID_VOXELS);
+}
+
 sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm_text *line,
                               sdm_error *err)
 {
@@ -162,6 +225,8 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
     const double *spacing = config->grid.spacing[0] > 0 ? config->grid.spacing : NULL;
     double thick = NAN;
     const char *limit = NULL;
+    const bool fitted = config->grid_auto;
+    double missing = NAN;
     family f;
     sdm_grid grid;
     sdm_status s = find_family(config, shape, &f, err);
@@ -170,13 +235,20 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
     s = sdm_grid_around(f.low, f.high, config->grid_voxels, spacing, &grid, err);
     if (s) return sdm_fail_in(err, SDM_E_CONFIG, "%s: grid", config->file);
     const double usual = grid.spacing[0];
-    if (config->grid_auto) s = refine_for_thin(config, shape, &f, &thick, &limit, &grid, err);
-    if (!s) s = avoid_faces(shape, &f, &grid, err);
+    if (fitted) s = refine_for_thin(config, shape, &f, &thick, &limit, &grid, err);
+    if (!s && fitted) s = find_missing(config, shape, &f, &grid, &missing, err);
+    if (s) return s;
+    if (missing > 0) {
+        thick = missing;
+        limit = show_part(config, shape, &f, thick, &grid);
+    }
+    s = avoid_faces(shape, &f, &grid, err);
     if (s) return s;
     const bool finer = grid.spacing[0] < usual;
     const double advised = thick / SDM_GRID_THIN_VOXELS;
     if (limit && grid.spacing[0] < FINER_MIN * advised) limit = NULL;
     sdm_config_set_grid(config, &grid);
+    config->grid_fitted = fitted;
     if (!line) return SDM_OK;
     sdm_text_add(line, "grid: ");
     add_keys(line, &grid);
@@ -185,10 +257,7 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
                  "y, %.2f to %.2f in z",
                  f.low[0], f.high[0], f.low[1], f.high[1], f.low[2], f.high[2]);
     if (finer)
-        sdm_text_add(line,
-                     "; voxels of %.3g mm in place of %.3g, because the thinnest part of %d random "
-                     "shapes is %.2g mm thick (grid.voxels: %d for the coarser grid)",
-                     grid.spacing[0], usual, THIN_SAMPLES, thick, SDM_GRID_VOXELS);
+        add_reason(line, grid.spacing[0], usual, missing > 0, thick);
     if (limit) propose_finer(config, n_params, &grid, limit, finer, thick, line);
     return line->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
 }

@@ -119,6 +119,7 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
     static const sdm_survey_opts none = {0};
     if (!opts) opts = &none;
     *out = (sdm_shape_survey){0};
+    out->grid_fitted = opts->grid_fitted;
     survey v = {.opts = opts, .out = out, .start = sdm_clock()};
     int n_threads = sdm_threads(opts->n_threads);
     sdm_status s = opts->grid ? sdm_grid_check(opts->grid, err) : SDM_OK;
@@ -181,7 +182,8 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
     if (s->failed.shapes || s->open.shapes) return SDM_E_MESH;
     bool bad = s->unused.shapes || s->inside_out.shapes || s->crossing.shapes ||
                sdm_survey_winds_wrongly(s) || s->folded.shapes || s->turned.shapes ||
-               s->resized.shapes || s->rewired.shapes || s->cut.shapes || s->thin.shapes ||
+               s->resized.shapes || s->rewired.shapes || s->cut.shapes ||
+               (s->thin.shapes && !s->grid_fitted) ||
                s->flat.shapes || s->tiny.shapes || s->narrow || s->repeat.unlike ||
                s->surplus > SDM_SURVEY_SURPLUS_MAX ||
                s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||

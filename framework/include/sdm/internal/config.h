@@ -113,6 +113,7 @@ typedef struct sdm_config {
     sdm_grid grid;
     int grid_voxels; /* grid.voxels: voxels along the longest edge of a grid to be fitted, 16 ..
                       * 4096, default 60; 0: the grid is complete, or its spacing was given */
+    bool grid_fitted; /* the grid is that of grid: auto, as fine as its limits allow */
     bool grid_auto;  /* no key of grid was given: thin parts may make grid_voxels larger */
     struct {
         sdm_network_kind kind; /* network.kind; some keys and defaults depend on it */

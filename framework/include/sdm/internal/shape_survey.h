@@ -29,6 +29,7 @@ typedef struct sdm_survey_opts {
     size_t samples; /* random shapes: Sobol' points of the distributions */
     uint64_t seed;
     const sdm_grid *grid; /* NULL: nothing is compared with a grid */
+    bool grid_fitted;     /* it is as fine as grid: auto makes it: thin parts are no fault */
     bool brief;           /* meshes, their audits, a few repetitions: no lines, no velocities */
     int n_threads;
     double seconds; /* what is not done after this time is left out; 0: no limit */
@@ -181,6 +182,7 @@ typedef struct sdm_shape_survey {
     /* shapes that are not `flat` with a part too thin for the grid (part_audit.h); amount: the
      * largest spacing of the grid, in thicknesses of the part */
     sdm_survey_count thin;
+    bool grid_fitted; /* the option: `thin` does not count for the verdict */
     double beyond[3][2]; /* mm, of all shapes: below the first and above the last voxel of each axis
                             of the grid; 0: not beyond */
     /* sdm_grid_surplus() of the grid and the box of all meshes, and its factors along the axes;

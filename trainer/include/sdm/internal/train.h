@@ -135,7 +135,9 @@ sdm_status sdm_train_ranges(const sdm_config *config, const sdm_instance *shape,
    A grid that is to be fitted to the shapes (grid: auto, grid.voxels, or grid.spacing alone)
    becomes sdm_grid_around() the box of sdm_shape_box() over the ranges of sdm_train_ranges(), with
    `grid: auto` finer if the thinnest part has less than three voxels across it (beyond 96 voxels
-   along the longest edge: less than two; at most 400,000 in all), moved by
+   along the longest edge: less than two; at most 400,000 in all, and up to a million where the
+   thinnest part of the shapes that `shapes check` looks at would be missing: sdm_too_thin()), moved
+   by
    sdm_grid_avoid_faces(); and one line about it is appended to *line (which may be NULL). The same
    configuration and shape give the same result. SDM_E_CONFIG with file:line:column, and the errors
    of sdm_instance_mesh(). */

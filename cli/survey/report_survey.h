@@ -23,8 +23,8 @@ void cli_survey_untested(const cli_survey *s, sdm_text *text);
  * of warnings about the shape, without those about the grid; *thin_spacing =
  * cli_survey_thin_spacing(). Errors, such as that of an interrupt,
  * are no notices: what follows meets them again. */
-size_t cli_notice_survey(const sdm_config *c, const sdm_instance *shape,
-                         sdm_repeat_process process, double *thin_spacing);
+size_t cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_repeat_process process,
+                         double *thin_spacing);
 
 /* Warns in one line if the meshes of a shape depend on the calls before; makes some dozens of them,
  * and takes a tenth of a second more. Without memory for it nothing is tested. */

@@ -339,7 +339,7 @@ int main(void)
                                        cmocka_unit_test(kind_stays_open),
                                        cmocka_unit_test(finer_grid_leaves_kind_open),
                                        cmocka_unit_test(uses_are_not_promised),
-        cmocka_unit_test(thin_part_comes_first),
+                                       cmocka_unit_test(thin_part_comes_first),
                                        cmocka_unit_test(finer_grid_alone),
                                        cmocka_unit_test(faster_pod)};
     return cmocka_run_group_tests(tests, NULL, NULL);

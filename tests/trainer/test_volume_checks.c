@@ -211,7 +211,7 @@ static void derivative_of_voxels(void **state)
                                     .n_holdout = 1,
                                     .holdout_params = p}};
         double error;
-        if (trainer_derivative_of_voxels(&t, 0, step, &error, &e)) fail_msg("%s", e.text);
+        if (trainer_derivative_of_voxels(&t, 0, step, 8, &error, &e)) fail_msg("%s", e.text);
         const double longer[3] = {p[0] + step, p[1], p[1]}, shorter[3] = {p[0] - step, p[1], p[1]},
                      map = box_map_volume(&grid, longer) - box_map_volume(&grid, shorter),
                      expected = fabs(map / (16 * step * p[1] * p[1]) - 1);
@@ -243,6 +243,30 @@ static void lists_of_derivatives(void **state)
                         "b: off by over 1000 % of their own size; by c: off by 140 %; by d: off by "
                         "90 %; by e: off by 80 %; ...: these parameters hardly change the volume, "
                         "and the sign may be wrong");
+}
+
+// Each parameter of the list has its own cause; one alone needs no name.
+static void causes_of_derivatives(void **state)
+{
+    (void)state;
+    static const sdm_param p[] = {{.name = "a"}, {.name = "b"}, {.name = "c"}, {.name = "d"}};
+    char text[SDM_VERDICT_LIST];
+    trainer_list_causes(p, (double[]){0.3, 0.1, 0.4, 0.5}, (double[]){0.25, 0.9, 0.015, 0.21}, 4,
+                        text);
+    assert_string_equal(text, "21 % for d, 25 % for a: take a finer grid.spacing; by 1.5 % for c: "
+                              "the network errs, train it as `verdict` says");
+    trainer_list_causes(p, (double[]){0.3, NAN, 0.1}, (double[]){0.15, NAN, NAN}, 3, text);
+    assert_string_equal(text, "15 %: train longer on a finer grid.spacing");
+    trainer_list_causes(p, (double[]){0.3}, (double[]){NAN}, 1, text);
+    assert_string_equal(text, "");
+    // what has no room is left out
+    char name[80];
+    sdm_param many[32];
+    double error[32], voxels[32];
+    memset(name, 'x', sizeof name), name[79] = '\0';
+    for (int i = 0; i < 32; i++) many[i] = (sdm_param){.name = name}, error[i] = 1, voxels[i] = 1;
+    trainer_list_causes(many, error, voxels, 32, text);
+    assert_non_null(strstr(text, "xxx: take a finer grid.spacing"));
 }
 
 // A parameter that moves vertices inside of another part alone has no error of its derivative, and
@@ -332,10 +356,10 @@ static void surfaces_lose_volume(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(surface_of_a_sphere),  cmocka_unit_test(volumes_and_derivatives),
-        cmocka_unit_test(derivative_of_voxels), cmocka_unit_test(lists_of_derivatives),
-        cmocka_unit_test(still_parameters),     cmocka_unit_test(small_changes_of_the_volume),
-        cmocka_unit_test(surfaces_lose_volume),
+        cmocka_unit_test(surface_of_a_sphere),         cmocka_unit_test(volumes_and_derivatives),
+        cmocka_unit_test(derivative_of_voxels),        cmocka_unit_test(lists_of_derivatives),
+        cmocka_unit_test(causes_of_derivatives),       cmocka_unit_test(still_parameters),
+        cmocka_unit_test(small_changes_of_the_volume), cmocka_unit_test(surfaces_lose_volume),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

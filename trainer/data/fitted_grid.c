@@ -2,8 +2,8 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "sdm/internal/shape_box.h"
 #include "sdm/internal/part_audit.h"
+#include "sdm/internal/shape_box.h"
 #include "sdm/internal/shape_survey.h"
 #include "sdm/internal/text.h"
 #include "sdm/internal/train.h"
@@ -85,10 +85,10 @@ static sdm_status refine_for_thin(const sdm_config *config, const sdm_instance *
     return s;
 }
 
-/* *thick = the thickness of the thinnest part, mm, of the shapes that `shapes check` looks at first;
- * NaN: the grid shows it. */
-static sdm_status find_missing(const sdm_config *config, const sdm_instance *shape,
-                               const family *f, const sdm_grid *grid, double *thick, sdm_error *err)
+/* *thick = the thickness of the thinnest part, mm, of the shapes that `shapes check` looks at
+ * first; NaN: the grid shows it. */
+static sdm_status find_missing(const sdm_config *config, const sdm_instance *shape, const family *f,
+                               const sdm_grid *grid, double *thick, sdm_error *err)
 {
     double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS];
     sdm_distribution distribution[SDM_MAX_PARAMS];
@@ -98,8 +98,8 @@ static sdm_status find_missing(const sdm_config *config, const sdm_instance *sha
     for (size_t i = 0; i < n; i++) min[i] = f->range[i][0], max[i] = f->range[i][1];
     sdm_status s = sdm_train_distributions(config, shape, min, max, distribution, err);
     if (s) return s;
-    s = sdm_shape_thickness_ends(shape, (const double(*)[2])f->range, distribution,
-                                 CHECK_SAMPLES, config->seed, (int)config->threads, thick, err);
+    s = sdm_shape_thickness_ends(shape, (const double(*)[2])f->range, distribution, CHECK_SAMPLES,
+                                 config->seed, (int)config->threads, thick, err);
     if (!sdm_too_thin(*thick, sdm_grid_coarsest(grid))) *thick = NAN;
     return s;
 }
@@ -115,8 +115,8 @@ static const char *show_part(const sdm_config *config, const sdm_instance *shape
     sdm_instance_params(shape, &n_params);
     for (int i = 0; i < 3; i++) longest = fmax(longest, f->high[i] - f->low[i]);
     sdm_grid finer = *grid;
-    for (int n = 8 + (int)(longest / sdm_grid_coarsest(grid)); SHOWN * sdm_grid_coarsest(&finer) > thick;
-         n += 4)
+    for (int n = 8 + (int)(longest / sdm_grid_coarsest(grid));
+         SHOWN * sdm_grid_coarsest(&finer) > thick; n += 4)
         if (n > VOXELS_END || sdm_grid_around(f->low, f->high, n, NULL, &finer, NULL) ||
             (double)sdm_grid_count(&finer) > COUNT_SHOWN)
             return "1,000,000 voxels, the most for a part that would be missing, do not show it";
@@ -207,8 +207,9 @@ static void propose_finer(const sdm_config *config, size_t n_params, const sdm_g
 static void add_reason(sdm_text *line, double spacing, double usual, bool ends, double thick)
 {
     char shapes[80];
-    snprintf(shapes, sizeof shapes, ends ? "the shapes, also at the ends of the ranges,"
-                                         : "%d random shapes", THIN_SAMPLES);
+    snprintf(shapes, sizeof shapes,
+             ends ? "the shapes, also at the ends of the ranges," : "%d random shapes",
+             THIN_SAMPLES);
     sdm_text_add(line,
                  "; voxels of %.3g mm in place of %.3g, because the thinnest part of %s is %.2g mm "
                  "thick (grid.voxels: %d for the coarser grid)",
@@ -256,8 +257,7 @@ sdm_status sdm_train_complete(sdm_config *config, const sdm_instance *shape, sdm
                  "; over the ranges the shape reaches from %.2f to %.2f mm in x, %.2f to %.2f in "
                  "y, %.2f to %.2f in z",
                  f.low[0], f.high[0], f.low[1], f.high[1], f.low[2], f.high[2]);
-    if (finer)
-        add_reason(line, grid.spacing[0], usual, missing > 0, thick);
+    if (finer) add_reason(line, grid.spacing[0], usual, missing > 0, thick);
     if (limit) propose_finer(config, n_params, &grid, limit, finer, thick, line);
     return line->failed ? sdm_fail(err, SDM_E_NOMEM, "out of memory") : SDM_OK;
 }

@@ -47,6 +47,13 @@ static const double VOLUME_SAME = 1e-6;
    none of the surface: what is left are rounding errors, over which no error can be told. */
 static const double STILL = 1e-3;
 
+/* Shapes on which exact maps are compared for one of n parameters. */
+static size_t voxels_shapes(size_t n)
+{
+    enum { EACH = 8, ALL = 64, LEAST = 2 };
+    return n * EACH <= ALL ? EACH : n * LEAST < ALL ? ALL / n : LEAST;
+}
+
 static const size_t JACOBIAN_BYTES = 1000000000;
 
 /* Voxels near the surface of a shape. */
@@ -249,21 +256,31 @@ static void take_largest(const dataset *d, const slope_sums *sums, derivative_ch
 
 void trainer_derivatives_unknown(derivative_check *out)
 {
-    *out = (derivative_check){.slope = NAN, .volume_slope = NAN, .voxels_slope = NAN};
+    *out = (derivative_check){.slope = NAN, .volume_slope = NAN};
 }
 
-/* Sets out->voxels_slope: whether voxels or the network cause the largest error of the volume. */
-static sdm_status find_voxels_slope(const trainer *t, derivative_check *out, sdm_error *err)
+/* Is the error of the derivative of the volume by parameter k too large, and not for want of a
+ * change of the volume? */
+static bool is_bad(const derivative_check *c, size_t k)
+{
+    return !c->volume_small[k] && c->volume_own[k] > SDM_DERIVATIVE_BAD;
+}
+
+/* Sets out->voxels_slopes: whether voxels or the network cause each error of the volume. */
+static sdm_status find_voxels_slopes(const trainer *t, derivative_check *out, sdm_error *err)
 {
     const dataset *d = &t->data;
-    size_t worst = d->n_params;
-    for (size_t k = 0; k < d->n_params; k++)
-        if (!out->volume_small[k] && out->volume_own[k] > SDM_DERIVATIVE_BAD &&
-            (worst == d->n_params || out->volume_own[k] > out->volume_own[worst]))
-            worst = k;
-    if (worst == d->n_params) return SDM_OK;
-    return trainer_derivative_of_voxels(t, worst, STEP * (d->max[worst] - d->min[worst]),
-                                        &out->voxels_slope, err);
+    size_t bad = 0;
+    sdm_status s = SDM_OK;
+    for (size_t k = 0; k < d->n_params; k++) {
+        out->voxels_slopes[k] = NAN;
+        bad += is_bad(out, k);
+    }
+    for (size_t k = 0; k < d->n_params && !s; k++)
+        if (is_bad(out, k))
+            s = trainer_derivative_of_voxels(t, k, STEP * (d->max[k] - d->min[k]),
+                                             voxels_shapes(bad), &out->voxels_slopes[k], err);
+    return s;
 }
 
 static size_t shapes_wanted(size_t n_params)
@@ -304,7 +321,7 @@ sdm_status trainer_derivative_check(const trainer *t, const sdm_model *m, deriva
     memory_dispose(&c);
     if (s || !out->shapes) return s;
     take_largest(d, sums, out);
-    return find_voxels_slope(t, out, err);
+    return find_voxels_slopes(t, out, err);
 }
 
 /* true: parameter a comes before b in the list. */
@@ -346,6 +363,45 @@ void trainer_list_derivatives(const sdm_param *p, const double *error, size_t n,
                               char text[SDM_VERDICT_LIST])
 {
     list(p, error, n, "", n, SDM_VERDICT_LIST, text);
+}
+
+/* What mends an error of derivatives of the volume, of which exact maps on the same voxels have
+ * this part. */
+static int remedy_of(double voxels)
+{
+    return voxels > SDM_DERIVATIVE_BAD ? 0 : voxels > 0.5 * SDM_DERIVATIVE_BAD ? 1 : 2;
+}
+
+void trainer_list_causes(const sdm_param *p, const double *error, const double *voxels, size_t n,
+                         char text[SDM_VERDICT_LIST])
+{
+    static const char *const remedies[] = {": take a finer grid.spacing",
+                                           ": train longer on a finer grid.spacing",
+                                           ": the network errs, train it as `verdict` says"};
+    enum { ROOM = SDM_VERDICT_LIST - 60 };
+    const size_t first = next_worst(error, n, n);
+    const bool single = first == n || next_worst(error, n, first) == n;
+    size_t used = 0;
+    text[0] = '\0';
+    for (int r = 0; r < 3; r++) {
+        bool some = false;
+        for (size_t k = first; k < n; k = next_worst(error, n, k)) {
+            char one[120], name[72] = "";
+            if (!(voxels[k] >= 0) || remedy_of(voxels[k]) != r) continue;
+            if (!single) snprintf(name, sizeof name, " for %.60s", p[k].name);
+            const int length =
+                snprintf(one, sizeof one, voxels[k] >= 0.1 ? "%s%.0f %%%s" : "%s%.2g %%%s",
+                         some   ? ", "
+                         : used ? "; by "
+                                : "",
+                         100 * voxels[k], name);
+            if (used + (size_t)length >= ROOM) break;
+            used += (size_t)snprintf(text + used, SDM_VERDICT_LIST - used, "%s", one);
+            some = true;
+        }
+        if (some) used += (size_t)snprintf(text + used, SDM_VERDICT_LIST - used, "%s", remedies[r]);
+        if (used >= ROOM) return;
+    }
 }
 
 void trainer_list_still(const sdm_param *p, const bool *still, size_t n,

@@ -22,10 +22,10 @@ typedef struct derivative_check {
        the parameter does not change the volume: infinite if the figure above exceeds
        SDM_DERIVATIVE_BAD, else NaN. */
     double volume_own[SDM_POD_MAX_PARAMS];
-    /* The error of volume_own that exact maps on the same voxels have, of the parameter with the
-       largest one that changes the volume by at least 5 %; NaN: no such error exceeds
-       SDM_DERIVATIVE_BAD. */
-    double voxels_slope;
+    /* The error of volume_own that exact maps on the same voxels have, of each parameter that
+       changes the volume by at least 5 % and whose volume_own exceeds SDM_DERIVATIVE_BAD; else
+       NaN. */
+    double voxels_slopes[SDM_POD_MAX_PARAMS];
     bool still[SDM_POD_MAX_PARAMS];        /* it moves no part of the surface over its range */
     bool volume_small[SDM_POD_MAX_PARAMS]; /* it changes it by less than 5 % over its range */
 } derivative_check;
@@ -44,6 +44,11 @@ void trainer_derivatives_unknown(derivative_check *out);
    sdm_verdict.derivatives_bad. An error that is NaN is not known. */
 void trainer_list_derivatives(const sdm_param *p, const double *error, size_t n,
                               char text[SDM_VERDICT_LIST]);
+
+/* text = the errors voxels[n] of exact maps for the parameters of the list above, with what mends
+   them, as sdm_verdict.volume_causes. */
+void trainer_list_causes(const sdm_param *p, const double *error, const double *voxels, size_t n,
+                         char text[SDM_VERDICT_LIST]);
 
 /* text = the names of the parameters p[n] that are still[n], as sdm_verdict.still_params. */
 void trainer_list_still(const sdm_param *p, const bool *still, size_t n,

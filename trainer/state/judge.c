@@ -433,7 +433,7 @@ static void set_derivatives(const trainer *t, const derivative_check *c, sdm_ver
     v->derivative_shapes = (int64_t)c->shapes;
     v->derivative_error = c->slope;
     v->volume_derivative_error = c->volume_slope;
-    v->volume_derivative_voxels = c->voxels_slope;
+    v->volume_derivative_voxels = NAN;
     if (c->shapes) trainer_list_still(p, c->still, n, v->still_params);
     if (isfinite(c->slope)) trainer_list_derivatives(p, c->slopes, n, v->derivatives_bad);
     if (isfinite(c->volume_slope)) {
@@ -443,6 +443,9 @@ static void set_derivatives(const trainer *t, const derivative_check *c, sdm_ver
             small[k] = c->volume_small[k] ? c->volume_own[k] : NAN;
         }
         trainer_list_derivatives(p, large, n, v->volume_derivatives_bad);
+        trainer_list_causes(p, large, c->voxels_slopes, n, v->volume_causes);
+        for (size_t k = 0; k < n; k++)
+            v->volume_derivative_voxels = fmax(v->volume_derivative_voxels, c->voxels_slopes[k]);
         trainer_list_small(p, small, n, v->volume_derivatives_small);
     }
     if (isfinite(c->slope))

@@ -74,27 +74,14 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
             SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED, finer, blurs, finer / blurs);
 }
 
-/* text[160] = what causes the error of derivatives of the volume, and what mends it; "": not
- * measured. */
-static void write_cause(const sdm_verdict *v, char text[160])
-{
-    char error[16];
-    const double voxels = v->volume_derivative_voxels;
-    *text = '\0';
-    if (!(voxels > 0)) return;
-    snprintf(text, 160, "; exact maps on voxels of %.3g mm err by %s %%: %s", v->coarse_mm,
-             percent(voxels, error),
-             voxels > SDM_DERIVATIVE_BAD ? "take a finer grid.spacing, or differences of meshes"
-             : voxels > 0.5 * SDM_DERIVATIVE_BAD
-                 ? "train longer on a finer grid.spacing, or take differences of meshes"
-                 : "the network errs, train it as `verdict` says, or take differences of meshes");
-}
-
 /* Of the distances at the voxels themselves the network has all of the error. */
 static void add_derivatives(const sdm_verdict *v, unfit_lines *l)
 {
-    char cause[160];
-    write_cause(v, cause);
+    char cause[SDM_VERDICT_LIST + 80] = "";
+    if (v->volume_causes[0])
+        snprintf(cause, sizeof cause,
+                 "; exact maps on voxels of %.3g mm err by %s; or take differences of meshes",
+                 v->coarse_mm, v->volume_causes);
     if (v->derivatives_bad[0])
         add(l, "derivatives of maps by %s; the network causes it: sdmgen exact --jacobian is exact",
             v->derivatives_bad);

@@ -11,8 +11,8 @@
 #include "sdm/map.h"
 #include "sdm/memory.h"
 
-/* Shapes whose volumes are compared, and differences of whose volumes. */
-enum { SHAPES = 20, SLOPE_SHAPES = 8 };
+/* Shapes whose volumes are compared. */
+enum { SHAPES = 20 };
 
 /* Relative errors of one kind of volume. */
 typedef struct volume_sums {
@@ -134,8 +134,8 @@ static sdm_status differences(const trainer *t, size_t i, size_t k, double step,
     return SDM_OK;
 }
 
-sdm_status trainer_derivative_of_voxels(const trainer *t, size_t k, double step, double *error,
-                                        sdm_error *err)
+sdm_status trainer_derivative_of_voxels(const trainer *t, size_t k, double step, size_t shapes,
+                                        double *error, sdm_error *err)
 {
     const dataset *d = &t->data;
     double off = 0, size = 0;
@@ -143,7 +143,7 @@ sdm_status trainer_derivative_of_voxels(const trainer *t, size_t k, double step,
     size_t n = 0;
     *error = NAN;
     sdm_status s = SDM_ALLOC(&values, sdm_grid_count(d->grid), "derivatives", err);
-    for (size_t i = 0; i < d->n_holdout && i < 4 * SLOPE_SHAPES && n < SLOPE_SHAPES && !s; i++) {
+    for (size_t i = 0; i < d->n_holdout && i < 4 * shapes && n < shapes && !s; i++) {
         double map, mesh;
         bool cut;
         s = differences(t, i, k, step, values, &map, &mesh, &cut, err);

@@ -20,8 +20,8 @@ sdm_status trainer_volume_check(const trainer *t, const sdm_model *m, volume_che
 void trainer_volumes_unknown(volume_check *out);
 
 /* *error = the relative error (root mean square) of differences of volumes of exact maps over
-   `step` to either side along parameter k, compared with those of the meshes, on up to eight
-   held-out shapes; NaN: the grid cuts all, or the parameter changes no volume. [t->n_threads
-   threads; the same bits for any number] */
-sdm_status trainer_derivative_of_voxels(const trainer *t, size_t k, double step, double *error,
-                                        sdm_error *err);
+   `step` to either side along parameter k, compared with those of the meshes, on up to
+   `shapes` held-out shapes; NaN: the grid cuts all, or the parameter changes no volume.
+   [t->n_threads threads; the same bits for any number] */
+sdm_status trainer_derivative_of_voxels(const trainer *t, size_t k, double step, size_t shapes,
+                                        double *error, sdm_error *err);

@@ -15,30 +15,56 @@ static int digits_over(double error, double bad)
     return n;
 }
 
-/* What is known of the parameter with the largest error. */
+/* The error of derivatives by one parameter, in the words of the training. */
 typedef struct worst_param {
-    char name[64];     /* "the worst parameter" where it is not known */
-    const char *lines; /* else the first line of `unfit` about these derivatives; NULL: none */
+    char name[64];    /* "the worst parameter" where it is not known */
+    char percent[64]; /* "38 %" or "over 1000 % of their own size" */
 } worst_param;
 
-/* The parameter whose derivatives have this error: the first of the line of `unfit` that begins
- * with `begin`, if its error there is the same; an error of the derivative's own size is not. */
-static worst_param find_worst(const char *unfit, const char *begin, double error)
+/* A parameter as a line of `unfit` names it first: "NAME: off by 38 % of their own size". */
+typedef struct told_param {
+    const char *name, *figure;
+    int name_length, figure_length;
+    bool own_size;
+    double percent; /* the figure; of "over 1000" that number */
+} told_param;
+
+/* Reads the parameter at the begin of `text`. false: there is none. */
+static bool read_told(const char *text, told_param *out)
 {
-    worst_param worst = {.name = "the worst parameter", .lines = strstr(unfit, begin)};
-    const char *name = worst.lines ? worst.lines + strlen(begin) : NULL,
-               *end = name ? strstr(name, ": off by ") : NULL;
-    char same[48];
-    if (!end) return worst;
-    if (error > 10)
-        snprintf(same, sizeof same, ": off by over 1000 %%");
-    else
-        snprintf(same, sizeof same, ": off by %.0f %%", 100 * error);
-    const size_t n = strlen(same);
-    if (strncmp(end, same, n) || !strncmp(end + n, " of their own", strlen(" of their own")))
-        return worst;
-    snprintf(worst.name, sizeof worst.name, "%.*s", (int)(end - name), name);
-    worst.lines = NULL;
+    static const char off[] = ": off by ", own[] = " % of their own size";
+    const char *end = strstr(text, off), *figure = end ? end + strlen(off) : NULL,
+               *percent = figure ? strstr(figure, " %") : NULL;
+    if (!percent || percent > text + strcspn(text, "\n")) return false;
+    *out = (told_param){.name = text,
+                        .name_length = (int)(end - text),
+                        .figure = figure,
+                        .figure_length = (int)(percent - figure),
+                        .own_size = !strncmp(percent, own, strlen(own))};
+    out->percent = strtod(figure + strcspn(figure, "0123456789"), NULL);
+    return out->name_length < 64 && out->figure_length < 16;
+}
+
+/* The parameter with the largest error of the lines of `unfit` that begin with `begin`, with the
+ * error that stands there. Where this is the rounded `error`, it has so many digits that it is seen
+ * to exceed `bad`. */
+static worst_param find_worst(const char *unfit, const char *begin, double error, double bad)
+{
+    worst_param worst = {.name = "the worst parameter"};
+    told_param told, most = {.percent = -1};
+    char rounded[32];
+    snprintf(worst.percent, sizeof worst.percent, "%.*f %%", digits_over(error, bad), 100 * error);
+    for (const char *at = unfit; begin && (at = strstr(at, begin));) {
+        at += strlen(begin);
+        if (read_told(at, &told) && told.percent > most.percent) most = told;
+    }
+    if (!most.name) return worst;
+    snprintf(worst.name, sizeof worst.name, "%.*s", most.name_length, most.name);
+    snprintf(rounded, sizeof rounded, "%.0f", 100 * error);
+    if (most.own_size || strlen(rounded) != (size_t)most.figure_length ||
+        strncmp(rounded, most.figure, strlen(rounded)) != 0)
+        snprintf(worst.percent, sizeof worst.percent, "%.*s %%%s", most.figure_length, most.figure,
+                 most.own_size ? " of their own size" : "");
     return worst;
 }
 
@@ -102,14 +128,8 @@ sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error 
         return sdm_fail(err, SDM_E_UNSUPPORTED, "the training did not measure the errors of %s",
                         f->name);
     if (f->error <= f->bad) return SDM_OK;
-    char percent[32] = "over 1000";
-    if (!f->lines || f->error <= 10)
-        snprintf(percent, sizeof percent, "%.*f", digits_over(f->error, f->bad), 100 * f->error);
-    worst_param worst = {.name = ""};
-    if (f->lines) worst = find_worst(q->unfit, f->lines, f->error);
-    return sdm_fail(err, SDM_E_QUALITY, "%s are off by %s %%%s%s, more than %g %%%s%s%.*s", f->name,
-                    percent, f->lines ? " for " : "", worst.name, 100 * f->bad, f->remedy,
-                    worst.lines ? "; in the words of the training: " : "",
-                    worst.lines ? (int)strcspn(worst.lines, "\n") : 0,
-                    worst.lines ? worst.lines : "");
+    const worst_param worst = find_worst(q->unfit, f->lines, f->error, f->bad);
+    return sdm_fail(err, SDM_E_QUALITY, "%s are off by %s%s%s, more than %g %%%s", f->name,
+                    worst.percent, f->lines ? " for " : "", f->lines ? worst.name : "",
+                    100 * f->bad, f->remedy);
 }

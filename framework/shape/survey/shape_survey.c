@@ -183,9 +183,8 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s)
     bool bad = s->unused.shapes || s->inside_out.shapes || s->crossing.shapes ||
                sdm_survey_winds_wrongly(s) || s->folded.shapes || s->turned.shapes ||
                s->resized.shapes || s->rewired.shapes || s->cut.shapes ||
-               (s->thin.shapes && !s->grid_fitted) ||
-               s->flat.shapes || s->tiny.shapes || s->narrow || s->repeat.unlike ||
-               s->surplus > SDM_SURVEY_SURPLUS_MAX ||
+               (s->thin.shapes && !s->grid_fitted) || s->flat.shapes || s->tiny.shapes ||
+               s->narrow || s->repeat.unlike || s->surplus > SDM_SURVEY_SURPLUS_MAX ||
                s->velocity_error > SDM_SURVEY_VELOCITY_LIMIT || s->scale.odd_size ||
                s->scale.odd_speed || s->scale.odd_angle || s->scale.other_length || s->scale.swings;
     for (size_t k = 0; k < s->n_params && s->jump; k++)

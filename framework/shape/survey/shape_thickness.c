@@ -50,7 +50,8 @@ sdm_status sdm_shape_thickness_ends(const sdm_instance *shape, const double (*ra
     const size_t all = 1 + f.n_corners + samples,
                  most = sdm_survey_samples(shape, all); // fewer of large meshes
     const int64_t n = (int64_t)(most < all ? most : all);
-#pragma omp parallel for schedule(dynamic) num_threads(sdm_threads(n_threads)) reduction(min : least)
+#pragma omp parallel for schedule(dynamic) num_threads(sdm_threads(n_threads)) reduction(min       \
+                                                                                         : least)
     for (int64_t i = 0; i < n; i++) {
         double p[SHAPE_PARAMS_MAX], own;
         survey_shape(&f, (size_t)i, p);

@@ -111,10 +111,10 @@ typedef struct sdm_config {
      * default [0, 0, 0]. Or a grid that the caller fits to the shapes (grid: auto): then grid.n is
      * 0, and grid.spacing too unless it was given; sdm_config_set_grid() stores the result. */
     sdm_grid grid;
-    int grid_voxels; /* grid.voxels: voxels along the longest edge of a grid to be fitted, 16 ..
-                      * 4096, default 60; 0: the grid is complete, or its spacing was given */
+    int grid_voxels;  /* grid.voxels: voxels along the longest edge of a grid to be fitted, 16 ..
+                       * 4096, default 60; 0: the grid is complete, or its spacing was given */
     bool grid_fitted; /* the grid is that of grid: auto, as fine as its limits allow */
-    bool grid_auto;  /* no key of grid was given: thin parts may make grid_voxels larger */
+    bool grid_auto;   /* no key of grid was given: thin parts may make grid_voxels larger */
     struct {
         sdm_network_kind kind; /* network.kind; some keys and defaults depend on it */
         /* pod: hidden layers of the MLP, 0..16, default 3 (0: polynomials only); sdmnn: levels;

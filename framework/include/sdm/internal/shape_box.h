@@ -29,11 +29,11 @@ sdm_status sdm_shape_box(const sdm_instance *shape, const double (*range)[2], si
 sdm_status sdm_shape_thickness(const sdm_instance *shape, const double (*range)[2], size_t samples,
                                uint64_t seed, double *mm, sdm_error *err);
 
-/* The same of the shapes that a survey (shape_survey.h) looks at: the default values, the corners of
- * the ranges, and the first `samples` random ones of the distributions (NULL: those of the shape); of
- * large meshes as many as sdm_survey_samples(). Shapes
- * whose mesh fails, or two walls of which lie on each other, do not count. n_threads: 0: the default
- * of OpenMP; the result is the same for any number. SDM_E_RANGE, SDM_E_NOMEM. */
+/* The same of the shapes that a survey (shape_survey.h) looks at: the default values, the corners
+ * of the ranges, and the first `samples` random ones of the distributions (NULL: those of the
+ * shape); of large meshes as many as sdm_survey_samples(). Shapes whose mesh fails, or two walls of
+ * which lie on each other, do not count. n_threads: 0: the default of OpenMP; the result is the
+ * same for any number. SDM_E_RANGE, SDM_E_NOMEM. */
 sdm_status sdm_shape_thickness_ends(const sdm_instance *shape, const double (*range)[2],
                                     const sdm_distribution *distribution, size_t samples,
                                     uint64_t seed, int n_threads, double *mm, sdm_error *err);

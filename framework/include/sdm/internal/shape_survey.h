@@ -182,7 +182,7 @@ typedef struct sdm_shape_survey {
     /* shapes that are not `flat` with a part too thin for the grid (part_audit.h); amount: the
      * largest spacing of the grid, in thicknesses of the part */
     sdm_survey_count thin;
-    bool grid_fitted; /* the option: `thin` does not count for the verdict */
+    bool grid_fitted;    /* the option: `thin` does not count for the verdict */
     double beyond[3][2]; /* mm, of all shapes: below the first and above the last voxel of each axis
                             of the grid; 0: not beyond */
     /* sdm_grid_surplus() of the grid and the box of all meshes, and its factors along the axes;

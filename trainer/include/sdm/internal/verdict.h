@@ -95,8 +95,11 @@ typedef struct sdm_verdict {
        over the size of their derivatives, however small. */
     char derivatives_bad[SDM_VERDICT_LIST], volume_derivatives_bad[SDM_VERDICT_LIST],
         volume_derivatives_small[SDM_VERDICT_LIST];
-    /* the error of derivatives of the volume that exact maps on these voxels have, of the first
-       parameter of volume_derivatives_bad; NaN: not measured */
+    /* the errors of derivatives of the volume that exact maps on these voxels have, of the
+       parameters of volume_derivatives_bad, and what mends them: "25 % for a: take a finer
+       grid.spacing; by 4 % for b: the network errs, ..."; "": not measured. The largest of them;
+       NaN: not measured. */
+    char volume_causes[SDM_VERDICT_LIST];
     double volume_derivative_voxels;
     /* the parameters that move no part of the surface, "a, b"; "": none was found */
     char still_params[SDM_VERDICT_LIST];

@@ -355,6 +355,36 @@ static void no_time_for_trials(void **state)
     assert_true(60 * r.trial_minutes / 5 > 1.2 * strtod(strpbrk(seconds, "0123456789"), NULL));
 }
 
+/* Puts a folder in the place of the model before it is written: the run ends with a checkpoint. */
+static void block_model(void *user, const sdm_progress *p)
+{
+    (void)user;
+    if (p->phase == SDM_PHASE_EVALUATE) (void)mkdir(in_folder("model.sdm"), 0700);
+}
+
+// A run that goes on from a checkpoint advises the same minutes for the trials that it left out.
+static void resume_keeps_advice(void **state)
+{
+    (void)state;
+    static const char *const short_time[] = {"train.steps=0", "train.minutes=0.0001"};
+    const sdm_config c = parse_config(ring_text, short_time, 2);
+    const sdm_train_hooks hooks = {.message = listen, .progress = block_model};
+    sdm_instance *shape = shape_of(&c);
+    sdm_train_report r;
+    sdm_error e = {0};
+    char told[80];
+    run_files_remove();
+    said[0] = '\0';
+    assert_int_equal(sdm_train(&c, shape, folder, false, &hooks, NULL, &e), SDM_E_IO);
+    assert_int_equal(rmdir(in_folder("model.sdm")), 0);
+    assert_true(exists("checkpoint.sdmc"));
+    if (sdm_train(&c, shape, folder, true, NULL, &r, &e)) fail_msg("%s", e.text);
+    snprintf(told, sizeof told, "(for both raise train.minutes to %.4g)", r.trial_minutes);
+    if (!(r.trial_minutes > 0) || !strstr(said, told)) fail_msg("%s: %s", told, said);
+    assert_true(r.chosen);
+    sdm_instance_free(shape);
+}
+
 // Thick parts that overlap: the verdict tells the error far inside from that near the surface, and
 // names the remedy, which is no finer grid.
 static void overlap_is_named(void **state)
@@ -461,6 +491,7 @@ int main(void)
                                        cmocka_unit_test(budget_is_shared),
                                        cmocka_unit_test(resume_is_bit_exact),
                                        cmocka_unit_test(refused_resume_loses_nothing),
+                                       cmocka_unit_test(resume_keeps_advice),
                                        cmocka_unit_test(second_model_cannot_be_written),
                                        cmocka_unit_test(template_remains),
                                        cmocka_unit_test(no_time_for_trials),

@@ -90,7 +90,7 @@ static sdm_status write_file(trainer *t, sdm_error *err)
         {"average", p->average, p->n * sizeof *p->average},
         {"best", p->best, p->n * sizeof *p->best},
         {"best.errors", best, sizeof best},
-        {"turns", t->turns, t->turns->n > 1 ? sizeof *t->turns : 0},
+        {"turns", t->turns, t->turns->chosen ? sizeof *t->turns : 0},
         {"points", t->data.plan.point, t->data.plan.n_planned * sizeof *t->data.plan.point},
         {"errors", t->data.plan.error, t->data.plan.n_planned * sizeof *t->data.plan.error}};
     uint8_t *bytes = NULL;
@@ -330,7 +330,13 @@ static bool ends(const char *text, size_t size) { return memchr(text, '\0', size
 static bool report_is_sound(const sdm_train_report *r)
 {
     const sdm_verdict *v = &r->verdict;
-    return r->steps >= 0 && r->seconds >= 0 && ends(r->model_path, sizeof r->model_path) &&
+    return ends(v->derivatives_bad, SDM_VERDICT_LIST) &&
+           ends(v->volume_derivatives_bad, SDM_VERDICT_LIST) &&
+           ends(v->volume_derivatives_small, SDM_VERDICT_LIST) &&
+           ends(v->volume_causes, SDM_VERDICT_LIST) && ends(v->still_params, SDM_VERDICT_LIST) &&
+           ends(v->derivative_by, sizeof v->derivative_by) &&
+           ends(v->volume_derivative_by, sizeof v->volume_derivative_by) && r->steps >= 0 &&
+           r->seconds >= 0 && ends(r->model_path, sizeof r->model_path) &&
            ends(r->other_path, sizeof r->other_path) &&
            (unsigned)r->other_grade <= SDM_GRADE_POOR && is_bool(&r->compared) &&
            is_bool(&r->tried) && is_bool(&r->unfinished) && is_bool(&r->chosen) &&
@@ -339,16 +345,17 @@ static bool report_is_sound(const sdm_train_report *r)
            ends(v->triangles_by, sizeof v->triangles_by) && ends(v->sentence, sizeof v->sentence);
 }
 
-/* Reads the turns of a run with two kinds. */
+/* Reads the turns of a run with network.kind: auto. */
 static sdm_status turns_read(const trainer *t, const sdm_section *stored, training_turns *out,
                              sdm_error *err)
 {
     if (stored->size == sizeof *out) memcpy(out, stored->data, sizeof *out);
-    bool sound = stored->size == sizeof *out && out->n == 2 && (out->at == 0 || out->at == 1) &&
-                 out->share > 0 && out->share <= 1 && out->tried >= 0 && isfinite(out->tried) &&
-                 is_bool(&out->chosen) && is_bool(&out->untried) && is_bool(&out->tried_other) &&
+    bool sound = stored->size == sizeof *out && (out->n == 1 || out->n == 2) && out->at >= 0 &&
+                 out->at < out->n && out->share > 0 && out->share <= 1 && out->tried >= 0 &&
+                 isfinite(out->tried) && is_bool(&out->chosen) && is_bool(&out->untried) &&
+                 is_bool(&out->tried_other) && out->pod_minutes >= 0 && out->trial_minutes >= 0 &&
                  report_is_sound(&out->first);
-    for (int i = 0; i < 2 && sound; i++)
+    for (int i = 0; i < out->n && sound; i++)
         sound = out->kind[i] == SDM_NETWORK_POD || out->kind[i] == SDM_NETWORK_TEMPLATE;
     return sound ? SDM_OK
                  : sdm_fail(err, SDM_E_FORMAT,

@@ -8,6 +8,7 @@
 
 #include "sdm/internal/shape_survey.h"
 #include "sdm/internal/text.h"
+#include "sdm/internal/units.h"
 #include "sdm/memory.h"
 #include "shape_internal.h"
 
@@ -160,6 +161,25 @@ static void tell_continuous(tests *t)
     }
 }
 
+static bool jumps_along(const sdm_shape_survey *f, size_t k)
+{
+    return f->jump && f->jump[k].kind != SDM_BREAK_NONE;
+}
+
+/* A length of which 1 mm hardly moves a vertex: vertices in m, where it moves them by 0.001 mm. */
+static void add_slow(sdm_text *text, const sdm_param *p, double speed)
+{
+    double length;
+    const char *unit = sdm_unit_near(1 / speed, &length);
+    sdm_text_add(text,
+                 "%s1 mm of '%s' moves no vertex by more than %.2g mm: are these vertices in ",
+                 text->data ? "; " : "", p->name, speed);
+    if (unit)
+        sdm_text_add(text, "%s? Multiply them by %g", unit, length);
+    else
+        sdm_text_add(text, "another unit than mm?");
+}
+
 /* The size and the motion by the parameters. */
 static void tell_units(tests *t)
 {
@@ -195,6 +215,8 @@ static void tell_units(tests *t)
             sdm_text_add(
                 &text, "%s'%s' ranges from %g to %g mm in a shape of %.3g mm: are these m?",
                 text.data ? "; " : "", params[k].name, params[k].min, params[k].max, c->size);
+        else if (sdm_survey_is_slow(f, t->instance, k) && !c->odd_speed && !jumps_along(f, k))
+            add_slow(&text, &params[k], f->speed[k]);
     if (f->tiny.shapes)
         sdm_text_add(&text,
                      "%sa part is %.0f times smaller than another one in %zu of %zu shapes: are "

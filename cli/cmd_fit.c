@@ -18,6 +18,8 @@
 typedef struct progress_state {
     cli_progress bar;
     const cli_fit *f;
+    sdm_fit_progress last; /* the last report, once the fit has begun */
+    bool begun;
     sdm_fit_phase phase;
     size_t before; /* number of iterations before this phase */
     size_t n_fits;
@@ -74,6 +76,7 @@ static void show_progress(void *user, const sdm_fit_progress *p)
     progress_state *w = user;
     const sdm_fit_opts *o = &w->f->opts;
     tell_why_again(w, p);
+    w->last = *p, w->begun = true;
     // a further candidate counts from 1 again
     if (p->phase != w->phase || p->iteration <= w->before)
         w->phase = p->phase, w->before = p->iteration - 1;
@@ -99,6 +102,35 @@ static void show_progress(void *user, const sdm_fit_progress *p)
                       : p->phase == SDM_FIT_MAIN ? "fit"
                                                  : "search",
                       (double)n / (double)most, text);
+}
+
+/* The error of a fit that an interrupt has stopped: in which phase, and that there is no result. */
+static sdm_status tell_stop(const progress_state *w, sdm_error *err)
+{
+    const cli_fit *f = w->f;
+    const sdm_fit_progress *p = &w->last;
+    char phase[80], which[80] = "";
+    if (!w->begun)
+        snprintf(phase, sizeof phase, "before its first iteration");
+    else if (p->phase == SDM_FIT_JUDGE)
+        snprintf(phase, sizeof phase, "in its checks");
+    else if (p->phase == SDM_FIT_SEARCH && p->n_starts)
+        snprintf(phase, sizeof phase, "in the search, at start %zu of %zu", p->start, p->n_starts);
+    else
+        snprintf(phase, sizeof phase, "in the %s, after iteration %zu",
+                 p->phase == SDM_FIT_POLISH   ? "polish"
+                 : p->phase == SDM_FIT_SEARCH ? "search"
+                                              : "fit",
+                 p->iteration);
+    if (f->candidate)
+        snprintf(which, sizeof which, " of candidate %zu of %zu", f->candidate, f->n_candidates);
+    else if (f->at_mirror)
+        snprintf(which, sizeof which, " of the mirror image");
+    else if (f->coarse_mm > 0)
+        snprintf(which, sizeof which, " with finer maps");
+    return sdm_fail(err, SDM_E_CANCELLED,
+                    "%s: the fit%s was stopped on request %s; no file was written", f->path, which,
+                    phase);
 }
 
 static sdm_status check_arguments(cli_fit *f, sdm_error *err)
@@ -142,6 +174,7 @@ static sdm_status fit_shape(cli_fit *f, sdm_error *err)
     cli_fit_doubt_changed_shape(f);
     for (size_t i = 0; i < f->result.verdict.n_findings; i++)
         cli_name_options(f->result.verdict.findings[i].text);
+    if (s == SDM_E_CANCELLED || f->doubt.status == SDM_E_CANCELLED) return tell_stop(&w, err);
     if (s || !f->doubt.status || f->doubt.status == SDM_E_QUALITY) return s;
     char astray[400] = "";
     if (f->doubt.status == SDM_E_ARG) (void)cli_fit_astray(f, astray, sizeof astray, NULL);

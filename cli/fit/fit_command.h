@@ -62,6 +62,7 @@ typedef struct cli_fit {
      * followed, and beside which part of the shape or the data they are coarse; 0: none followed */
     double coarse_mm;
     char coarse_beside[64];
+    bool was_nearly_coarse; /* these had passed, and explained a figure a little beyond its limit */
     /* fit_finer.c: voxels of the maps that the fit would have gone on with, and the largest number
      * that it takes by itself; 0: these were not too many */
     double too_many, many_at_most;
@@ -106,7 +107,7 @@ typedef struct cli_fit {
     bool found;      /* result holds an estimate */
     sdm_error doubt; /* status SDM_E_QUALITY: why the estimate is not trustworthy; SDM_OK: it is
                         trustworthy */
-    bool exchanged;  /* fit_contrast.c: that is the reason */
+    bool exchanged;  /* fit_contrast.c: exchanged values of the tissues are the reason */
     sdm_fit_source map_source; /* source of `map`: the one of the last iterations */
     bool by_network;           /* the network makes `map`: the estimate is in its trained range */
     sdm_grid map_grid;         /* grid of map_source, in the estimated pose */
@@ -134,11 +135,18 @@ sdm_status cli_fit_make_grid(cli_fit *f, sdm_error *err);
 sdm_status cli_fit_finer_grid(const cli_fit *f, const double *params, double spacing, sdm_grid *out,
                               sdm_error *err);
 
+/* After a fit: the edge (mm) of the voxels of finer exact maps that may pass where this fit is in
+ * doubt: those that `map voxels` advises; or, if that check has passed but the maps are nearly too
+ * coarse, and residuals or the values of a tissue are a little beyond their limits, 0.8 times the
+ * present ones. NaN: finer maps are not the remedy. */
+double cli_fit_finer_voxel(const cli_fit *f);
+
 /* After cli_fit_run(): where the command line leaves the voxels of exact maps open and nothing but
- * them leaves the fit in doubt, goes on from its result with the voxels that its verdict advises,
- * and f->result is that of the second fit. Nothing where a prior of the pose is given, nor where
- * these are too many: f->too_many then holds their number. Where the second fit ends with an error
- * other than SDM_E_QUALITY, the first result stays, and a warning tells why. SDM_E_CANCELLED. */
+ * them leaves, or may leave, the fit in doubt, goes on once from its result with voxels of
+ * cli_fit_finer_voxel(), and f->result is that of the second fit. Nothing where a prior of the pose
+ * is given, nor where these are too many: f->too_many then holds their number. Where the second fit
+ * ends with an error other than SDM_E_QUALITY, the first result stays, and a warning tells why.
+ * SDM_E_CANCELLED. */
 sdm_status cli_fit_go_finer(cli_fit *f, sdm_error *err);
 
 /* After cli_fit_open_source(): reads --depth. With --measure it measures the shape at the start, so
@@ -301,9 +309,11 @@ void cli_fit_json_usable(const cli_fit *f, sdm_json *json);
 void cli_fit_print_verdict(const cli_fit *f);
 void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);
 
-/* Before a fit to an image: SDM_E_QUALITY where the values of the tissues are clearly exchanged at
- * the start pose, unless rotations are tried or --force is given; then, and where it is not clear,
- * a notice. A notice, too, where the border of the image has the values of the inside. */
+/* Before a fit to an image: SDM_E_QUALITY where the values of the tissues are exchanged at the
+ * start pose, unless --force is given: so clearly, and without rotations that are tried; or in an
+ * image that cannot be stated right: its border is like the inside, it has about as much of the
+ * outside as of the shape, and encloses nothing that is like the inside. Else a notice. A notice,
+ * too, where only the border speaks for exchanged values. */
 sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err);
 
 /* After a fit to an image that is not trustworthy: where the image at the start pose looks like the

@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "fit_command.h"
+#include "measure/enclosed.h"
 #include "report/terminal.h"
 #include "sdm/memory.h"
 
@@ -20,9 +21,16 @@
 /* An image shows the inside at its border where so much of it is like the inside. */
 #define BORDER_SHARE 0.9
 
-/* Sums and number of the voxels of an image on one side of the surface. */
+/* With exchanged values, the voxels like the outside are the shape: they have its volume at the
+ * start, up to this factor. */
+#define VOLUME_FACTOR 4.0
+/* Less than this share of the volume of the start shape is enclosed by noise and narrow gaps. */
+#define ENCLOSED_MAX 0.05
+
+/* Sums and number of the voxels of an image on one side of the surface; volume (mm^3) of this side,
+ * also where it lies beside the image. */
 typedef struct side_values {
-    double sum, squares, n;
+    double sum, squares, n, volume;
 } side_values;
 
 /* in, around: the image within the start shape and in the layer of the margin around it, sampled at
@@ -34,6 +42,7 @@ static sdm_status measure_start(const cli_fit *f, side_values *in, side_values *
                                         : &f->source.grid,
                    *image = &f->target.grid;
     const sdm_pose own = {{0, 0, 0}, {0, 0, 0}};
+    const double voxel = g->spacing[0] * g->spacing[1] * g->spacing[2];
     float *map = NULL;
     sdm_status s = SDM_ALLOC(&map, sdm_grid_count(g), "distance map", err);
     if (!s) s = sdm_fit_map(&f->source, f->start, &own, g, f->opts.n_threads, map, err);
@@ -44,6 +53,8 @@ static sdm_status measure_start(const cli_fit *f, side_values *in, side_values *
                 const double index[3] = {(double)i, (double)j, (double)k};
                 double world[3], x[3];
                 bool there = map[v] <= f->opts.margin;
+                side_values *side = map[v] < 0 ? in : around;
+                if (there) side->volume += voxel;
                 sdm_grid_world(g, index, world);
                 sdm_pose_apply(&f->opts.start_pose, world, world);
                 sdm_grid_index(image, world, x);
@@ -53,7 +64,6 @@ static sdm_status measure_start(const cli_fit *f, side_values *in, side_values *
                 const size_t at =
                     (size_t)((llrint(x[2]) * image->n[1] + llrint(x[1])) * image->n[0] +
                              llrint(x[0]));
-                side_values *side = map[v] < 0 ? in : around;
                 const double value = f->target.values[at];
                 if (isfinite(value)) side->sum += value, side->squares += value * value, side->n++;
             }
@@ -73,6 +83,7 @@ static sdm_status fit_exchanged(const cli_fit *f, bool *fits, sdm_error *err)
     out->mean = given.mean, out->sd = given.sd;
     opts.max_restarts = 0;
     opts.progress = NULL;
+    opts.cancelled = cli_interrupted;
     sdm_status s = sdm_fit(&f->source, &f->target, &opts, &r, err);
     *fits = !s || (s == SDM_E_QUALITY && r.verdict.n_findings);
     for (size_t i = 0; i < r.verdict.n_findings; i++) {
@@ -82,7 +93,12 @@ static sdm_status fit_exchanged(const cli_fit *f, bool *fits, sdm_error *err)
     }
     *fits = *fits && !(r.evidence <= f->result.evidence + SDM_FIT_PREFERRED);
     sdm_fit_dispose(&r);
-    return s == SDM_E_NOMEM || s == SDM_E_CANCELLED ? s : SDM_OK;
+    if (s == SDM_E_CANCELLED)
+        return sdm_fail(err, s,
+                        "%s: the fit was stopped on request while exchanged values of the inside "
+                        "and the outside were tried; no file was written",
+                        f->path);
+    return s == SDM_E_NOMEM ? s : SDM_OK;
 }
 
 /* Whether the refused fit itself has exchanged them on its way, and found the shape. */
@@ -154,9 +170,38 @@ static bool is_like_inside(const sdm_fit_appearance *a, double value)
     return true;
 }
 
-/* A notice where nearly the whole border of the image has the values of the inside, as an image
- * that holds the whole shape never has. One value alone there is padding. */
-static void check_border(const cli_fit *f)
+/* Is the value nearer to the inside than to every tissue outside? NaN is. */
+static bool is_nearest_inside(const sdm_fit_appearance *a, double value)
+{
+    for (size_t k = 0; k < a->n_outside; k++)
+        if (fabs(value - a->outside[k].mean) < fabs(value - a->inside[0].mean)) return false;
+    return true;
+}
+
+/* Is the value clearly nearer to a tissue outside than to the inside? */
+static bool is_like_outside(const sdm_fit_appearance *a, double value)
+{
+    for (size_t k = 0; k < a->n_outside; k++)
+        if (fabs(value - a->outside[k].mean) < CLEARLY * fabs(value - a->inside[0].mean))
+            return true;
+    return false;
+}
+
+/* Have the voxels like the outside about the volume of the shape at the start, mm^3? Around a shape
+ * whose values are right, an image mostly shows more of the outside. */
+static bool outside_is_as_small(const cli_fit *f, double shape)
+{
+    const sdm_grid *g = &f->target.grid;
+    const double voxel = g->spacing[0] * g->spacing[1] * g->spacing[2];
+    double volume = 0;
+    for (size_t v = 0; v < sdm_grid_count(g); v++)
+        if (is_like_outside(&f->opts.appearance, f->target.values[v])) volume += voxel;
+    return volume * VOLUME_FACTOR > shape && volume < VOLUME_FACTOR * shape;
+}
+
+/* Has nearly the whole border of the image the values of the inside? One value alone there is
+ * padding. tell: with a notice, because an image that holds the whole shape rarely has. */
+static bool check_border(const cli_fit *f, bool tell)
 {
     const sdm_grid *g = &f->target.grid;
     double sum = 0, least = INFINITY, most = -INFINITY;
@@ -171,12 +216,31 @@ static void check_border(const cli_fit *f)
                 n++, like += is_like_inside(&f->opts.appearance, value);
                 sum += value, least = fmin(least, value), most = fmax(most, value);
             }
-    if (!n || !(most > least) || (double)like < BORDER_SHARE * (double)n) return;
+    if (!n || !(most > least) || (double)like < BORDER_SHARE * (double)n) return false;
+    if (!tell) return true;
     cli_notice(
         "%.0f %% of the border of the image (mean %.4g) is nearer to the value of the inside, "
         "%.4g, than to those outside, %.4g%s: are --inside and --outside exchanged?",
         100 * (double)like / (double)n, sum / (double)n, f->opts.appearance.inside[0].mean,
         f->opts.appearance.outside[0].mean, f->opts.appearance.n_outside > 1 ? " and others" : "");
+    return true;
+}
+
+/* Is hardly any of what is like the inside enclosed by something else, compared with the volume of
+ * the shape at the start, mm^3? Around a shape whose values are right lies the outside. */
+static bool encloses_nothing(const cli_fit *f, double shape)
+{
+    const sdm_grid *g = &f->target.grid;
+    const double voxel = g->spacing[0] * g->spacing[1] * g->spacing[2];
+    const size_t count = sdm_grid_count(g);
+    unsigned char *mask = NULL;
+    size_t n = 0;
+    if (SDM_ALLOC(&mask, count, "voxels of the image", NULL)) return false;
+    for (size_t v = 0; v < count; v++)
+        mask[v] = is_nearest_inside(&f->opts.appearance, f->target.values[v]);
+    const sdm_status s = cli_count_enclosed(g, mask, &n, NULL);
+    sdm_free(mask);
+    return !s && (double)n * voxel < ENCLOSED_MAX * shape;
 }
 
 sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err)
@@ -195,12 +259,12 @@ sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err)
                        fabs(b - inside) < CLEARLY * fabs(b - outside) &&
                        fabs(a - b) > DEVIATIONS * sqrt(variance_of_mean(f, &in) +
                                                        variance_of_mean(f, &around));
-    if (!other || !((a - b) / (outside - inside) > CONTRAST_MIN)) {
-        check_border(f);
-        return SDM_OK;
-    }
+    if (!other || !((a - b) / (outside - inside) > CONTRAST_MIN))
+        return check_border(f, true), SDM_OK;
     describe_exchange(f, a, b, false, why.text, sizeof why.text);
-    if (clear && f->opts.turns == SDM_FIT_TURNS_NONE && !f->args->force)
+    const bool alone = check_border(f, false) && outside_is_as_small(f, in.volume) &&
+                       encloses_nothing(f, in.volume);
+    if (((clear && f->opts.turns == SDM_FIT_TURNS_NONE) || alone) && !f->args->force)
         return sdm_fail(err, SDM_E_QUALITY, "%s: %s; --force fits nevertheless", f->path, why.text);
     cli_notice("%s, if the shape lies near the start", why.text);
     return SDM_OK;

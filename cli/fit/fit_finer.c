@@ -1,4 +1,4 @@
-/* Goes on with finer exact maps after a fit whose voxels alone leave it in doubt. */
+/* Goes on with finer exact maps after a fit whose voxels alone leave, or may leave, it in doubt. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -6,11 +6,20 @@
 #include "fit_command.h"
 #include "report/terminal.h"
 #include "sdm/internal/fit_finding.h"
+#include "sdm/internal/shape_box.h"
 
 /* Limits of the finer maps, so that time and memory stay bounded: voxels, and values of a map with
  * its derivatives by the parameters. */
 #define VOXELS_MAX 2097152.0
 #define VALUES_MAX 16777216.0
+
+/* Voxels that pass are nearly too coarse if they are longer than this share of their limit. */
+#define NEARLY_COARSE 0.5
+/* They explain figures of up to so many times their limit. */
+#define LITTLE_BEYOND 1.5
+/* Such a fit goes on by itself with at most so many voxels, because finer maps may not be the
+ * remedy: twice those of the default grid. */
+#define NEARLY_VOXELS_MAX 524288.0
 
 /* Are the exact maps on the default grid, because no model and no option gives another one? */
 static bool grid_is_open(const cli_fit *f)
@@ -27,10 +36,35 @@ static bool coarse_maps_explain(sdm_fit_check_kind kind)
            kind == SDM_FIT_CHECK_OUTSIDE;
 }
 
+/* Are the voxels of the maps nearly too coarse, and is nothing in doubt but checks that coarse maps
+ * explain, each a little beyond its limit? */
+static bool maps_are_nearly_coarse(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    const sdm_fit_finding *voxels = sdm_fit_finding_of(v, SDM_FIT_CHECK_VOXELS);
+    if (!voxels || voxels->grade != SDM_FIT_PASSED || v->grade != SDM_FIT_DOUBTFUL || f->points ||
+        !(voxels->figure > NEARLY_COARSE * voxels->limit))
+        return false;
+    for (size_t i = 0; i < v->n_findings; i++) {
+        const sdm_fit_finding *x = &v->findings[i];
+        if (x->grade != SDM_FIT_PASSED &&
+            !(coarse_maps_explain(x->kind) && x->figure <= LITTLE_BEYOND * x->limit))
+            return false;
+    }
+    return true;
+}
+
+double cli_fit_finer_voxel(const cli_fit *f)
+{
+    // finer maps that were tried for this reason and did not help are not advised again
+    const bool nearly = !f->was_nearly_coarse && maps_are_nearly_coarse(f);
+    return nearly ? SDM_GRID_FIT_ADVISED * cli_fit_map_voxel(f) : f->result.advised_voxel_mm;
+}
+
 static bool only_maps_doubt(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
-    if (!isfinite(f->result.advised_voxel_mm)) return false;
+    if (!isfinite(cli_fit_finer_voxel(f))) return false;
     if (f->doubt.status && !cli_fit_voxels_refuse(f)) return false;
     for (size_t i = 0; i < v->n_findings; i++)
         if (v->findings[i].grade != SDM_FIT_PASSED && !coarse_maps_explain(v->findings[i].kind))
@@ -66,6 +100,7 @@ static void add_work(const sdm_fit_result *first, sdm_fit_result *r)
 /* Fits with maps on the grid g from the result of `before`. SDM_E_QUALITY is no error here. */
 static sdm_status fit_finer(cli_fit *f, const cli_fit *before, const sdm_grid *g, sdm_error *err)
 {
+    f->was_nearly_coarse = maps_are_nearly_coarse(f);
     f->coarse_mm = cli_fit_map_voxel(f);
     note_reason(f);
     f->thinnest = 0;
@@ -98,6 +133,7 @@ static sdm_status go_back(cli_fit *f, const cli_fit *before, sdm_error *err)
     f->better = before->better;
     memcpy(f->side, before->side, sizeof f->side);
     f->coarse_mm = 0;
+    f->was_nearly_coarse = false;
     return s;
 }
 
@@ -107,10 +143,11 @@ sdm_status cli_fit_go_finer(cli_fit *f, sdm_error *err)
     // a prior of the pose is one about its start
     const bool anchored = f->opts.prior_rotation_sd > 0 || f->opts.prior_translation_sd > 0;
     if (!grid_is_open(f) || anchored || !only_maps_doubt(f) ||
-        cli_fit_finer_grid(f, f->result.params, f->result.advised_voxel_mm, &g, NULL))
+        cli_fit_finer_grid(f, f->result.params, cli_fit_finer_voxel(f), &g, NULL))
         return SDM_OK;
     const double voxels = (double)sdm_grid_count(&g),
-                 most = fmin(VOXELS_MAX, floor(VALUES_MAX / (double)(f->n_params + 1)));
+                 most = fmin(maps_are_nearly_coarse(f) ? NEARLY_VOXELS_MAX : VOXELS_MAX,
+                             floor(VALUES_MAX / (double)(f->n_params + 1)));
     if (voxels > most) {
         f->too_many = voxels, f->many_at_most = most;
         return SDM_OK;

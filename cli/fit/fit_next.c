@@ -51,7 +51,7 @@ static void add_three(sdm_text *t, const char *name, const double x[3])
 static void write_price(const cli_fit *f, char *text, size_t size)
 {
     const sdm_fit_result *r = &f->result;
-    const double factor = pow(cli_fit_map_voxel(f) / r->advised_voxel_mm, 3),
+    const double factor = pow(cli_fit_map_voxel(f) / cli_fit_finer_voxel(f), 3),
                  voxels = (double)sdm_grid_count(f->source.model
                                                      ? &sdm_model_get_info(f->source.model)->grid
                                                      : &f->source.grid),
@@ -62,15 +62,17 @@ static void write_price(const cli_fit *f, char *text, size_t size)
         snprintf(why, sizeof why,
                  ", %.2g million in all (more than the %.2g million that a fit takes by itself)",
                  f->too_many / 1e6, f->many_at_most / 1e6);
-    snprintf(text, size, "; %s times as many voxels%s, up to %s %s", cli_number(factor, 2, times),
-             why, cli_number(most < 100 ? most : most / 60, 2, time), most < 100 ? "s" : "minutes");
+    snprintf(text, size,
+             "; %s times as many voxels%s, up to %s %s if the machine is as busy as in this fit",
+             cli_number(factor, 2, times), why, cli_number(most < 100 ? most : most / 60, 2, time),
+             most < 100 ? "s" : "minutes");
 }
 
 void cli_fit_print_next(const cli_fit *f)
 {
     const cli_args *a = f->args;
     const sdm_fit_result *r = &f->result;
-    const bool voxels = isfinite(r->advised_voxel_mm);
+    const bool voxels = isfinite(cli_fit_finer_voxel(f));
     // --exact and --polish need the exact shape
     const bool more = cli_fit_is_unfinished(f),
                refused = f->doubt.status && !cli_fit_voxels_refuse(f),
@@ -99,7 +101,7 @@ void cli_fit_print_next(const cli_fit *f)
     if (more && !lacks)
         sdm_text_add(&t, " --max-iterations=%zu", iterations > usual ? iterations : usual);
     if (voxels && !more) {
-        snprintf(text, sizeof text, "%.2g", r->advised_voxel_mm);
+        snprintf(text, sizeof text, "%.2g", cli_fit_finer_voxel(f));
         add_option(&t, "spacing", text);
         write_price(f, price, sizeof price);
     }
@@ -116,11 +118,14 @@ void cli_fit_print_next(const cli_fit *f)
     add_three(&t, "rotation", r->pose.rotation);
     add_three(&t, "translation", r->pose.translation);
     if (!t.failed)
-        printf("%s from here%s:\n  %s\n",
+        printf("%s from here%s%s:\n  %s\n",
                lacks    ? "known values in place of VALUE, for what the data hardly determine,"
                : more   ? "more iterations"
                : voxels ? "finer maps"
                         : "a polish with exact maps",
+               voxels && !more && !isfinite(r->advised_voxel_mm)
+                   ? " (the present ones are nearly too coarse, which may explain the doubt)"
+                   : "",
                voxels && !more ? price : "", t.data);
     sdm_text_dispose(&t);
 }

@@ -156,7 +156,9 @@ static void print_maps(const cli_fit *f)
     printf("  maps         %zu by the network, %zu by the exact engine", r->n_network, r->n_exact);
     if (!f->source.model && !f->points) printf(", voxels of %.3g mm", cli_fit_map_voxel(f));
     if (f->thinnest > 0) printf(", because the thinnest part is %.2g mm thick", f->thinnest);
-    if (f->coarse_mm > 0)
+    if (f->was_nearly_coarse)
+        printf(", because those of %.3g mm at first were nearly too coarse", f->coarse_mm);
+    else if (f->coarse_mm > 0)
         printf(", because those of %.3g mm at first were coarse beside %s", f->coarse_mm,
                f->coarse_beside);
     printf("\n");

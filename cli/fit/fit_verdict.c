@@ -193,6 +193,9 @@ static const char *in_short(const cli_fit *f)
         only(v, SDM_FIT_DOUBTFUL, coarse, sizeof coarse / sizeof *coarse))
         return "the maps are too coarse for these data: fit with finer ones before you judge the "
                "values";
+    if (!isfinite(f->result.advised_voxel_mm) && isfinite(cli_fit_finer_voxel(f)))
+        return "the maps are nearly too coarse, or the data differ from the shape as the lines "
+               "below say: fit with finer maps, and look at a picture (-o fit.png)";
     return "the data may differ from the shape as the lines below say: look at a picture "
            "(-o fit.png) before you use the values";
 }

@@ -53,7 +53,7 @@ expect 4 'error: thin-label.nii: the voxels of the maps are coarse beside ' \
     sdmgen fit --shape torus thin-label.nii --label 1 --rotation 0,0,0 --spacing 1 --quiet
 grep -q -- '--rotation gives one start' out && bad 'advice on the start beside coarse maps'
 grep -q 'a wrong start' err && bad 'a wrong start is named beside coarse maps'
-has '^finer maps from here; [0-9.]+ times as many voxels, up to [0-9.e+]+ (s|minutes):$'
+has '^finer maps from here; [0-9.]+ times as many voxels, up to [0-9.e+]+ (s|minutes) if the machine is as busy as in this fit:$'
 eval "$(sed -n 's/^  sdmgen fit/expect 0 - sdmgen fit/p' out)"
 has '^verdict: (passed|doubtful)$'
 
@@ -70,8 +70,36 @@ grep -q 'finer maps from here' out && bad 'the command of a fit that went on by 
 expect 0 - sdmgen phantom --shape capsule -p radius=0.6 -p length=1 --spacing 0.05 -o fine.nii --label fine-label.nii --quiet
 expect 0 - $small fine-label.nii --margin 0.3
 has '^  map voxels   doubtful .* coarse beside the voxels of the labels'
-has '^finer maps from here; [0-9.]+ times as many voxels, [0-9.]+ million in all \(more than the 2\.1 million that a fit takes by itself\), up to [0-9.e+]+ (s|minutes):$'
+has '^finer maps from here; [0-9.]+ times as many voxels, [0-9.]+ million in all \(more than the 2\.1 million that a fit takes by itself\), up to [0-9.e+]+ (s|minutes) if the machine is as busy as in this fit:$'
 has '^  maps .*, voxels of 0\.1[78][0-9]* mm$'
+
+# Maps pass but are nearly too coarse, and residuals are a little above their limit: the fit tries finer ones once by itself; with --spacing it prints the command.
+# (The labels are those of a shape that is a little squarer than the ellipsoid.)
+expect 0 - sdmgen phantom --shape ellipsoid -O e1=0.83 -O edge=0.2 -p rx=3 -p ry=2.5 -p rz=2 --spacing 0.2 -o square.nii --label square-label.nii --quiet
+square='sdmgen fit --shape ellipsoid -p rx=3 -p ry=2.5 -p rz=2 square-label.nii --label 1 --rotation 0,0,0 --keep pose --margin 0.4'
+$square >out 2>err || bad "a fit that tries finer maps: $(cat err)"
+grep -Eq '^sdmgen: fit 0 %  going on with finer maps \(voxels of 0\.15 mm\)$' err || bad "no line on finer maps: $(cat err)"
+has '^  maps .*, voxels of 0\.152 mm, because those of 0\.19 mm at first were nearly too coarse$'
+grep -q 'finer maps from here' out && bad 'finer maps are advised after some that did not help'
+expect 0 - $square --spacing 0.25 --quiet
+has '^  in short     the maps are nearly too coarse, or the data differ from the shape as the lines below say: fit with finer maps'
+has '^  map voxels   passed    0\.25, need at most 0\.3 '
+has '^finer maps from here \(the present ones are nearly too coarse, which may explain the doubt\); 2 times as many voxels, '
+has '^  sdmgen fit .* --spacing=0\.2 '
+
+# A point spread that is given and narrower than the maps show decides how fine they must be: 0.8 * 1.5 * 0.28 mm; else half a voxel of the image, 0.8 * 1.5 * 0.2 mm.
+expect 0 - sdmgen phantom --shape ellipsoid -O edge=0.6 -p rx=3.5 -p ry=2.5 -p rz=2 --spacing 0.4 -o spread.nii --quiet
+spread='sdmgen fit --shape ellipsoid -O edge=0.6 spread.nii --rotation 0,0,0 --spacing 0.6 --eps 1e-3 --quiet'
+expect 0 - $spread --blur 0.28
+has '^  map voxels   doubtful  0\.6, need at most 0\.42: .* coarse beside the point spread of the image: .* with voxels of 0\.34 mm '
+expect 0 - $spread
+has '^  map voxels   doubtful  0\.6, need at most 0\.3: .* contain an estimate of this error, which may be too small; exact maps with voxels of 0\.24 mm '
+has '^  in short     the maps limit the fit: the values are near; their \+- contain an estimate of the error of the maps, which may be too small$'
+
+# An interrupt says what it has stopped, and where.
+expect 130 'spread.nii: the fit was stopped on request (before its first iteration|in the search, at start [0-9]+ of 60); no file was written$' \
+    timeout --foreground --preserve-status -s TERM 1.5 "$program" fit --shape ellipsoid -O edge=0.1 spread.nii --spacing 0.15 --quiet -o none.json
+[ -e none.json ] && bad 'a file of a fit that was stopped'
 
 # Exchanged values of a thin shape beside its place: as much of both tissues lies within the start as around it.
 expect 0 - sdmgen phantom --shape torus -O edge=0.5 --spacing 0.4 -o torus.nii --quiet

@@ -32,8 +32,11 @@ expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside a
     $torus turned.nii --inside 1300,270 --outside 40,170
 grep -q '^verdict' out && bad 'a fit with values that the start shows to be exchanged'
 expect 0 - $torus turned.nii --inside 40,170 --outside 1300,270 --start-centre 1,0,0
-# a start beside the shape, or many rotations: a notice
-sdmgen fit --shape torus -O edge=0.5 turned.nii --spacing 0.4 --inside 1300,270 --outside 40,170 --start-axis 0,0,1 --turns 1 --max-iterations 1 >out 2>err
+# many rotations: told at once, too, because this image cannot be stated right; with --force a notice
+expect 4 'error: turned.nii: the values of the inside and the outside are exchanged: at the start .*--force fits nevertheless$' \
+    sdmgen fit --shape torus -O edge=0.5 turned.nii --quiet --inside 1300,270 --outside 40,170 --start-axis 0,0,1 --turns 1 --max-iterations 1
+grep -q '^verdict' out && bad 'a fit of many rotations with values that the image shows to be exchanged'
+sdmgen fit --shape torus -O edge=0.5 turned.nii --spacing 0.4 --inside 1300,270 --outside 40,170 --start-axis 0,0,1 --turns 1 --max-iterations 1 --force >out 2>err
 grep -q '^sdmgen: the values of the inside and the outside are exchanged: at the start .*: exchange --inside and --outside, if the shape lies near the start$' err ||
     bad "no notice of exchanged values: $(cat err)"
 # a start so far beside the shape that it shows nothing: the border of the image tells
@@ -41,6 +44,16 @@ sdmgen fit --shape torus -O edge=0.5 turned.nii --spacing 0.4 --inside 1300,270 
 grep -q '^sdmgen: [0-9]* % of the border of the image (mean 1[23][0-9.]*) is nearer to the value of the inside, 1300, than to those outside, 40' err || bad "no notice of the border: $(cat err)"
 sdmgen fit --shape torus -O edge=0.5 turned.nii --spacing 0.4 --inside 40,170 --outside 1300,270 --start-centre 0,0,4 --max-iterations 1 --turns 1 >out 2>err
 grep -q 'border of the image' err && bad "a notice of the border with the right values: $(cat err)"
+# a dark shape in a bright layer, around which the image is dark again: right values are fitted, although the start lies in the layer
+awk 'BEGIN { printf "NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 40 36 34\nspace directions: (0.4,0,0) (0,0.4,0) (0,0,0.4)\nspace origin: (-7.8,-7,-6.6)\nencoding: raw\n\n"
+    for (k = 0; k < 34; k++) for (j = 0; j < 36; j++) for (i = 0; i < 40; i++) {
+        x = 0.4 * i - 7.8; y = 0.4 * j - 7; z = 0.4 * k - 6.6
+        dark = x * x / 12.25 + y * y / 6.25 + z * z / 4 < 1 || x * x / 27 + y * y / 17.6 + z * z / 13.7 > 1
+        printf "%c", (dark ? 20 : 100) + (7 * i + 13 * j + 29 * k) % 9 } }' >layer.nrrd
+layer='sdmgen fit --shape ellipsoid -O edge=0.8 -p rx=1 -p ry=1 -p rz=1 layer.nrrd --spacing 0.4 --start-centre 0,0,2.85 --start-axis 0,0,1 --turns 1 --margin 4 --max-iterations 1'
+$layer --inside 24,3 --outside 104,3 >out 2>err
+grep -q 'exchanged: at the start .*, if the shape lies near the start$' err || bad "the start does not look exchanged: $(cat err)"
+has '^verdict: '
 expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside are exchanged: .*: exchange --inside and --outside$' \
     $torus turned.nii --inside 1300,270 --outside 40,170 --force
 has '^  given values doubtful  [0-9.]+, need at most 3 '

@@ -1,5 +1,5 @@
 /* A polish of a fit to points: the exact shape has a rod that the network does not show, so that
- * the network leaves it too long. Tests: fit.c even_points.c */
+ * the network leaves it too long. Tests: fit.c fit_defaults.c even_points.c */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -190,6 +190,17 @@ static void coarseness_limit(fit_coarseness *c, double limit, const char *detail
     if (limit < c->limit) c->limit = limit, c->detail = detail;
 }
 
+/* The point spread at the start, where it is not a default one and narrower than the maps show; 0:
+ * no such one was given. */
+static double given_blur(const fit_problem *p)
+{
+    const double blur = p->opts->blur,
+                 voxel = fmax(fit_longest_edge(&p->maps.grid), fit_longest_edge(&p->target->grid));
+    const bool is_default =
+        blur == sdm_fit_defaults().blur || blur == sdm_fit_defaults_for(voxel).blur;
+    return is_default || blur > p->maps.min_blur ? 0 : blur;
+}
+
 /* Longest edge of voxels that show the data. */
 static fit_coarseness data_limit(const fit_problem *p, double blur)
 {
@@ -199,11 +210,12 @@ static fit_coarseness data_limit(const fit_problem *p, double blur)
         coarseness_limit(&c, SDM_GRID_FIT_DATA * image, "the voxels of the labels");
     if (!(blur > 0)) return c;
     // an image hardly shows a point spread below half of its voxels, and maps with coarse voxels
-    // show none below half of theirs: finer ones may find a narrower one
+    // show none below half of theirs: finer ones may find a narrower one, the one that is given or,
+    // without it, any
     const double narrow = BLUR_OVER_IMAGE_VOXEL * image;
     const bool bound = !p->opts->keep_blur && blur <= p->maps.min_blur * (1 + LIMIT_ERROR);
-    coarseness_limit(&c, SDM_GRID_FIT_DATA * (bound ? narrow : fmax(blur, narrow)),
-                     "the point spread of the image");
+    const double least = bound ? given_blur(p) : blur;
+    coarseness_limit(&c, SDM_GRID_FIT_DATA * fmax(least, narrow), "the point spread of the image");
     return c;
 }
 
@@ -275,14 +287,13 @@ void sdm_fit_check_voxels(const fit_problem *p, fit_coarseness coarse, sdm_fit_r
                  "show it",
                  coarse.advice, SDM_GRID_FIT_ADVISED);
     if (voxel > coarse.limit && !*coarse.cause) r->advised_voxel_mm = coarse.advice;
-    sdm_fit_judge_add(&r->verdict, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit),
-                      coarse.blind ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, voxel, coarse.limit,
-                      "the voxels of the maps are coarse beside %s: parameters may be biased, and "
-                      "their standard deviations %s; %s",
-                      coarse.detail,
-                      p->target->kind == SDM_FIT_POINTS ? "contain an estimate of this error"
-                                                        : "may be too small",
-                      remedy);
+    sdm_fit_judge_add(
+        &r->verdict, SDM_FIT_CHECK_VOXELS, !(voxel > coarse.limit),
+        coarse.blind ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, voxel, coarse.limit,
+        "the voxels of the maps are coarse beside %s: parameters may be biased; their "
+        "standard deviations contain an estimate of this error, which may be too "
+        "small; %s",
+        coarse.detail, remedy);
 }
 
 void sdm_fit_check_labels(const fit_problem *p, double thinnest, sdm_fit_verdict *v)

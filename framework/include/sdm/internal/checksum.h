@@ -17,12 +17,13 @@ extern "C" {
 SDM_INTERNAL_API uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size);
 
 /* The CRC-64 of any bytes that end with the CRC-64 of the bytes before them (little-endian), as
- * containers do (model files, .ssm): it is the same for all of them and says nothing of the content.
+ * containers do (model files, .ssm): it is the same for all of them and says nothing of the
+ * content.
  */
 #define SDM_CRC64_WITH_OWN 0xb66a73654282cac0u
 
-/* Checksum that tells files apart: the CRC-64 of `size` bytes at `data`; if they end with the CRC-64
- * of the bytes before them, that CRC-64. [any thread] */
+/* Checksum that tells files apart: the CRC-64 of `size` bytes at `data`; if they end with the
+ * CRC-64 of the bytes before them, that CRC-64. [any thread] */
 uint64_t sdm_content_checksum(const void *data, size_t size);
 
 /* sdm_content_checksum() of a regular file. SDM_E_IO, SDM_E_NOMEM. [any thread] */

@@ -83,7 +83,7 @@ static void print_other(const sdm_train_report *r)
         "%.3g ms a map%s",
         kind_name(r->other_kind), sdm_grade_name(r->other_grade), r->other.rmse_mm,
         r->other_voxel_mm, r->other_ms,
-        r->other_voxel_mm < r->verdict.rmse_voxel_mm ? "; better at the surface, worse elsewhere"
+        r->other_voxel_mm < r->verdict.rmse_voxel_mm ? "; better at the surface"
                                                      : "");
     if (r->other_path[0]) printf("; its model is %s", r->other_path);
     printf("\n");
@@ -146,15 +146,17 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     if (r->verdict.saved_seconds > 0 && r->steps)
         printf("; train.patience saved %.0f s", r->verdict.saved_seconds);
     const sdm_verdict *v = &r->verdict;
+    printf("\n");
+    cli_print_two("  time        ", times);
+    if (use->n > 1) print_ranks(use);
+    if (r->compared) print_other(r);
+    cli_print_measurements(v);
     printf(
         "\n  held out    %lld shapes: RMSE %.5f mm (%.4f voxels), MSE %.3g mm^2; within a voxel of "
         "the surface %.5f mm (%.4f voxels); Dice %.4f, smallest %.4f\n",
         (long long)a->samples, a->rmse_mm, a->rmse_mm / v->voxel_mm, a->mse_mm2, v->rmse_voxel_mm,
         v->rmse_voxel_mm / v->voxel_mm, v->dice, v->dice_min);
-    cli_print_two("  time        ", times);
-    if (use->n > 1) print_ranks(use);
-    if (r->compared) print_other(r);
-    cli_print_verdict(&r->verdict);
+    cli_print_verdict(v);
     if (isfinite(before)) cli_print_before(before, a->rmse_mm);
     cli_print_pod(args, r, times, minutes);
     cli_print_next(args, r, r->chosen ? kind_name(r->kind) : NULL, times->ms_network, minutes);

@@ -32,9 +32,9 @@ sdm_status sdm_train_check_folder(const char *folder, bool resume, bool force, s
     if (force || (!there[0] && !there[1])) return SDM_OK;
     if (!there[1])
         return sdm_fail(err, SDM_E_ARG,
-                        "%s holds %s and no checkpoint to continue from: start again with --force, "
-                        "or choose --out DIR",
-                        folder, files[0].content);
+                        "%s holds %s%s: --force replaces it, --out DIR writes into another folder",
+                        folder, files[0].content,
+                        resume ? " and no checkpoint from which --resume can go on" : "");
     if (resume) return SDM_OK;
     return sdm_fail(
         err, SDM_E_ARG,

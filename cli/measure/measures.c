@@ -46,7 +46,7 @@ static void print_measure(const sdm_measured *m, bool with_sd)
     if (!isnan(m->depth)) printf(" at %g mm", m->depth);
     if (isnan(m->value)) printf("   (%s)", isnan(m->depth) ? "the mesh is open" : "beyond the end");
     if (m->not_determined)
-        printf("   not determined: the standard deviation is at least that before the fit");
+        printf("   not determined: the standard deviation is over 0.9 of that before the fit");
     printf("\n");
 }
 

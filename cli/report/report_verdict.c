@@ -70,7 +70,7 @@ static void print_derivatives(const sdm_verdict *v)
         "%s, the worst one)",
         (int)v->derivative_shapes, percent(v->derivative_error, text), v->derivative_by);
     if (v->volume_derivatives_bad[0] || v->volume_derivatives_small[0])
-        printf(", of volumes as `not for` says");
+        printf("; of volumes: see `not for`");
     else if (isfinite(v->volume_derivative_error))
         printf(", of volumes by %s %% (by %s)", percent(v->volume_derivative_error, text),
                v->volume_derivative_by);
@@ -86,13 +86,8 @@ static void print_still(const sdm_verdict *v)
             v->still_params, strchr(v->still_params, ',') ? "move" : "moves");
 }
 
-void cli_print_verdict(const sdm_verdict *v)
+void cli_print_measurements(const sdm_verdict *v)
 {
-    char text[SDM_GRADE_TEXT], few[SDM_GRADE_FEW], grade[48], unfit[SDM_MODEL_UNFIT];
-    snprintf(grade, sizeof grade, "%s%s", sdm_grade_name(v->grade), sdm_grade_few(v->heldout, few));
-    printf("  %-11s %s\n", grade, sdm_grade_text(v, text));
-    sdm_verdict_unfit(v, unfit);
-    cli_print_unfit(unfit, "  not for", 13);
     print_far(v);
     print_derivatives(v);
     print_still(v);
@@ -101,19 +96,25 @@ void cli_print_verdict(const sdm_verdict *v)
         printf("  template    at the vertices: frames and amplitudes %.2g mm, warp %.2g mm\n",
                v->motion_mm, v->warp_mm);
     if (isfinite(v->fall))
-        printf("  steps       the last third of them lowered the error of the network by "
+        printf("  steps       the last third of the steps lowered the error of the network by "
                "%.0f %%\n",
                100 * v->fall);
-    if (isfinite(v->thin)) {
-        const double grid = sqrt(v->part_mm2[SDM_CAUSE_GRID]);
-        printf(
-            "  grid        between its voxels exact maps miss the surface by %.5f mm (%.3f voxels)",
-            grid, grid / v->voxel_mm);
-        if (v->thin >= 0.005)
-            printf("; %.0f %% of the surface is thinner than two voxels or has an edge",
-                   100 * v->thin);
-        printf("\n");
-    }
+    if (!isfinite(v->thin)) return;
+    const double grid = sqrt(v->part_mm2[SDM_CAUSE_GRID]);
+    printf("  grid        between its voxels exact maps miss the surface by %.5f mm (%.3f voxels)",
+           grid, grid / v->voxel_mm);
+    if (v->thin >= 0.005)
+        printf("; %.0f %% of the surface is thinner than two voxels or has an edge", 100 * v->thin);
+    printf("\n");
+}
+
+void cli_print_verdict(const sdm_verdict *v)
+{
+    char text[SDM_GRADE_TEXT], few[SDM_GRADE_FEW], grade[48], unfit[SDM_MODEL_UNFIT];
+    snprintf(grade, sizeof grade, "%s%s", sdm_grade_name(v->grade), sdm_grade_few(v->heldout, few));
+    printf("  %-11s %s\n", grade, sdm_grade_text(v, text));
+    sdm_verdict_unfit(v, unfit);
+    cli_print_unfit(unfit, "  not for", 13);
     printf("  verdict     %s%s\n",
            v->grade == SDM_GRADE_POOR ? "The model is poor, not for use. " : "", v->sentence);
 }

@@ -3,8 +3,11 @@
 
 #include "sdm/internal/verdict.h"
 
-/* Prints on stdout how good the model is, the parts of its error, one per line, and what limits it.
- */
+/* Prints the measurements of a training on stdout: the error by distance, of volumes and
+ * derivatives, its parts, the steps and the grid. */
+void cli_print_measurements(const sdm_verdict *v);
+
+/* Prints on stdout how good the model is, for which uses it is not, and what limits it. */
 void cli_print_verdict(const sdm_verdict *v);
 
 /* Prints `lines` (sdm_model_quality.unfit) on stdout, each after `width` columns and a space, the

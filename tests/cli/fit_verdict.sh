@@ -193,5 +193,5 @@ has '^  residuals +doubtful +the points lie too far apart .* \(--point-sd\), kee
 expect 0 - $few --point-sd 0.05 --keep appearance
 has '^verdict: passed$'
 expect 0 - $few --point-sd 0.02 --keep appearance
-has '^  residuals +doubtful .*: the points lie 0\.0[0-9]+ mm off the surface, .* as given: another shape, or it is larger$'
+has '^  residuals +doubtful .*: the points lie 0\.0[0-9]+ mm off the surface, .* as given: another shape, or their standard deviation is larger$'
 finish

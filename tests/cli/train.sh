@@ -33,8 +33,8 @@ tail -n 1 run/metrics.jsonl | grep -q '^{"phase": "verdict", "grade": ' || bad '
 
 # A finished run is not overwritten.
 before=$(cksum <run/model.sdm)
-expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run
-expect 2 'run holds a trained model and no checkpoint to continue from' sdmgen train "$tiny" --out run --resume
+expect 2 'run holds a trained model: --force replaces it, --out DIR writes into another folder' sdmgen train "$tiny" --out run
+expect 2 'run holds a trained model and no checkpoint from which --resume can go on: --force replaces it' sdmgen train "$tiny" --out run --resume
 expect 2 'exclude each other' sdmgen train "$tiny" --out run --resume --force
 [ "$before" = "$(cksum <run/model.sdm)" ] || bad 'the model has changed'
 

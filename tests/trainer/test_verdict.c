@@ -445,7 +445,7 @@ static void unfinished_names_one_change(void **state)
     v.limited = true, v.limit = SDM_CAUSE_NETWORK, v.at_best_mm = 0.03, v.minutes = 2;
     v.part_mm2[SDM_CAUSE_NETWORK] = 0.0027;
     strcpy(v.key, "network.depth");
-    strcpy(v.sentence, "Polynomials alone limit it: raise network.depth from 0 to 3.");
+    strcpy(v.sentence, "Polynomials alone limit the model: raise network.depth from 0 to 3.");
     trainer_verdict_unfinished("template", "pod", false, &v);
     assert_string_equal(v.sentence,
                         "network.kind: auto had no time left to train pod, too: pod may be better "

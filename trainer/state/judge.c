@@ -83,7 +83,7 @@ static const char *advise_network(const verdict_input *in, sdm_verdict *v)
     const sdm_config *c = in->config;
     if (has_bases(c) && !c->network.depth) {
         advise(v, "network.depth", 0, 3);
-        return "Polynomials alone limit it";
+        return "Polynomials alone limit the model";
     }
     if (c->train.learning_rate > RATE_HIGH) {
         advise(v, "train.learning_rate", c->train.learning_rate, RATE_USUAL);
@@ -106,13 +106,13 @@ static const char *advise_network(const verdict_input *in, sdm_verdict *v)
     // the head sees more than the modes, but the MLP learns only them
     if (has_bases(c) && v->modes_mm2 > 0.5 * v->part_mm2[SDM_CAUSE_NETWORK] &&
         advise_double(v, "network.modes", c->network.modes, 2048))
-        return "The number of global modes limits it";
+        return "The number of global modes limits the model";
     if (c->network.kind == SDM_NETWORK_SDMNN &&
         advise_double(v, "network.channels", c->network.channels, 512))
-        return "The size of the network limits it";
+        return "The size of the network limits the model";
     if (!advise_double(v, "network.width", c->network.width, 4096) && c->network.depth < 16)
         advise(v, "network.depth", c->network.depth, c->network.depth + 1);
-    return "The size of the network limits it";
+    return "The size of the network limits the model";
 }
 
 /* Held-out maps have a larger error than training maps. */
@@ -139,7 +139,7 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
         advise(v, "data.online", (double)c->data.online, 2 * (double)c->data.online);
     else
         advise(v, "data.start", (double)c->data.start, 2 * fmax((double)c->data.start, in->maps));
-    return "The number of maps limits it";
+    return "The number of maps limits the model";
 }
 
 /* Sets the key for the part that limits; returns the first half of the sentence. */
@@ -150,19 +150,19 @@ static const char *advise_part(const verdict_input *in, sdm_verdict *v)
     case SDM_CAUSE_BASES:
         if (!advise_double(v, "network.rank", c->network.rank, 256) && c->network.block >= 4)
             advise(v, "network.block", c->network.block, c->network.block / 2);
-        return "The bases limit it";
+        return "The bases limit the model";
     case SDM_CAUSE_NETWORK:
         return advise_network(in, v);
     case SDM_CAUSE_MAPS:
         return advise_maps(in, v);
     case SDM_CAUSE_ROUNDING:
-        return "The rounding of the weights limits it";
+        return "The rounding of the weights limits the model";
     case SDM_CAUSE_FAR:
         return "Far from the surface the template only estimates distances, inside overlaps of its "
-               "parts and where parts are stretched; this limits it";
+               "parts and where parts are stretched; this limits the model";
     case SDM_CAUSE_TEMPLATE:
         advise(v, "grid.spacing", v->voxel_mm, v->voxel_mm / 2);
-        return "The lattices of the template limit it, which are as fine as the grid";
+        return "The lattices of the template limit the model, which are as fine as the grid";
     default:
         if (sdm_verdict_lacks_part(v)) {
             advise(v, "grid.spacing", v->coarse_mm, sdm_verdict_spacing(v));
@@ -311,7 +311,7 @@ static void decide_limit(const verdict_input *in, sdm_verdict *v)
     v->at_best_mm = NAN;
     v->limited = find_limit(in, v, &v->limit);
     if (!v->limited) {
-        snprintf(v->sentence, sizeof v->sentence, "Nothing that was measured limits it.");
+        snprintf(v->sentence, sizeof v->sentence, "Nothing that was measured limits the model.");
         return;
     }
     double rest = 0;

@@ -87,7 +87,7 @@ static sdm_status check_distances(const sdm_model_info *m, sdm_error *err)
     return sdm_fail(
         err, SDM_E_QUALITY,
         "distances of its maps farther than %.3g mm from the surface are wrong by up "
-        "to %.2g mm; nearer ones have an RMS error of %.2g mm; all of exact maps are right",
+        "to %.2g mm; nearer ones have an RMS error of %.2g mm; exact maps have no such error",
         m->accuracy.near_mm, error, m->accuracy.rmse_near_mm);
 }
 

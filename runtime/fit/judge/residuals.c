@@ -40,6 +40,8 @@
 #define GRADIENT_MIN 0.25
 // correlations below this count as none
 #define CORRELATION_MIN 0.05
+// where pairs become too few to measure it, a larger one says that noise reaches farther
+#define CORRELATION_OPEN 0.2
 
 static bool is_voxels(const fit_problem *p) { return p->target->kind != SDM_FIT_POINTS; }
 
@@ -290,7 +292,9 @@ static void correlations_measure(fit_residuals *r, const lookup *l, double *list
         for (int lag = 1; lag <= FIT_RESIDUAL_LAGS; lag++) {
             const size_t n = differences(r, l, axis, lag, -1, list);
             const double c = sdm_fit_robust_correlation(list, n);
-            if (lag == 1 && isnan(c) && l->size[axis] > 1) r->unmeasured = true;
+            if (isnan(c) && l->size[axis] > (size_t)lag &&
+                r->correlation[axis][lag - 1] > CORRELATION_OPEN)
+                r->unmeasured = true;
             if (!(c >= CORRELATION_MIN)) break;
             r->correlation[axis][lag] = c;
         }

@@ -40,8 +40,7 @@ typedef struct fit_residuals {
     int32_t edge[3];
     /* correlation of the noise of voxels that lie so many steps apart along each axis */
     double correlation[3][FIT_RESIDUAL_LAGS + 1];
-    /* too few pairs of neighbours along an axis to measure the correlation, which is then 0 above
-     */
+    /* along an axis, pairs become too few before the correlation is small: it is 0 from there on */
     bool unmeasured;
     /* voxels: middle and robust sd of the values deep outside [0] and deep inside [1], and the
        number of these voxels; points: 0 */

@@ -149,7 +149,7 @@ static void add_scatter(given_scatter g, sdm_fit_verdict *v)
     sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, g.over <= g.limit, SDM_FIT_DOUBTFUL, g.over,
                       g.limit,
                       "the points lie %.2g mm off the surface, %.2g times their standard deviation "
-                      "as given: another shape, or it is larger",
+                      "as given: another shape, or their standard deviation is larger",
                       g.rms, sqrt(g.over));
 }
 

@@ -315,8 +315,8 @@ static const char *open_note(const sdm_train_report *r, char text[200])
     *text = '\0';
     if (is_open(r))
         snprintf(text, 200,
-                 "network.kind stays auto: this run had no time to try %s; at the pace of this run "
-                 "these train.minutes are enough to try both kinds%s; ",
+                 "network.kind stays auto: this run had no time to try %s; at its pace these "
+                 "train.minutes are enough for both kinds, those of the verdict for one%s; ",
                  r->kind == SDM_NETWORK_POD ? "template" : "pod",
                  r->kind == SDM_NETWORK_POD ? "; network.kind=template alone needs less" : "");
     return text;

@@ -120,6 +120,9 @@ class FitResult:
     restarts: int
     #: True: the fit began with a network and ended with exact maps (polish=True)
     polished: bool
+    #: edge of the voxels of exact maps (mm) that would be fine enough, where the check `map voxels` has
+    #: not passed, or `network bias` and a polish may end too coarse: fit with `spacing=` of it; else NaN
+    advised_voxel_mm: float
     #: log-posterior density after each iteration, up to a constant
     objective: Float64
     log_likelihood: float
@@ -704,6 +707,7 @@ def _result_of(
         iterations=c.n_iterations,
         restarts=c.n_restarts,
         polished=c.polished,
+        advised_voxel_mm=c.advised_voxel_mm,
         objective=copied(c.objective, (c.n_iterations,), np.float64),
         log_likelihood=c.log_likelihood,
         evidence=c.evidence,

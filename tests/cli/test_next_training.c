@@ -162,8 +162,8 @@ static void kind_stays_open(void **state)
         assert_string_equal(text, expected);
         assert_string_equal(
             second, "              (network.kind stays auto: this run had no time to try "
-                    "template; at the pace of this run these train.minutes are enough to try both "
-                    "kinds; network.kind=template alone needs less)\n");
+                    "template; at its pace these train.minutes are enough for both kinds, those of "
+                    "the verdict for one; network.kind=template alone needs less)\n");
         // a kind that was tried needs no other trial
         r.tried = true;
         next_lines(&r, 2, text, second);
@@ -194,8 +194,8 @@ static void finer_grid_leaves_kind_open(void **state)
                               "train.minutes=84 --out run-2\n");
     assert_string_equal(second,
                         "              (network.kind stays auto: this run had no time to "
-                        "try template; at the pace of this run these train.minutes are enough to "
-                        "try both kinds; network.kind=template alone needs less; the finer grid is "
+                        "try template; at its pace these train.minutes are enough for both "
+                        "kinds, those of the verdict for one; network.kind=template alone needs less; the finer grid is "
                         "for derivatives of the volume, see `not for`; it has 8 times the voxels; "
                         "nothing else needs to change, because the error at the surface is only "
                         "0.01 voxels)\n");

@@ -56,7 +56,7 @@ has '^  auto        trained (pod|template), too \((good|usable|poor)\): RMSE .*,
 # each figure of the end stands there once
 has '^  held out    12 shapes: RMSE [0-9.]+ mm \([0-9.]+ voxels\), MSE [0-9.e-]+ mm\^2; within a voxel of the surface [0-9.]+ mm \([0-9.]+ voxels\); Dice [0-9.]+, smallest [0-9.]+$'
 has '^  by distance within two voxels \(0\.68 mm\) of the surface [0-9.]+ mm, '
-has '^  derivatives by the parameters, of [0-9]+ shapes: .*, of volumes as `not for` says$'
+has '^  derivatives by the parameters, of [0-9]+ shapes: .*; of volumes: see `not for`$'
 has '^  (next|better) +sdmgen train link.yaml .*network.kind=(pod|template) --out both-2$'
 has '^              \(the kind stays (pod|template)(, whose maps take [0-9.e-]+ ms)?; without network\.kind=(pod|template) auto chooses again[;)]'
 other=$(sed -n 's/.*; its model is //p' out)

@@ -83,8 +83,7 @@ static void print_other(const sdm_train_report *r)
         "%.3g ms a map%s",
         kind_name(r->other_kind), sdm_grade_name(r->other_grade), r->other.rmse_mm,
         r->other_voxel_mm, r->other_ms,
-        r->other_voxel_mm < r->verdict.rmse_voxel_mm ? "; better at the surface"
-                                                     : "");
+        r->other_voxel_mm < r->verdict.rmse_voxel_mm ? "; better at the surface" : "");
     if (r->other_path[0]) printf("; its model is %s", r->other_path);
     printf("\n");
 }

@@ -195,7 +195,8 @@ static void finer_grid_leaves_kind_open(void **state)
     assert_string_equal(second,
                         "              (network.kind stays auto: this run had no time to "
                         "try template; at its pace these train.minutes are enough for both "
-                        "kinds, those of the verdict for one; network.kind=template alone needs less; the finer grid is "
+                        "kinds, those of the verdict for one; network.kind=template alone needs "
+                        "less; the finer grid is "
                         "for derivatives of the volume, see `not for`; it has 8 times the voxels; "
                         "nothing else needs to change, because the error at the surface is only "
                         "0.01 voxels)\n");

@@ -84,9 +84,10 @@ def test_labels_and_points(run, ct, tmp_path):
     result = sdmgen.fit(shape, ct["label.nii.gz"], label=1, start_axis=(0, 0, 1), turns=1, spacing=0.6, threads=1)
     compare(result, run("fit", "--shape", "torus", ct["label.nii.gz"], *words))
     assert result.dice > 0.9
-    assert np.isnan(result.advised_voxel_mm)
-    coarse = sdmgen.fit(shape, ct["label.nii.gz"], label=1, rotation=(0, 0, 0), spacing=1.2, threads=1)
-    assert coarse.verdict == "doubtful" and 0.2 < coarse.advised_voxel_mm < 0.7  # 1.5 voxels of the labels at most
+    finer = result.advised_voxel_mm
+    assert 0.2 < finer < 0.6
+    result = sdmgen.fit(shape, ct["label.nii.gz"], label=1, rotation=(0, 0, 0), spacing=finer, threads=1)
+    assert np.isnan(result.advised_voxel_mm) and result.verdict == "passed"
     mesh = sdmgen.Shape("torus", edge=0.5).mesh(major=2.4)
     mesh.write(tmp_path / "torus.ply")
     np.save(tmp_path / "points.npy", mesh.vertices)

@@ -122,7 +122,7 @@ static bool print_command(const char *begin, const cli_args *args, const sdm_tra
 /* Does the template err far from the surface alone, so that another kind is a choice? */
 static bool is_far(const sdm_verdict *v)
 {
-    return v->limited && v->limit == SDM_CAUSE_FAR && !(v->cut > 0) && !(v->inside_out > 0);
+    return v->limited && v->limit == SDM_CAUSE_FAR && !(v->cut > 0) && !sdm_verdict_broken(v);
 }
 
 /* The line `far away`. Returns whether pod may help. */
@@ -207,7 +207,7 @@ void cli_show_part_first(sdm_train_report *r, double thin_spacing, double minute
     sdm_verdict *v = &r->verdict;
     const double factor = pow(v->coarse_mm / thin_spacing, 3);
     char time[80] = "";
-    if (!(factor > 1) || v->inside_out > 0 || sdm_verdict_lacks_part(v)) return;
+    if (!(factor > 1) || sdm_verdict_broken(v) || sdm_verdict_lacks_part(v)) return;
     v->limited = true, v->limit = SDM_CAUSE_GRID, v->at_best_mm = NAN;
     strcpy(v->key, "grid.spacing");
     v->from = v->coarse_mm, v->to = thin_spacing;
@@ -287,7 +287,7 @@ static const char *named_key(const sdm_verdict *v)
  * the kind that was trained. */
 static bool is_open(const sdm_train_report *r)
 {
-    return r->trial_minutes > 0 && !r->tried && !r->compared && !(r->verdict.inside_out > 0);
+    return r->trial_minutes > 0 && !r->tried && !r->compared && !sdm_verdict_broken(&r->verdict);
 }
 
 /* Returns the changes of keys, with train.minutes raised so that they hold the trials of both
@@ -390,7 +390,7 @@ void cli_print_next(const cli_args *args, const sdm_train_report *r, const char 
     const char *begin = v->grade == SDM_GRADE_GOOD ? "  better      " : "  next        ";
     // the maps of another grid are not in --dataset
     const bool other_maps = args->dataset && (v->cut > 0 || !strncmp(v->key, "grid.", 5));
-    if (r->unfinished && !(v->inside_out > 0) && !other_maps) {
+    if (r->unfinished && !sdm_verdict_broken(v) && !other_maps) {
         print_finish(begin, args, r, minutes);
         return;
     }

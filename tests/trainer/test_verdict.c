@@ -418,6 +418,17 @@ static void inside_out_is_the_cause(void **state)
         trainer_verdict_decide(&in, &v);
         assert_non_null(strstr(v.sentence, "inside out"));
         assert_true(!v.limited && v.key[0] == 0 && v.grade != SDM_GRADE_GOOD);
+        // open edges, too; the model file says it
+        char unfit[SDM_MODEL_UNFIT];
+        v = figures();
+        v.open = 0.25;
+        v.part_mm2[SDM_CAUSE_MAPS] = 8e-5;
+        if (!good) v.dice = 0.5;
+        trainer_verdict_decide(&in, &v);
+        sdm_verdict_unfit(&v, unfit);
+        assert_non_null(strstr(v.sentence, "open or badly oriented edges"));
+        assert_non_null(strstr(unfit, "open or badly oriented edges of the meshes"));
+        assert_true(!v.limited && v.key[0] == 0 && v.grade != SDM_GRADE_GOOD);
     }
 }
 

@@ -113,13 +113,15 @@ sdm_status trainer_exact_within(const dataset *d, const double *p, int n_threads
     return s;
 }
 
-/* Adds 1 to *n if parts of the mesh are inside out and stay so; lowers *thickness to that of the
- * thinnest part. */
-static sdm_status check_parts(const sdm_mesh *m, size_t *n, double *thickness, sdm_error *err)
+/* Adds 1 to *inside_out if parts of the mesh are inside out and stay so, and to *open if it has open
+ * or badly oriented edges; lowers *thickness to that of the thinnest part. */
+static sdm_status check_parts(const sdm_mesh *m, size_t *inside_out, size_t *open,
+                              double *thickness, sdm_error *err)
 {
     sdm_part_audit audit = {0};
     const sdm_status s = sdm_part_audit_make(m, SDM_AUDIT_WALLS, NULL, &audit, err);
-    *n += !s && audit.inside_out;
+    *inside_out += !s && audit.inside_out;
+    *open += !s && !audit.mesh.closed;
     *thickness = fmin(*thickness, sdm_part_audit_thickness(&audit)); // fmin() ignores NaN
     sdm_part_audit_dispose(&audit);
     return s;
@@ -133,14 +135,14 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
     sdm_mesh mesh = {0};
     float *map = NULL;
     double thickness = NAN;
-    size_t cut = 0, compared = 0, inside_out = 0;
+    size_t cut = 0, compared = 0, inside_out = 0, open = 0;
     sdm_status s = SDM_ALLOC(&map, sdm_grid_count(d->grid), "surface", err);
     for (size_t i = 0; i < d->n_holdout && !s; i++) {
         sdm_exact *e = NULL;
         s = sdm_instance_mesh(d->shape, d->holdout_params + i * d->n_params, &mesh, err);
         if (!s) cut += trainer_is_cut(&mesh, d->grid);
         if (s || i >= SHAPES) continue;
-        s = check_parts(&mesh, &inside_out, &thickness, err);
+        s = check_parts(&mesh, &inside_out, &open, &thickness, err);
         compared++;
         if (!s) s = sdm_exact_create(&mesh, &opts, &e, err);
         if (!s) s = check_surface(d, e, i, map, &sums, err);
@@ -152,7 +154,8 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
                            .thin = sums.n > 0 ? sums.thin / sums.n : NAN,
                            .thickness_mm = thickness,
                            .cut = d->n_holdout ? (double)cut / (double)d->n_holdout : 0,
-                           .inside_out = compared ? (double)inside_out / (double)compared : 0};
+                           .inside_out = compared ? (double)inside_out / (double)compared : 0,
+                           .open = compared ? (double)open / (double)compared : 0};
     return s;
 }
 

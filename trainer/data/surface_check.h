@@ -20,6 +20,8 @@ typedef struct surface_check {
     /* Fraction of the compared shapes with parts that are inside out and that the engine does not
        turn: they take away from the parts that they overlap. */
     double inside_out;
+    /* Fraction of the compared shapes with open or badly oriented edges. */
+    double open;
 } surface_check;
 
 /* Does the mesh reach beyond the outer voxel centres of the grid? */

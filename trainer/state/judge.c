@@ -332,17 +332,22 @@ static void tell_cut(sdm_verdict *v)
              share, rest);
 }
 
-/* Parts that are inside out make the maps jump where they begin to overlap others: no network
- * learns that, and what it leaves says nothing about network or maps. */
-static void tell_inside_out(sdm_verdict *v)
+/* Parts that are inside out make the maps jump where they begin to overlap others, and open edges
+ * where the side of a point is a guess: no network learns that, and the error that it leaves says
+ * nothing about network or maps. */
+static void tell_broken(sdm_verdict *v)
 {
     v->limited = false;
     v->key[0] = 0;
     v->at_best_mm = NAN;
-    snprintf(v->sentence, sizeof v->sentence,
-             "Parts of the meshes are inside out and vanish where they overlap others: reverse the "
-             "vertices of their triangles in mesh() of the shape (sdmgen shapes check names the "
-             "parts).");
+    snprintf(v->sentence, sizeof v->sentence, "%s",
+             v->inside_out > 0
+                 ? "Parts of the meshes are inside out and vanish where they overlap others: "
+                   "reverse the vertices of their triangles in mesh() of the shape (sdmgen shapes "
+                   "check names the parts)."
+                 : "The meshes have open or badly oriented edges, so that nothing tells the inside "
+                   "from the outside there: mend mesh() of the shape (sdmgen shapes check names "
+                   "the edges), then train again.");
 }
 
 /* Ends the sentence with the number of held-out shapes, where they are few. */
@@ -360,13 +365,13 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
     v->grade = grade_of(v);
     decide_limit(in, v);
     // the maps lack these parts: however exact the network is, it has learned another shape
-    const bool lacks = v->inside_out > 0 || sdm_verdict_lacks_part(v);
+    const bool lacks = sdm_verdict_broken(v) || sdm_verdict_lacks_part(v);
     if (lacks && v->grade == SDM_GRADE_GOOD) v->grade = SDM_GRADE_USABLE;
     // whole parts are missing: who has only the model file must be warned
     if (v->inside_out > 0) v->grade = SDM_GRADE_POOR;
     if (v->thickness_mm < SDM_PART_MISSING * v->coarse_mm) v->grade = SDM_GRADE_POOR;
-    if (v->inside_out > 0)
-        tell_inside_out(v);
+    if (sdm_verdict_broken(v))
+        tell_broken(v);
     else if (v->cut > 0)
         tell_cut(v);
     tell_few(v);
@@ -375,7 +380,7 @@ void trainer_verdict_decide(const verdict_input *in, sdm_verdict *v)
 void trainer_verdict_unfinished(const char *own, const char *other, bool tried, sdm_verdict *v)
 {
     char rest[sizeof v->sentence];
-    if (v->inside_out > 0) return;
+    if (sdm_verdict_broken(v)) return;
     // the other kind is the change to make: no key of this one, but the grid of both
     if (v->limited && strncmp(v->key, "grid.", 5)) {
         const double part = v->part_mm2[v->limit], others = v->at_best_mm * v->at_best_mm;
@@ -465,7 +470,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                         .warp_mm = NAN,
                         .degree = NAN,
                         .ridge = NAN};
-    surface_check surface = {NAN, NAN, NAN, 0, 0};
+    surface_check surface = {NAN, NAN, NAN, 0, 0, 0};
     size_t triangles;
     history h = {0};
     const dataset *d = &t->data;
@@ -498,6 +503,7 @@ sdm_status trainer_verdict_make(trainer *t, const model_errors *errors, sdm_verd
                          .coarse_mm = sdm_grid_coarsest(d->grid),
                          .cut = surface.cut,
                          .inside_out = surface.inside_out,
+                         .open = surface.open,
                          .volume_error = errors->volumes.map,
                          .volume_error_max = errors->volumes.map_max,
                          .surface_volume_error = errors->volumes.surface,

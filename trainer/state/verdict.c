@@ -59,6 +59,8 @@ bool sdm_verdict_voxels_cut(const sdm_verdict *v)
            sdm_voxels_explain_volume(v->surface_volume_error, v->volume_error);
 }
 
+bool sdm_verdict_broken(const sdm_verdict *v) { return v->inside_out > 0 || v->open > 0; }
+
 bool sdm_verdict_errs_near(const sdm_verdict *v)
 {
     return v->rmse_voxel_mm > SDM_GRADE_GOOD_VOXELS * v->voxel_mm ||
@@ -68,7 +70,7 @@ bool sdm_verdict_errs_near(const sdm_verdict *v)
 
 bool sdm_verdict_needs_pod(const sdm_verdict *v)
 {
-    return v->limited && v->limit == SDM_CAUSE_FAR && !(v->cut > 0) && !(v->inside_out > 0) &&
+    return v->limited && v->limit == SDM_CAUSE_FAR && !(v->cut > 0) && !sdm_verdict_broken(v) &&
            sdm_verdict_errs_near(v);
 }
 
@@ -185,6 +187,7 @@ void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
     sdm_json_real(j, "thickness_mm", v->thickness_mm);
     sdm_json_real(j, "cut", v->cut);
     sdm_json_real(j, "inside_out", v->inside_out);
+    sdm_json_real(j, "open", v->open);
     sdm_json_real(j, "volume_error", v->volume_error);
     sdm_json_real(j, "volume_error_max", v->volume_error_max);
     sdm_json_real(j, "surface_volume_error", v->surface_volume_error);

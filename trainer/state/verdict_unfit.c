@@ -43,6 +43,9 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
     char text[16];
     const double spacing = sdm_verdict_spacing(v);
     if (v->inside_out > 0) add(l, "the parts that are inside out, which are missing");
+    if (v->open > 0)
+        add(l, "the places of open or badly oriented edges of the meshes: inside and outside are "
+               "a guess there");
     // the line of the grade tells of more, unless parts are inside out
     if (v->cut > 0 && (v->cut <= SDM_CUT_POOR || v->inside_out > 0))
         add(l, "the %.2g %% of the shapes that the grid cuts", fmin(99, 100 * v->cut));

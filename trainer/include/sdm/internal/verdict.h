@@ -81,6 +81,8 @@ typedef struct sdm_verdict {
                    open */
     /* fraction of a few held-out shapes with parts that are inside out and overlap others */
     double inside_out;
+    /* fraction of a few held-out shapes with open or badly oriented edges */
+    double open;
     /* On a few held-out shapes, over the right value; NaN: not measured. Volumes of maps: root mean
        square, and the largest; the same of the surfaces of these maps. Derivatives by the parameter
        for which they are worst, root mean square: of maps within half a voxel of the surface, and
@@ -159,6 +161,9 @@ bool sdm_verdict_surfaces_off(const sdm_verdict *v);
 /* They do, and voxels that cut edges and thin walls explain it: the volumes of maps are much
    better. [any thread] */
 bool sdm_verdict_voxels_cut(const sdm_verdict *v);
+
+/* Are parts of the meshes inside out, or edges open? Then neither network nor maps are the cause. */
+bool sdm_verdict_broken(const sdm_verdict *v);
 
 /* At the surface the model is not good, by its error within a voxel, its Dice overlap or volumes
    that voxels do not explain. [any thread] */

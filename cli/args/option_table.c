@@ -367,11 +367,13 @@ const cli_option cli_options[] = {
      "also write the nearest triangle of the mesh, counted from 0: uint32 [z][y][x]"},
     {"gradient", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_GENERATE), AT(gradient),
      "also write the derivatives of the map along x, y, z (LPS): float32 [3][z][y][x]"},
-    {"jacobian", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_GENERATE) | ON(CLI_EXACT),
-     AT(jacobian),
+    {"jacobian", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_GENERATE), AT(jacobian),
      "also write the derivatives by the shape's parameters: float32 [parameter][z][y][x], mm per "
-     "unit (--points: [point][parameter]); the map of a network then differs by about a thousandth "
-     "of a voxel"},
+     "unit (--points: [point][parameter]); the map of the network then differs by about a "
+     "thousandth of a voxel"},
+    {"jacobian", 0, CLI_TEXT, "FILE.npy", NULL, 0, 0, ON(CLI_EXACT), AT(jacobian),
+     "also write the derivatives by the shape's parameters: float32 [parameter][z][y][x], mm per "
+     "unit (--points: [point][parameter])"},
     {"audit", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH), AT(audit),
      "check the mesh and print its properties, defects and parts"},
     {"turn-parts", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_MESH) | ON(CLI_EXACT), AT(turn_parts),

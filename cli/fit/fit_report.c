@@ -117,7 +117,7 @@ static void print_target(const cli_fit *f)
     const sdm_fit_result *r = &f->result;
     if (f->target.kind == SDM_FIT_POINTS) {
         printf(
-            "points: %zu%s, as good as %.3g independent ones, standard deviation %.3g mm about the "
+            "points: %zu%s, as good as %.0f independent ones, standard deviation %.3g mm about the "
             "surface",
             r->n_used, f->of_surface ? " on the surface of the mesh" : "",
             (double)r->n_used / fmax(r->noise_factor, 1), r->point_sd);

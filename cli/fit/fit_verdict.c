@@ -147,6 +147,17 @@ static bool only_a_part(const cli_fit *f)
            only(v, SDM_FIT_DOUBTFUL, part, bounds_are_open(f) ? 3 : 2);
 }
 
+/* Is the fit through a network doubtful, and only because the data show a part of the shape or the
+ * network errs? */
+static bool a_part_by_network(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    static const sdm_fit_check_kind part[] = {SDM_FIT_CHECK_NETWORK_ERROR, SDM_FIT_CHECK_COVERED,
+                                              SDM_FIT_CHECK_DATA, SDM_FIT_CHECK_BOUNDS};
+    return v->grade == SDM_FIT_DOUBTFUL && cli_fit_knows_usable(f) &&
+           only(v, SDM_FIT_DOUBTFUL, part, bounds_are_open(f) ? 4 : 3);
+}
+
 /* Does the line `use` name the values that can be used? Through a network it does not: where the
  * data show nothing, the errors of its map pass for data. */
 static bool tells_usable(const cli_fit *f)
@@ -175,7 +186,7 @@ static const char *in_short(const cli_fit *f)
     if (tells_usable(f))
         return "the data show a part of the shape: the line `use` names the values that can be "
                "used";
-    if (only_a_part(f) && cli_fit_knows_usable(f))
+    if (a_part_by_network(f))
         return "the data show a part of the shape; where they show nothing, errors of the network "
                "may pass for data: --polish tells the values that can be used";
     if (only_a_part(f))

@@ -99,15 +99,15 @@ static void name_cause(const fit_problem *p, const fit_misfit *m, const fit_susp
             far ? "" : ", or another shape lies there");
     else
         snprintf(cause, size,
-                 "%s%s, or the organ differs from the model (then say by how much it may: "
+                 "%s%s, or the object differs from the model (then say by how much it may: "
                  "sdm_fit_opts.tolerance)",
                  other->refused ? "another shape lies there"
                  : fit_is_image(p)
                      ? m->worst[1].more
-                           ? "the fit stopped beside the best place, another shape or a part that "
-                             "this one lacks lies there, or the texture of the image is coarse"
-                           : "the fit stopped beside the best place, the image lacks a part of the "
-                             "shape or shows another one, or its texture is coarse"
+                           ? "the texture of the image is coarse, the fit stopped beside the best "
+                             "place, another shape or a part that this one lacks lies there"
+                           : "the texture of the image is coarse, the fit stopped beside the best "
+                             "place, the image lacks a part of the shape or shows another one"
                      : "the data have errors of their own, the fit stopped beside the best place, "
                        "another shape lies there",
                  p->opts->kept ? ", a kept parameter has another value" : "");

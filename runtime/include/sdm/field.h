@@ -70,7 +70,7 @@ SDM_API sdm_status sdm_field_point(const sdm_field *f, const double x[3], float 
                                    float gradient[3], float *slopes, sdm_error *err);
 
 /* The same at the points x[n][3] on all threads: values[n]; gradient[n][3] and slopes[n][n_params]
-   may be NULL. The message of an error names the first wrong point, counted from 0. */
+   may be NULL. The message of an error names the first wrong point, counted from 1. */
 SDM_API sdm_status sdm_field_points(const sdm_field *f, const double *x, size_t n, float *values,
                                     float *gradient, float *slopes, sdm_error *err);
 

@@ -339,7 +339,8 @@ static void notice_mesh(job *j)
         cli_warn_cut_shape(&j->grid, &j->mesh,
                            "a larger grid (--size, --spacing, --origin) holds it");
     const double size = sqrt(v3_dist2(a->min, a->max));
-    if (size > 0 && (size < SDM_SURVEY_SIZE_MIN || size > SDM_SURVEY_SIZE_MAX))
+    // the check of a shape tells it with the parameters
+    if (!j->args->shape && size > 0 && (size < SDM_SURVEY_SIZE_MIN || size > SDM_SURVEY_SIZE_MAX))
         cli_warn("the mesh measures %.3g mm across: is it in %s? lengths are mm", size,
                  sdm_unit_near(size < SDM_SURVEY_SIZE_MIN ? 1e3 : 1e-3, NULL));
     // a closed part that meets no other cannot be inside out after the engine has turned it; the

@@ -95,13 +95,15 @@ static void show_progress(void *user, const sdm_fit_progress *p)
     const size_t used = strlen(text), n = p->iteration - w->before,
                  most = 2 *
                         (p->phase == SDM_FIT_POLISH ? o->max_polish_iterations : o->max_iterations);
-    snprintf(text + used, sizeof text - used, "iteration %zu of at most %zu, last step %.1e", n,
-             most, p->step);
+    // a fit that goes on from another pose or value may need more
+    char limit[40] = "";
+    if (n <= most) snprintf(limit, sizeof limit, " of at most %zu", most);
+    snprintf(text + used, sizeof text - used, "iteration %zu%s, last step %.1e", n, limit, p->step);
     cli_progress_show(&w->bar,
                       p->phase == SDM_FIT_POLISH ? "polish"
                       : p->phase == SDM_FIT_MAIN ? "fit"
                                                  : "search",
-                      (double)n / (double)most, text);
+                      fmin((double)n / (double)most, 1), text);
 }
 
 /* The error of a fit that an interrupt has stopped: in which phase, and that there is no result. */

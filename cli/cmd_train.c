@@ -161,8 +161,8 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
     cli_print_next(args, r, r->chosen ? kind_name(r->kind) : NULL, times->ms_network, minutes);
     if (cli_warnings() > 0)
         printf("  warnings    %zu, at the beginning of the output%s\n", cli_warnings(),
-               v->cut > 0 || sdm_verdict_broken(v) || v->triangles_by[0] || sdm_verdict_lacks_part(v) ||
-                       !strncmp(v->key, "grid.", 5)
+               v->cut > 0 || sdm_verdict_broken(v) || v->triangles_by[0] ||
+                       sdm_verdict_lacks_part(v) || !strncmp(v->key, "grid.", 5)
                    ? ""
                    : ": mend what they name first, the lines above leave it out");
     return SDM_OK;

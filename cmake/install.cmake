@@ -31,6 +31,8 @@ set(parts sdm_core sdm_geom sdm_nn sdm_io sdm_shape sdm_shapes sdm_runtime)
 if(SDM_SHARED)
   sdm_library(sdmgen_shared C OUTPUT sdmgen EXPORT sdmgen PARTS ${parts} LINK ${SDM_LIBM}
     ${CMAKE_DL_LIBS} ${SDM_THREADS})
+  # programs that use the library mostly call functions of math.h themselves
+  target_link_libraries(sdmgen_shared INTERFACE ${SDM_LIBM})
 endif()
 if(TARGET sdm_image)
   sdm_library(sdmgen_image C OUTPUT sdmgen_image EXPORT image PARTS sdm_image LINK sdmgen_shared

@@ -82,13 +82,16 @@ void cli_fit_print_next(const cli_fit *f)
         (!voxels && !more &&
          !cli_fit_found(f, SDM_FIT_CHECK_NETWORK_ERROR, SDM_FIT_DOUBTFUL, -INFINITY)))
         return;
+    // maps that are too coarse may be why the fit did not come to an end
+    const bool lacks = cli_fit_lacks_data(f),
+               finer = more && !lacks && !f->source.model && isfinite(r->advised_voxel_mm);
     sdm_text t = {0};
     char text[96], price[240] = "";
     sdm_text_add(&t, "sdmgen fit");
     for (size_t i = 0; i < a->files.n; i++) cli_add_next_word(&t, a->files.items[i]);
     for (size_t i = 0; i < a->n_given; i++) {
         const cli_option *o = a->given[i].option;
-        if (is_left_out(o->name, more)) continue;
+        if (is_left_out(o->name, more && !finer)) continue;
         if (o->kind == CLI_FLAG) {
             sdm_text_add(&t, " --%s", o->name);
         } else {
@@ -96,15 +99,14 @@ void cli_fit_print_next(const cli_fit *f)
         }
     }
     if (f->model_path && !more) sdm_text_add(&t, voxels ? " --exact" : " --polish");
-    const bool lacks = cli_fit_lacks_data(f);
     const size_t iterations = 4 * f->opts.max_iterations, usual = sdm_fit_defaults().max_iterations;
     if (more && !lacks)
         sdm_text_add(&t, " --max-iterations=%zu", iterations > usual ? iterations : usual);
-    if (voxels && !more) {
-        snprintf(text, sizeof text, "%.2g", cli_fit_finer_voxel(f));
+    if ((voxels && !more) || finer) {
+        snprintf(text, sizeof text, "%.2g", finer ? r->advised_voxel_mm : cli_fit_finer_voxel(f));
         add_option(&t, "spacing", text);
-        write_price(f, price, sizeof price);
     }
+    if (voxels && !more) write_price(f, price, sizeof price);
     for (size_t i = 0; i < f->n_params; i++) {
         if (lacks && sdm_fit_hardly_known(r, i)) {
             add_option(&t, "keep", f->params[i].name);
@@ -120,6 +122,7 @@ void cli_fit_print_next(const cli_fit *f)
     if (!t.failed)
         printf("%s from here%s%s:\n  %s\n",
                lacks    ? "known values in place of VALUE, for what the data hardly determine,"
+               : finer  ? "more iterations with finer maps"
                : more   ? "more iterations"
                : voxels ? "finer maps"
                         : "a polish with exact maps",

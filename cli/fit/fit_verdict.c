@@ -1,6 +1,7 @@
 /* Shows the verdict of a fit: what was checked, with its figure and the bound that it needs. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "fit_command.h"
 #include "sdm/internal/fit_finding.h"
@@ -147,6 +148,18 @@ static bool only_a_part(const cli_fit *f)
            only(v, SDM_FIT_DOUBTFUL, part, bounds_are_open(f) ? 3 : 2);
 }
 
+/* Has the fit passed although the data do not determine a parameter of which nothing else is known?
+ */
+static bool passed_with_open(const cli_fit *f)
+{
+    const sdm_fit_result *r = &f->result;
+    if (r->verdict.grade != SDM_FIT_PASSED || f->opts.keep_params || !r->by_prior) return false;
+    for (size_t k = 0; k < f->n_params; k++)
+        if (r->by_prior[k] && !(f->opts.kept && f->opts.kept[k]) && strcmp(f->params[k].unit, "sd"))
+            return true;
+    return false;
+}
+
 /* Is the fit through a network doubtful, and only because the data show a part of the shape or the
  * network errs? */
 static bool a_part_by_network(const cli_fit *f)
@@ -163,7 +176,7 @@ static bool a_part_by_network(const cli_fit *f)
 static bool tells_usable(const cli_fit *f)
 {
     const bool network = f->model_path && !f->args->fit.exact && !f->args->fit.polish;
-    return only_a_part(f) && cli_fit_knows_usable(f) && !network;
+    return passed_with_open(f) || (only_a_part(f) && cli_fit_knows_usable(f) && !network);
 }
 
 /* What a verdict that is not `passed` means for the user of the values. */

@@ -217,6 +217,42 @@ static void vertices_in_metres(void **state)
     }
 }
 
+/* A bar whose length is the parameter. */
+static int bar_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, sdm_mesh_out *out)
+{
+    (void)self, (void)options;
+    const int failed = host->reserve(host, out, 8, 12);
+    if (!failed)
+        faulty_box(out, 0, (const double[3]){0, -50, -50}, (const double[3]){p[0], 50, 50}, 0);
+    return failed;
+}
+
+// A shape of over 1 m is in mm where a length in mm moves its vertices by as many mm.
+static void large_shape_in_mm(void **state)
+{
+    (void)state;
+    for (int mm = 0; mm < 2; mm++) {
+        const sdm_param length = {"length", mm ? "mm" : "", 1000, 1500, 1200, "x"};
+        const sdm_shape shape = {.abi = SDM_SHAPE_ABI,
+                                 .size = sizeof(sdm_shape),
+                                 .name = "bar",
+                                 .summary = "test",
+                                 .params = &length,
+                                 .n_params = 1,
+                                 .mesh = bar_mesh};
+        sdm_instance *instance = NULL;
+        sdm_shape_survey s;
+        if (sdm_instance_create(&shape, NULL, 0, NULL, &instance, &err) ||
+            sdm_shape_survey_make(instance, &(sdm_survey_opts){.samples = 8}, &s, &err))
+            fail_msg("%s", err.text);
+        assert_true(s.scale.size == 1500 && s.scale.odd_size == !mm && !s.scale.odd_speed);
+        assert_int_equal(sdm_shape_survey_verdict(&s), mm ? SDM_OK : SDM_E_QUALITY);
+        sdm_shape_survey_dispose(&s);
+        sdm_instance_free(instance);
+    }
+}
+
 // Only the handle is in m: it lies in the body, and its length moves nothing that counts.
 static void a_part_in_metres(void **state)
 {
@@ -787,6 +823,7 @@ int main(void)
         cmocka_unit_test(broken_meshes),
         cmocka_unit_test(parts_in_the_same_place),
         cmocka_unit_test(vertices_in_metres),
+        cmocka_unit_test(large_shape_in_mm),
         cmocka_unit_test(a_part_in_metres),
         cmocka_unit_test(a_part_without_volume),
         cmocka_unit_test(a_box_winds_once),

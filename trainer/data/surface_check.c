@@ -113,8 +113,8 @@ sdm_status trainer_exact_within(const dataset *d, const double *p, int n_threads
     return s;
 }
 
-/* Adds 1 to *inside_out if parts of the mesh are inside out and stay so, and to *open if it has open
- * or badly oriented edges; lowers *thickness to that of the thinnest part. */
+/* Adds 1 to *inside_out if parts of the mesh are inside out and stay so, and to *open if it has
+ * open or badly oriented edges; lowers *thickness to that of the thinnest part. */
 static sdm_status check_parts(const sdm_mesh *m, size_t *inside_out, size_t *open,
                               double *thickness, sdm_error *err)
 {

@@ -202,6 +202,8 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
     if (status) return status;
     c->odd_speed =
         c->speed > 0 && (c->speed < SDM_SURVEY_SPEED_MIN || c->speed > SDM_SURVEY_SPEED_MAX);
+    // a parameter in mm that moves the vertices by about as many mm: they are in mm, too
+    if (c->speed > 0 && !c->odd_speed && !c->degrees && !c->swings) c->odd_size = false;
     if (c->odd_speed)
         c->unit = sdm_unit_near(1 / c->speed, &c->unit_mm);
     else if (c->odd_size && isnan(c->speed))

@@ -266,6 +266,10 @@ static sdm_status take_points(const fit_problem *p, double far, fit_distances *t
     return s;
 }
 
+/* More outlying points that lie together than this multiple of the largest group are in several
+ * places. */
+#define SEVERAL 1.2
+
 static void doubt_patch(const fit_problem *p, const fit_distances *t, const fit_groups *g,
                         double sd, sdm_fit_verdict *v)
 {
@@ -274,15 +278,19 @@ static void doubt_patch(const fit_problem *p, const fit_distances *t, const fit_
                  many = (double)g->largest * (double)p->samples.n / (double)t->n;
     char place[FIT_PLACE_NAME], sds[60] = "";
     if (share <= limit) return;
+    // text and figure agree where there is one group
+    const char *several = (double)g->n > SEVERAL * (double)g->largest
+                              ? "outlying points lie together in several places; in the largest "
+                              : "";
     if (fabs(g->mean) < SD_TOLD_MAX * sd)
         snprintf(sds, sizeof sds, ", on average %.2g standard deviations of the points,",
                  fabs(g->mean) / sd);
     sdm_fit_judge_add(v, SDM_FIT_CHECK_PATCH, false, SDM_FIT_DOUBTFUL, share, limit,
-                      "about %.0f points lie together %.2g to %.2g mm %s the fitted surface%s at "
+                      "%sabout %.0f points lie together %.2g to %.2g mm %s the fitted surface%s at "
                       "%s: %s; look there, and take them out of the data if they are no part of it "
                       "(sdm_fit_opts.tolerance accepts a difference)",
-                      many, g->nearest, g->farthest, g->mean < 0 ? "inside" : "outside of", sds,
-                      sdm_fit_name_place(&p->state, g->centre, place),
+                      several, many, g->nearest, g->farthest, g->mean < 0 ? "inside" : "outside of",
+                      sds, sdm_fit_name_place(&p->state, g->centre, place),
                       g->mean < 0 ? "the data lack a part of the shape, or show a hollow"
                                   : "the data have a part that the shape lacks");
 }

@@ -128,12 +128,18 @@ typedef struct given_scatter {
     double limit; /* of `over`: a right fit exceeds it once in a thousand times */
 } given_scatter;
 
+/* Error of the maps of the fit's network near the surface, mm; exact maps: 0. It belongs to the
+ * distances of the points, too. */
+static double network_error(const fit_problem *p)
+{
+    const sdm_model *model = fit_maps_direct(&p->maps) ? NULL : p->source->model;
+    return model ? sdm_model_get_info(model)->accuracy.rmse_near_mm : 0;
+}
+
 /* together: so many points share their error. */
 static given_scatter scatter_of(const fit_problem *p, double together)
 {
-    const sdm_model *model = fit_maps_direct(&p->maps) ? NULL : p->source->model;
-    // the errors of a network belong to the distances, too
-    const double network = model ? sdm_model_get_info(model)->accuracy.rmse_near_mm : 0;
+    const double network = network_error(p);
     // the sum of the squares of n - unknowns normal errors
     double sum = 0;
     for (size_t i = 0; i < p->samples.n; i++) sum += p->samples.field[i] * p->samples.field[i];
@@ -144,10 +150,27 @@ static given_scatter scatter_of(const fit_problem *p, double together)
                            .limit = 1 + BY_CHANCE * sqrt(2 * together / free)};
 }
 
-static void add_scatter(given_scatter g, sdm_fit_verdict *v)
+/* Distances of which half are so many times as long as the given standard deviation explains are no
+ * matter of its precision, nor of outliers. */
+#define SCATTER_FAILED 3.0
+
+/* Median of the distances over that of normal errors with the given variance; NaN: no memory. */
+static double middle_over_given(const fit_problem *p)
 {
-    sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, g.over <= g.limit, SDM_FIT_DOUBTFUL, g.over,
-                      g.limit,
+    double *list = NULL;
+    if (SDM_ALLOC(&list, p->samples.n, "distances of the points", NULL)) return NAN;
+    for (size_t i = 0; i < p->samples.n; i++) list[i] = p->samples.field[i];
+    const double sd = sdm_fit_robust_sd(list, p->samples.n, 0);
+    sdm_free(list);
+    return sd / hypot(p->state.point_sd, network_error(p));
+}
+
+static void add_scatter(const fit_problem *p, given_scatter g, sdm_fit_verdict *v)
+{
+    const bool far =
+        !(p->opts->tolerance > 0) && middle_over_given(p) > SCATTER_FAILED * sqrt(g.limit);
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, g.over <= g.limit,
+                      far ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, g.over, g.limit,
                       "the points lie %.2g mm off the surface, %.2g times their standard deviation "
                       "as given: another shape, or their standard deviation is larger",
                       g.rms, sqrt(g.over));
@@ -163,7 +186,7 @@ void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v)
                           "(sdm_fit_opts.keep_appearance)");
         return;
     }
-    add_scatter(scatter_of(p, 1), v);
+    add_scatter(p, scatter_of(p, 1), v);
 }
 
 bool sdm_fit_doubt_given_scatter(const fit_problem *p, sdm_fit_verdict *v)
@@ -171,7 +194,7 @@ bool sdm_fit_doubt_given_scatter(const fit_problem *p, sdm_fit_verdict *v)
     if (!p->opts->keep_appearance) return false;
     const given_scatter g = scatter_of(p, fmax(p->noise_factor, 1));
     if (g.over <= g.limit) return false;
-    add_scatter(g, v);
+    add_scatter(p, g, v);
     return true;
 }
 
@@ -331,7 +354,7 @@ void sdm_fit_check_determined(const fit_problem *p, const sdm_fit_result *r, sdm
         const sdm_fit_finding *points = sdm_fit_finding_of(v, SDM_FIT_CHECK_DATA);
         if (points && *points->text) snprintf(before, sizeof before, "%s; ", points->text);
         sdm_fit_judge_add(v, SDM_FIT_CHECK_DATA, false, SDM_FIT_DOUBTFUL, (double)(counted - open),
-                          (double)counted,
+                          (double)(counted / 2 + 1),
                           "%s%zu of %zu parameters are not determined by the data: their standard "
                           "deviations are those of the priors",
                           before, open, counted);

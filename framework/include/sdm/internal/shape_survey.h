@@ -89,8 +89,10 @@ typedef struct sdm_survey_meeting {
 
 /* How large the shapes are, and whether they look like shapes in another unit than mm. */
 typedef struct sdm_survey_scale {
-    double size;   /* longest edge of the box of all shapes, mm */
-    bool odd_size; /* it is below SDM_SURVEY_SIZE_MIN or above SDM_SURVEY_SIZE_MAX */
+    double size; /* longest edge of the box of all shapes, mm */
+    /* it is below SDM_SURVEY_SIZE_MIN or above SDM_SURVEY_SIZE_MAX, and no parameter in mm moves
+       the vertices by about as many mm */
+    bool odd_size;
     /* how far vertices of the first shape move per mm of the parameter `param`, at most, mm: of the
      * parameters with the unit mm the one that moves them farthest. NaN: there is none */
     double speed;

@@ -164,7 +164,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
                v->cut > 0 || sdm_verdict_broken(v) || v->triangles_by[0] ||
                        sdm_verdict_lacks_part(v) || !strncmp(v->key, "grid.", 5)
                    ? ""
-                   : ": mend what they name first, the lines above leave it out");
+                   : ": mend these first; the lines above do not consider them");
     return SDM_OK;
 }
 

@@ -123,16 +123,15 @@ static const char *advise_maps(const verdict_input *in, sdm_verdict *v)
     if (in->cut) {
         advise_budget(in, v);
         return in->ended_early
-                   ? "Half of the budget is for maps, too little for data.start of them; the "
-                     "steps ended before the other half did (train.patience). The number of maps "
-                     "limits the model"
-                   : "The time for maps was too short for data.start of them. Their number limits "
-                     "the model";
+                   ? "There are fewer maps than data.start, because they may take half of "
+                     "train.minutes only. Their number limits the model"
+                   : "There are fewer maps than data.start, because the time was too short. Their "
+                     "number limits the model";
     }
     if (in->full) {
         advise_double(v, "data.memory_gb", c->data.memory_gb, INFINITY);
-        return "The memory for maps was too small for data.start of them. Their number limits the "
-               "model";
+        return "There are fewer maps than data.start, because data.memory_gb holds no more. Their "
+               "number limits the model";
     }
     // `start` counts for bases and polynomials, too
     if (c->data.online > c->data.start)

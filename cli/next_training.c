@@ -374,8 +374,8 @@ static void print_note(const sdm_train_report *r, const char *kind, double ms_ma
         sdm_text_add(&note, "the kind stays %s%s; without network.kind=%s auto chooses again; ",
                      kind, time, kind);
     if (unfit[0] && strncmp(v->key, "grid.", 5))
-        sdm_text_add(&note, "this change lowers the error of distances; the uses in `not for` may "
-                            "need another one; ");
+        sdm_text_add(&note, "this change makes distances better; the uses in `not for` may need "
+                            "another change; ");
     else if (v->derivatives_bad[0])
         sdm_text_add(&note, "derivatives of maps may need another change; ");
     if (!note.failed && note.size > 2)

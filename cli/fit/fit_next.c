@@ -82,9 +82,11 @@ void cli_fit_print_next(const cli_fit *f)
         (!voxels && !more &&
          !cli_fit_found(f, SDM_FIT_CHECK_NETWORK_ERROR, SDM_FIT_DOUBTFUL, -INFINITY)))
         return;
-    // maps that are too coarse may be why the fit did not come to an end
+    // maps that are too coarse may be why the usual number of iterations did not end the fit
+    const size_t iterations = 4 * f->opts.max_iterations, usual = sdm_fit_defaults().max_iterations;
     const bool lacks = cli_fit_lacks_data(f),
-               finer = more && !lacks && !f->source.model && isfinite(r->advised_voxel_mm);
+               finer = more && !lacks && !f->source.model && f->opts.max_iterations >= usual &&
+                       isfinite(r->advised_voxel_mm);
     sdm_text t = {0};
     char text[96], price[240] = "";
     sdm_text_add(&t, "sdmgen fit");
@@ -99,7 +101,6 @@ void cli_fit_print_next(const cli_fit *f)
         }
     }
     if (f->model_path && !more) sdm_text_add(&t, voxels ? " --exact" : " --polish");
-    const size_t iterations = 4 * f->opts.max_iterations, usual = sdm_fit_defaults().max_iterations;
     if (more && !lacks)
         sdm_text_add(&t, " --max-iterations=%zu", iterations > usual ? iterations : usual);
     if ((voxels && !more) || finer) {

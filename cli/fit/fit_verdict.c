@@ -19,7 +19,7 @@ const char *cli_fit_grade_name(sdm_fit_grade grade)
 /* What the figure of a check is. */
 static const char *const MEANINGS[SDM_FIT_N_CHECKS] = {
     [SDM_FIT_CHECK_NO_SHAPE] = "gain over an image without the shape",
-    [SDM_FIT_CHECK_CONTRAST] = "mean value inside less mean value outside",
+    [SDM_FIT_CHECK_CONTRAST] = "mean value inside minus mean value outside",
     [SDM_FIT_CHECK_CAVITY] = "radius of the largest ball in the shape, mm",
     [SDM_FIT_CHECK_IN_IMAGE] = "share of the shape that lies in the image",
     [SDM_FIT_CHECK_CONVERGED] = "iterations",

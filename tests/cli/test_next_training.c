@@ -255,8 +255,8 @@ static void uses_are_not_promised(void **state)
                                       .from = 128,
                                       .to = 256}};
     next_lines(&r, 2, text, second);
-    assert_non_null(strstr(second, "; this change lowers the error of distances; the uses in "
-                                   "`not for` may need another one)\n"));
+    assert_non_null(strstr(second, "; this change makes distances better; the uses in "
+                                   "`not for` may need another change)\n"));
     strcpy(r.verdict.key, "grid.spacing");
     next_lines(&r, 2, text, second);
     assert_non_null(strstr(second, "; derivatives of maps may need another change)\n"));

@@ -72,9 +72,9 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
         add(l,
             "fits by the network alone: the thinnest part, %.2g mm in a few held-out shapes, has "
             "%.1f voxels across it, and %.2g or more are safe; use sdmgen fit --exact --spacing "
-            "%.2g, or %.2g times the blur of the image if its blur is below %.2g mm",
+            "%.2g (an image with a blur below %.2g mm: %.2g times its blur)",
             v->thickness_mm, floor(10 * v->thickness_mm / v->coarse_mm + 1e-9) / 10,
-            SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED, finer, blurs, finer / blurs);
+            SDM_GRID_FIT_VOXELS / SDM_GRID_FIT_ADVISED, finer, finer / blurs, blurs);
 }
 
 /* Of the distances at the voxels themselves the network has all of the error. */

@@ -99,8 +99,8 @@ sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error 
     const sdm_model_quality *q = &info->quality;
     if (use == SDM_USE_SURFACE) return check_grade(q, err);
     if (use == SDM_USE_DISTANCE) return check_distances(info, err);
-    static const char slopes[] = "; exact maps have right ones (sdmgen exact --jacobian), unless "
-                                 "a parameter changes the triangles of the shape",
+    static const char slopes[] = "; sdmgen exact --jacobian gives right ones, unless a parameter "
+                                 "changes the triangles of the shape",
                       volume_slopes[] = "; take differences of volumes of the mesh (exact "
                                         "--measure): those of maps swing as faces cross planes of "
                                         "voxels";

@@ -84,9 +84,9 @@ void cli_fit_print_next(const cli_fit *f)
         return;
     // maps that are too coarse may be why the usual number of iterations did not end the fit
     const size_t iterations = 4 * f->opts.max_iterations, usual = sdm_fit_defaults().max_iterations;
-    const bool lacks = cli_fit_lacks_data(f),
-               finer = more && !lacks && !f->source.model && f->opts.max_iterations >= usual &&
-                       isfinite(r->advised_voxel_mm);
+    const bool lacks = cli_fit_lacks_data(f), finer = more && !lacks && !f->source.model &&
+                                                      f->opts.max_iterations >= usual &&
+                                                      isfinite(r->advised_voxel_mm);
     sdm_text t = {0};
     char text[96], price[240] = "";
     sdm_text_add(&t, "sdmgen fit");

@@ -245,7 +245,8 @@ void cli_describe_open(const sdm_part_audit *a, sdm_text *text)
     const double *x = a->part[most].open_at;
     cli_name_part(a, most, text);
     sdm_text_add(text,
-                 "has %zu edges that are open or badly oriented, the first at %.4g %.4g %.4g mm: add the triangles that are missing there, "
+                 "has %zu edges that are open or badly oriented, the first at %.4g %.4g %.4g mm: "
+                 "add the triangles that are missing there, "
                  "let neighbours run the same way around, and give vertices that are the same "
                  "point exactly the same coordinates",
                  a->part[most].open_edges, x[0], x[1], x[2]);

@@ -204,12 +204,13 @@ static void patience_left_time(void **state)
                             .budget = 2};
         trainer_verdict_decide(&in, &v);
         assert_true(!strcmp(v.key, "train.minutes") && v.to == 4);
-        const char *why = early ? "There are fewer maps than data.start, because they may take half "
-                                  "of train.minutes only. Their number limits the model (100 % of "
-                                  "the mean square error): raise train.minutes from 2 to 4"
-                                : "There are fewer maps than data.start, because the time was too "
-                                  "short. Their number limits the model (100 % of the mean square "
-                                  "error): raise train.minutes from 2 to 4";
+        const char *why = early
+                              ? "There are fewer maps than data.start, because they may take half "
+                                "of train.minutes only. Their number limits the model (100 % of "
+                                "the mean square error): raise train.minutes from 2 to 4"
+                              : "There are fewer maps than data.start, because the time was too "
+                                "short. Their number limits the model (100 % of the mean square "
+                                "error): raise train.minutes from 2 to 4";
         assert_non_null(strstr(v.sentence, why));
         // few steps, but patience ended them
         v = figures();

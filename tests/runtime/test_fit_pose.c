@@ -156,6 +156,89 @@ static void test_joint_that_is_a_pose(void **state)
     sdm_fit_dispose(&f);
 }
 
+// The links are 3 mm long, the first one along x, with the second joint at (3, 0, 0). The first
+// link meets the ball of this joint at x = 2.54, and for other angles at up to x = 3.1. Whether the
+// point says nothing about the joint.
+static bool is_past_joint(const double x[3]) { return x[0] > 3.2; }
+
+// Motion (mm per rad) of the surface of the first link along its normal as it turns about the
+// second joint; the ball of the first joint has a radius of 1.08 mm.
+static double motion_about_joint(const double x[3])
+{
+    const double length = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]),
+                 across = sqrt(x[1] * x[1] + x[2] * x[2]);
+    return length < 1.1 ? -3 * x[1] / length : (x[0] - 3) * x[1] / across;
+}
+
+static const double POINT_ERROR = 0.02;
+
+// x[n][3], points on the shape: keeps every `every`-th point of the first link (0: none) and all
+// past the second joint, adds errors and brings them into POSE; returns their number. *information:
+// the information of the kept points of the first link on its angle about the joint.
+static size_t thin_link(double *x, size_t n, size_t every, double *information)
+{
+    size_t kept = 0, before = 0;
+    *information = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double *from = x + 3 * i;
+        if (!is_past_joint(from)) {
+            if (!every || from[0] > 2.5 || before++ % every) continue;
+            *information += pow(motion_about_joint(from) / POINT_ERROR, 2);
+        }
+        double y[3];
+        for (size_t k = 0; k < 3; k++) y[k] = from[k] + POINT_ERROR * sdm_rng_normal(1, k, i);
+        sdm_pose_apply(&POSE, y, x + 3 * kept++);
+    }
+    return kept;
+}
+
+// Nearly all points lie on the last link, which the second joint turns as the pose does. 27 points
+// on the first link determine the joint none the less. They alone tell the angle between the links,
+// because the pose of the last link is well known. Without these points nothing determines the
+// joint.
+static void test_joint_seen_by_few_points(void **state)
+{
+    (void)state;
+    enum { N = 8000 };
+    static double x[3 * N];
+    const double p[2] = {0, 0.4};
+    const sdm_named_text options[] = {
+        {"links", "2"}, {"base", "0"}, {"edge", "0.2"}, {"limit", "0.5"}};
+    sdm_instance *shape = NULL;
+    sdm_mesh m = {0};
+    assert_int_equal(sdm_instance_create(sdm_registry_find(registry, "linkage", NULL), options, 4,
+                                         NULL, &shape, NULL),
+                     SDM_OK);
+    assert_int_equal(sdm_instance_mesh(shape, p, &m, NULL), SDM_OK);
+    const sdm_fit_source source = {
+        .shape = shape,
+        .grid = sdm_grid_centred((int64_t[3]){20, 20, 20}, 0.6, (double[3]){2, 0, 0})};
+    sdm_fit_opts o = sdm_fit_defaults();
+    o.start_pose = POSE;
+    o.start_params = p;
+    o.kept = (const bool[2]){true, false};
+    o.n_threads = 2;
+    for (int seen = 0; seen < 2; seen++) {
+        double information;
+        assert_int_equal(sdm_fit_surface_points(&m, N, 2, x, NULL), SDM_OK);
+        const size_t n = thin_link(x, N, seen ? 160 : 0, &information);
+        const sdm_fit_target target = {.kind = SDM_FIT_POINTS, .points = x, .n_points = n};
+        sdm_fit_result r;
+        sdm_error err = {0};
+        const sdm_status s = sdm_fit(&source, &target, &o, &r, &err);
+        // a fit that determines no parameter is refused
+        if (s && (seen || s != SDM_E_QUALITY)) fail_msg("%s", err.text);
+        const double expected = seen ? 1 / sqrt(information) : 0.5;
+        if (!(r.sd[1] > 0.8 * expected && r.sd[1] < 1.25 * expected))
+            fail_msg("seen %d: sd %g, expected %g", seen, r.sd[1], expected);
+        assert_int_equal(r.by_prior[1], !seen);
+        assert_true(!seen || fabs(r.params[1] - p[1]) < 3 * expected);
+        sdm_fit_dispose(&r);
+    }
+    sdm_mesh_dispose(&m);
+    sdm_instance_free(shape);
+}
+
 // The evidence with the shape's parameters as unknowns, if `share` times the noise factor of the
 // covariance voxels count as one independent one.
 static double evidence_at(const sdm_fit_result *r, double share)
@@ -303,6 +386,7 @@ int main(void)
         cmocka_unit_test(test_kept_pose_not_converged),
         cmocka_unit_test(test_restless_unknown),
         cmocka_unit_test(test_joint_that_is_a_pose),
+        cmocka_unit_test(test_joint_seen_by_few_points),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -14,8 +14,16 @@
 // A parameter is tried if the pose explains all but this share of its information. Derivatives by
 // parameters and by the pose, both interpolated, differ by a few per cent, squared here.
 #define REST_MAX 0.02
-// the change of the parameter, as a share of its range
+// the change of the parameter, as a share of its range; and a larger one
 #define CHANGE 0.1
+#define LARGER 4.0
+// The data determine the parameter if the motion that is left grows in proportion to the change, to
+// these factors, and is at least this share of the motion by the derivatives. Errors of
+// interpolation and of the facets of a mesh do not grow; the motion at the edge of a surface grows
+// faster.
+#define GROWTH_MIN 0.7
+#define GROWTH_MAX 1.4
+#define AS_DERIVATIVES 0.5
 // iterations that fit the pose, and their damping
 #define ROUNDS 5
 #define DAMPING 1e-3
@@ -62,14 +70,33 @@ static void undo_step(const fit_problem *p, double m[6])
     for (size_t x = 0; x < 6; x++) m[x] += step[x];
 }
 
-// whether a finite change of parameter k is a rigid motion; m[6]: then that which undoes a change
-// of 1. Overwrites p->maps
-static sdm_status try_finite(fit_problem *p, size_t k, double m[6], bool *rigid, sdm_error *err)
+// rms motion (mm) of the surface along its normal that a change of 1 of parameter k and the motion
+// m[6] leave, by the derivatives
+static double motion_by_derivatives(const fit_problem *p, size_t k, const double m[6])
 {
-    double params[FIT_PARAMS_MAX], change = CHANGE * (p->high[k] - p->low[k]);
+    const fit_samples *s = &p->samples;
+    double square = 0, slope = 0;
+    for (size_t i = 0; i < s->n; i++) {
+        if (s->row[i] == SIZE_MAX) continue;
+        const float *column = s->jacobian + s->row[i] * s->n_columns;
+        double left = (double)column[k];
+        for (size_t x = 0; x < 6; x++)
+            left += (double)column[fit_at_rotation(p->n_params) + x] * m[x];
+        square += left * left;
+        slope += sdm_fit_slope_squared(p, i);
+    }
+    return slope > 0 ? sqrt(square / slope) : 0;
+}
+
+// m[6], in: a motion that nearly undoes a change of 1 of parameter k; out: the one that best undoes
+// `change`, per change of 1. *motion: the rms motion (mm) of the surface that is left. Overwrites
+// p->maps
+static sdm_status undo_finite(fit_problem *p, size_t k, double change, double m[6], double *motion,
+                              sdm_error *err)
+{
+    double params[FIT_PARAMS_MAX];
     fit_state to;
     memcpy(params, p->state.params, sizeof params);
-    if (params[k] - p->low[k] > p->high[k] - params[k]) change = -change;
     params[k] += change;
     p->maps_params[0] = p->maps_blur = NAN;
     const sdm_status s = sdm_fit_maps_make(&p->maps, params, false, err);
@@ -78,9 +105,40 @@ static sdm_status try_finite(fit_problem *p, size_t k, double m[6], bool *rigid,
     for (int i = 0; i < 6; i++) m[i] *= change;
     for (int round = 0; round < ROUNDS; round++) undo_step(p, m);
     sdm_fit_move_along(&p->state, m, 1, &to);
-    *rigid = sdm_fit_surface_motion(p, &to) < FIT_MOTION_MIN * fit_longest_edge(&p->maps.grid);
+    *motion = sdm_fit_surface_motion(p, &to);
     for (int i = 0; i < 6; i++) m[i] /= change;
     return SDM_OK;
+}
+
+// *grows: whether the motion that is left grows in proportion from `motion`, left by `change`, to a
+// larger change, and agrees with the derivatives; false where there is no shape. m[6]: the motion
+// that undoes a change of 1
+static sdm_status try_larger(fit_problem *p, size_t k, double change, double motion,
+                             double by_derivatives, const double m[6], bool *grows, sdm_error *err)
+{
+    double undo[6], left = 0;
+    memcpy(undo, m, sizeof undo);
+    const sdm_status s = undo_finite(p, k, LARGER * change, undo, &left, err);
+    const double growth = motion > 0 ? left / (LARGER * motion) : 0;
+    *grows = !s && growth > GROWTH_MIN && growth < GROWTH_MAX &&
+             left > AS_DERIVATIVES * by_derivatives * fabs(LARGER * change);
+    return s == SDM_E_NOMEM || s == SDM_E_CANCELLED ? s : SDM_OK;
+}
+
+// whether a finite change of parameter k is a rigid motion; m[6]: then that which undoes a change
+// of 1. Overwrites p->maps
+static sdm_status try_finite(fit_problem *p, size_t k, double m[6], bool *rigid, sdm_error *err)
+{
+    const double by_derivatives = motion_by_derivatives(p, k, m);
+    double change = CHANGE * (p->high[k] - p->low[k]), motion;
+    if (p->state.params[k] - p->low[k] > p->high[k] - p->state.params[k]) change = -change;
+    sdm_status s = undo_finite(p, k, change, m, &motion, err);
+    if (s) return s;
+    *rigid = motion < FIT_MOTION_MIN * fit_longest_edge(&p->maps.grid);
+    bool grows = false;
+    if (*rigid) s = try_larger(p, k, change, motion, by_derivatives, m, &grows, err);
+    if (grows) *rigid = false;
+    return s;
 }
 
 sdm_status sdm_fit_pose_params_find(fit_problem *p, sdm_error *err)

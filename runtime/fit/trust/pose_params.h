@@ -8,7 +8,9 @@
 /* Fills problem->pose_param[problem->n_pose_params] for the evaluated state. A parameter whose
    derivative the pose explains nearly is changed by a tenth of its range, and the pose is fitted to
    the earlier surface: the parameter counts where the surface then lies where it was, to a
-   twentieth of a voxel of the map. Leaves *p evaluated. None where parameters or pose are kept.
+   twentieth of a voxel of the map. It does not count where a change four times as large leaves
+   about four times the motion, as the derivatives have it: a small part of the surface then shows
+   the parameter. Leaves *p evaluated. None where parameters or pose are kept.
    SDM_E_CANCELLED, SDM_E_NOMEM and errors of the maps. */
 sdm_status sdm_fit_pose_params_find(fit_problem *p, sdm_error *err);
 

@@ -78,12 +78,17 @@ static void print_ranks(const cli_ranks_use *use)
  */
 static void print_other(const sdm_train_report *r)
 {
+    char other[16], own[16];
     printf(
         "  auto        trained %s, too (%s): RMSE %.5f mm, within a voxel of the surface %.5f mm, "
         "%.3g ms a map%s",
         kind_name(r->other_kind), sdm_grade_name(r->other_grade), r->other.rmse_mm,
         r->other_voxel_mm, r->other_ms,
         r->other_voxel_mm < r->verdict.rmse_voxel_mm ? "; better at the surface" : "");
+    if (isfinite(r->other_derivative) && isfinite(r->verdict.derivative_error))
+        printf("; derivatives of maps off by %s %%, those of %s by %s %%",
+               cli_percent(r->other_derivative, other), kind_name(r->kind),
+               cli_percent(r->verdict.derivative_error, own));
     if (r->other_path[0]) printf("; its model is %s", r->other_path);
     printf("\n");
 }

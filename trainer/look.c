@@ -61,6 +61,12 @@ sdm_status trainer_look(const trainer *t, sdm_config *config, trial_look *out, s
         (trainer_shared_seconds(&r) - began) / (double)(config->data.holdout + config->data.start);
     out->trials =
         trials_seconds(out, (double)holdout, fmin((double)random, (double)FILL_LEAST_RANDOM));
+    out->lacks_time =
+        trainer_by_time(t) && out->trials > TRAINER_TRIALS_SHARE * 60 * t->config->train.minutes;
+    if (!s && out->bends && out->lacks_time) {
+        s = trainer_template_look_parts(&r, &out->divides, err);
+        if (s == SDM_E_UNSUPPORTED) s = SDM_OK;
+    }
     out->maps = r.data;
     r.data = (dataset){0};
     sdm_free(r.blocks);

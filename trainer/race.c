@@ -5,7 +5,6 @@
 #include <stdio.h>
 
 #include "data/dataset_fill.h"
-#include "look.h"
 #include "sdm/internal/clock.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
@@ -50,6 +49,14 @@ static const double BURST = 1.5;
 /* The next run may make maps more slowly than this one by this factor, as on a busier machine. */
 static const double PACE_MARGIN = 1.25;
 
+/* Where there is no time for trials, a template that needs no correction is made before `pod` if
+   that is expected to take at most this part of the budget. */
+static const double TEMPLATE_FIRST = 0.5;
+
+/* The design of a template of several parts takes at most as long as so many exact maps
+   (docs/notes/network.md). */
+static const double DESIGN_PARTS = 400;
+
 /* Part of a budget of steps for a template that is trained before `pod`. */
 static const double TEMPLATE_SHARE = 1.0 / 3;
 
@@ -59,6 +66,9 @@ typedef struct entrant {
     trainer *race;       /* the run, with the whole budget */
     bool finished;       /* false: the shape does not allow this kind */
     bool ready;          /* it needs no training */
+    bool only_ready;     /* dropped before the maps of its trial if it needs training, or if its
+                            design takes too long */
+    const char *dropped; /* why; NULL: it was not */
     bool cut;            /* the budget of time ended before all maps of the trial were made */
     turn_figures errors; /* of its trial */
     double seconds;
@@ -136,6 +146,35 @@ static sdm_status measure(const trainer *r, turn_figures *out, sdm_error *err)
     return s;
 }
 
+/* Sets up the trial of an entrant. *allowed = whether its maps are made: else the shape does not
+ * allow this kind, or it is dropped (entrant.dropped). */
+static sdm_status set_up(trainer *t, entrant *e, bool *allowed, sdm_error *err)
+{
+    sdm_error reason = {0};
+    trainer *r = &e->run;
+    if (e->only_ready)
+        r->design_until = t->started + TEMPLATE_FIRST * 60 * t->config->train.minutes;
+    sdm_status s = trainer_set_up(r, &reason);
+    // the ranks have clocks of their own
+    if (e->only_ready) s = sdm_comm_agree(t->hooks.comm, s, &reason);
+    e->ready = !s && r->data.only_holdout;
+    const char *dropped = !e->only_ready         ? NULL
+                          : s == SDM_E_CANCELLED ? "its design takes over half of train.minutes"
+                          : !s && !e->ready      ? "it needs training, too"
+                                                 : NULL;
+    *allowed = !s && !dropped;
+    if (*allowed) return s;
+    if (!dropped && (s != SDM_E_UNSUPPORTED || e->kind == SDM_NETWORK_POD)) {
+        if (err) *err = reason;
+        return s;
+    }
+    e->dropped = dropped;
+    if (!dropped) snprintf(e->left_out, sizeof e->left_out, "%s", reason.text);
+    trainer_message(t, "auto: %s is left out: %s", trainer_turn_name(e->kind),
+                    dropped ? dropped : reason.text);
+    return SDM_OK;
+}
+
 /* Trains and measures one entrant. Keeps its design and its maps. known: exact maps made
  * before. */
 static sdm_status trial(trainer *t, const sdm_config *config, const dataset *known, entrant *e,
@@ -158,16 +197,11 @@ static sdm_status trial(trainer *t, const sdm_config *config, const dataset *kno
                    .metrics = &metrics};
     const fill_hooks hooks = {
         .report = trial_report, .cancelled = trial_cancelled, .enough = trial_enough, .user = e};
-    sdm_error reason = {0};
-    sdm_status s = trainer_set_up(r, &reason);
-    if (s == SDM_E_UNSUPPORTED && e->kind != SDM_NETWORK_POD) {
-        snprintf(e->left_out, sizeof e->left_out, "%s", reason.text);
-        trainer_message(t, "auto: %s is left out: %s", trainer_turn_name(e->kind), reason.text);
-        s = SDM_OK;
-    } else {
-        if (s && err) *err = reason;
+    bool allowed = false;
+    sdm_status s = set_up(t, e, &allowed, err);
+    if (!s && allowed) {
         if (known->n_voxels && !r->data.target.make) r->data.known = known;
-        if (!s) s = trainer_dataset_fill(&r->data, r->n_threads, &hooks, err);
+        s = trainer_dataset_fill(&r->data, r->n_threads, &hooks, err);
         r->data.known = NULL;
         if (!s) s = trainer_check_grid(r, err);
         if (!s) s = r->kind->begin(r, err);
@@ -179,7 +213,6 @@ static sdm_status trial(trainer *t, const sdm_config *config, const dataset *kno
         e->finished = !s;
     }
     e->seconds = trainer_seconds(r);
-    e->ready = r->data.only_holdout;
     e->cut = !e->ready && (int64_t)r->data.n_start < config->data.start;
     r->metrics = NULL;
     sdm_text_dispose(&metrics);
@@ -205,23 +238,53 @@ static sdm_status try_kind(trainer *t, sdm_config *config, const dataset *known,
     return s;
 }
 
-/* true: the trials of both kinds would take more than TRAINER_TRIALS_SHARE of train.minutes. */
-static bool lacks_time(const trainer *t, const trial_look *l)
-{
-    return trainer_by_time(t) && l->trials > TRAINER_TRIALS_SHARE * 60 * t->config->train.minutes;
-}
-
 /* train.minutes of which TRAINER_TRIALS_SHARE holds the trials of both kinds, with a margin. */
 static double trial_minutes(const trial_look *l)
 {
     return ceil(10 * PACE_MARGIN * l->trials / (60 * TRAINER_TRIALS_SHARE)) / 10;
 }
 
-/* true: there is no time for trials, and pod is taken without one: a template is not likely to be
- * kept. */
-static bool takes_pod(const trainer *t, const trial_look *l, size_t n_params)
+/* What is done where there is no time for the trials of both kinds. */
+typedef enum haste {
+    HASTE_NONE,  /* there is time */
+    HASTE_POD,   /* pod is taken without a trial: a template is not likely to be kept */
+    HASTE_FIRST, /* a template is made, and kept if it is good, as long as it needs no training */
+    HASTE_TEMPLATE, /* a template alone has a trial, the beginning of its training */
+} haste;
+
+/* About the seconds until a template of several parts is made and measured. */
+static double template_seconds(const trainer *t, const trial_look *l)
 {
-    return lacks_time(t, l) && l->bends && n_params <= FEW_PARAMS;
+    return l->per_map * (DESIGN_PARTS + (double)t->config->data.holdout + MEASUREMENT);
+}
+
+static haste haste_of(const trainer *t, const trial_look *l)
+{
+    size_t n_params;
+    sdm_instance_params(t->shape, &n_params);
+    if (!l->lacks_time) return HASTE_NONE;
+    if (!l->bends || n_params > FEW_PARAMS) return HASTE_TEMPLATE;
+    const double most = TEMPLATE_FIRST * 60 * t->config->train.minutes;
+    return l->divides && template_seconds(t, l) <= most ? HASTE_FIRST : HASTE_POD;
+}
+
+/* Tells that there is no time for the trials of both kinds, and what is done instead. */
+static void tell_haste(const trainer *t, const trial_look *l)
+{
+    char first[120];
+    const haste h = haste_of(t, l);
+    if (h == HASTE_NONE) return;
+    snprintf(first, sizeof first,
+             "template is made first, which takes about %.3g s, and kept if it is good",
+             template_seconds(t, l));
+    const char *done = h == HASTE_FIRST ? first
+                       : h == HASTE_POD ? "pod is taken without trials"
+                                        : "template alone has one";
+    trainer_message(t,
+                    "auto: trials of both kinds would take about %.3g s, and a fifth of "
+                    "train.minutes is %.3g s: %s (for both raise train.minutes to %.4g)",
+                    l->trials, TRAINER_TRIALS_SHARE * 60 * t->config->train.minutes, done,
+                    trial_minutes(l));
 }
 
 /* With a budget of time: looks at the shape, and tells how many maps fit into the budget. *minutes
@@ -237,18 +300,11 @@ static sdm_status look(trainer *t, sdm_config *scratch, trial_look *l, double *m
     trainer_report(t, trainer_start_fraction(t), true);
     const sdm_status s = trainer_look(t, scratch, l, err);
     if (s) return s;
-    const double spent = trainer_shared_seconds(t) + (lacks_time(t, l) ? 0 : l->trials);
+    const double spent = trainer_shared_seconds(t) + (l->lacks_time ? 0 : l->trials);
     *scratch = *t->config;
     sdm_config_choose_kind(scratch, SDM_NETWORK_POD);
     *minutes = trainer_tell_pace(t, scratch, BURST * l->per_map, 0.5 * budget - spent);
-    if (lacks_time(t, l))
-        trainer_message(t,
-                        "auto: trials of both kinds would take about %.3g s, and a fifth of "
-                        "train.minutes is %.3g s: %s (for both raise train.minutes to %.4g)",
-                        l->trials, TRAINER_TRIALS_SHARE * budget,
-                        takes_pod(t, l, n_params) ? "pod is taken without trials"
-                                                  : "template alone has one",
-                        trial_minutes(l));
+    tell_haste(t, l);
     return SDM_OK;
 }
 
@@ -279,13 +335,18 @@ static double first_share(const trainer *t, bool ready)
 /* Decides without a trial of pod, for which the budget is too short. */
 static const char *decide_untried(const trainer *t, const entrant *carried, training_turns *out)
 {
-    if (!carried->run.kind) {
+    if (!carried->run.kind || carried->dropped) {
         out->kind[0] = SDM_NETWORK_POD;
         return "it suits a shape of few parameters that bends or stretches";
     }
     if (trainer_score(&carried->errors) > POOR * t->config->grid.spacing[0]) {
         out->kind[0] = SDM_NETWORK_POD;
         return "the trial of template leaves a large error";
+    }
+    if (carried->only_ready) {
+        out->n = 2, out->kind[1] = SDM_NETWORK_POD, out->if_good = true;
+        return "it is ready, and kept if it is good; else pod gets the rest of the "
+               "budget, and the better one is kept";
     }
     out->untried = true;
     return "it suits parts that only move, and shapes of many parameters";
@@ -296,7 +357,7 @@ static const char *decide(const trainer *t, const trial_look *l, const entrant *
                           const entrant *pod, bool done, training_turns *out)
 {
     *out = (training_turns){.n = 1, .kind = {SDM_NETWORK_TEMPLATE}, .chosen = true, .share = 1};
-    if (carried->run.kind && !carried->finished) {
+    if (carried->left_out[0]) {
         out->kind[0] = SDM_NETWORK_POD;
         return "the only kind left";
     }
@@ -344,17 +405,18 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
     entrant e[] = {{.kind = SDM_NETWORK_TEMPLATE, .race = t}, {.kind = SDM_NETWORK_POD, .race = t}};
     turn_figures figures[2];
     trial_look l = {0};
-    size_t n = 0, n_params;
+    size_t n = 0;
     double pod_minutes = 0;
     t->phase = SDM_PHASE_TRIAL;
-    sdm_instance_params(t->shape, &n_params);
     sdm_status s = look(t, scratch, &l, &pod_minutes, err);
-    const bool brief = lacks_time(t, &l);
+    const haste h = haste_of(t, &l);
+    e[0].only_ready = h == HASTE_FIRST;
     // where a template is likely to be kept, its trial is the beginning of its training
-    if (!s && !takes_pod(t, &l, n_params)) s = try_kind(t, scratch, &l.maps, &e[0], err);
+    if (!s && h != HASTE_POD) s = try_kind(t, scratch, &l.maps, &e[0], err);
     const bool done =
         e[0].finished && trainer_score(&e[0].errors) < ENOUGH * t->config->grid.spacing[0];
-    if (!s && e[0].finished && !done && !brief) s = try_kind(t, scratch, &l.maps, &e[1], err);
+    if (!s && e[0].finished && !done && h == HASTE_NONE)
+        s = try_kind(t, scratch, &l.maps, &e[1], err);
     if (!s) {
         const char *reason = decide(t, &l, &e[0], &e[1], done, out);
         // minutes for a later training of pod; where pod is trained now, its report has them
@@ -362,8 +424,8 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
         const entrant *other = out->kind[0] == e[0].kind ? &e[1] : &e[0];
         out->tried_other = other->finished;
         // a kind that the shape does not allow, or that is not needed, has no trial later either
-        const bool left_out = brief && !done && (takes_pod(t, &l, n_params) || out->untried);
-        out->trial_minutes = left_out ? trial_minutes(&l) : 0;
+        const bool open = h != HASTE_NONE && !done && !e[0].left_out[0] && !out->tried_other;
+        out->trial_minutes = open ? trial_minutes(&l) : 0;
         if (out->tried_other) out->other = other->errors;
         trainer_message(t, "auto: network.kind is %s: %s", trainer_turn_name(out->kind[0]), reason);
         for (size_t i = 0; i < 2; i++)

@@ -2,17 +2,13 @@
    own maps. */
 #pragma once
 
-#include "state/kind.h"
+#include "look.h"
 
 /* What a trial hands on to the training of its kind. */
 typedef struct trial_gain {
     void *design; /* trainer.design; NULL: none */
     dataset maps; /* trainer.tried */
 } trial_gain;
-
-/* Part of a budget of time for the trials: one that takes more is left out, as its first maps tell,
-   and no more maps are made for a trial once the part is used. */
-#define TRAINER_TRIALS_SHARE 0.2
 
 /* Numbers of the maps of a trial, for training and held out. */
 size_t trainer_trial_maps(const sdm_config *c, size_t n_params);

@@ -102,13 +102,18 @@ static void report_trial(const training_turns *r, sdm_train_report *report)
     report->other_kind = r->other.kind;
 }
 
-/* Tells and records that the second kind is trained now: it is its turn then. It is not if hardly
- * any of the budget is left, which *report tells. */
+/* Tells and records that the second kind is trained now: it is its turn then. It is not if a good
+ * first one suffices, or if hardly any of the budget is left, which *report tells. */
 static sdm_status begin_second(run *r, const trainer *t, sdm_train_report *report, sdm_error *err)
 {
     const double left = trainer_turns_left(&r->turns, r->asked);
     const char *first = trainer_turn_name(r->turns.kind[0]),
                *second = trainer_turn_name(r->turns.kind[1]);
+    if (r->turns.if_good && report->verdict.grade == SDM_GRADE_GOOD) {
+        trainer_message(t, "auto: %s is kept without a comparison: it is good", first);
+        report_trial(&r->turns, report);
+        return SDM_OK;
+    }
     if (left < ENOUGH_LEFT) {
         trainer_message(t, "auto: %s is kept: hardly any of the budget is left for %s", first,
                         second);
@@ -151,6 +156,7 @@ static sdm_status keep_better(run *r, trainer *t, sdm_train_report *report, sdm_
     report->other = both[!best].accuracy;
     report->other_voxel_mm = both[!best].verdict.rmse_voxel_mm;
     report->other_ms = both[!best].map_ms;
+    report->other_derivative = both[!best].verdict.derivative_error;
     report->other_grade = both[!best].verdict.grade;
     memcpy(report->other_path, both[1].other_path, sizeof report->other_path);
     report->other_kind = r->turns.kind[!best];

@@ -39,8 +39,7 @@ static void print_far(const sdm_verdict *v)
            v->largest_at_mm < 0 ? "inside" : "outside");
 }
 
-/* text[16] = an error in per cent: a whole number from 10 on. Returns text. */
-static const char *percent(double share, char text[16])
+const char *cli_percent(double share, char text[16])
 {
     snprintf(text, 16, share >= 0.1 ? "%.0f" : "%.2g", 100 * share);
     return text;
@@ -58,21 +57,21 @@ static void print_derivatives(const sdm_verdict *v)
     char text[16], largest[16];
     if (isfinite(v->volume_error))
         printf("  volumes     of maps are off by %s %%, at most by %s %%",
-               percent(v->volume_error, text), percent(v->volume_error_max, largest));
+               cli_percent(v->volume_error, text), cli_percent(v->volume_error_max, largest));
     if (isfinite(v->surface_volume_error))
         printf("; of their surfaces (.stl) by %s %%, at most by %s %%",
-               percent(v->surface_volume_error, text),
-               percent(v->surface_volume_error_max, largest));
+               cli_percent(v->surface_volume_error, text),
+               cli_percent(v->surface_volume_error_max, largest));
     if (isfinite(v->volume_error)) printf("\n");
     if (!isfinite(v->derivative_error)) return;
     printf(
         "  derivatives by the parameters, of %d shapes: of maps near the surface off by %s %% (by "
         "%s, the worst one)",
-        (int)v->derivative_shapes, percent(v->derivative_error, text), v->derivative_by);
+        (int)v->derivative_shapes, cli_percent(v->derivative_error, text), v->derivative_by);
     if (v->volume_derivatives_bad[0] || v->volume_derivatives_small[0])
         printf("; of volumes: see `not for`");
     else if (isfinite(v->volume_derivative_error))
-        printf(", of volumes by %s %% (by %s)", percent(v->volume_derivative_error, text),
+        printf(", of volumes by %s %% (by %s)", cli_percent(v->volume_derivative_error, text),
                v->volume_derivative_by);
     printf("\n");
 }

@@ -7,6 +7,9 @@
  * derivatives, its parts, the steps and the grid. */
 void cli_print_measurements(const sdm_verdict *v);
 
+/* text[16] = an error in per cent: a whole number from 10 on. Returns text. */
+const char *cli_percent(double share, char text[16]);
+
 /* Prints on stdout how good the model is, for which uses it is not, and what limits it. */
 void cli_print_verdict(const sdm_verdict *v);
 

@@ -52,7 +52,7 @@ fi
 
 # auto: the command names the kind that was kept and the cost of its maps; that of the other kind is in its line and in the JSON.
 expect 0 - sdmgen train link.yaml data.start=300 data.memory_gb=6 data.holdout=12 --out both --quiet
-has '^  auto        trained (pod|template), too \((good|usable|poor)\): RMSE .*, [0-9.e-]+ ms a map.*; its model is both/model-(pod|template)\.sdm$'
+has '^  auto        trained (pod|template), too \((good|usable|poor)\): RMSE .*, [0-9.e-]+ ms a map.*; derivatives of maps off by [0-9.]+ %, those of (pod|template) by [0-9.]+ %; its model is both/model-(pod|template)\.sdm$'
 # each figure of the end stands there once
 has '^  held out    12 shapes: RMSE [0-9.]+ mm \([0-9.]+ voxels\), MSE [0-9.e-]+ mm\^2; within a voxel of the surface [0-9.]+ mm \([0-9.]+ voxels\); Dice [0-9.]+, smallest [0-9.]+$'
 has '^  by distance within two voxels \(0\.68 mm\) of the surface [0-9.]+ mm, '

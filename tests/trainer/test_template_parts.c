@@ -340,9 +340,53 @@ static void allocations_may_fail(void **state)
     }
 }
 
+// Several components, or one with pieces, can be several parts; a ring that bends as a whole and a
+// shape with a cavity cannot.
+static void shapes_that_divide(void **state)
+{
+    (void)state;
+    const struct {
+        const sdm_shape *shape;
+        mistake mistake;
+        bool divides;
+    } cases[] = {{&mechanism, BEND, true},
+                 {&mechanism, CAVITY, false},
+                 {&welded, NONE, true},
+                 {&ring, NONE, false}};
+    const sdm_grid grid = coarse_grid();
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        sdm_instance *shape = instance_of(cases[i].shape);
+        const template_design d = blank(shape, &grid);
+        bool divides = !cases[i].divides;
+        sdm_error e = {0};
+        mistaken = cases[i].mistake;
+        if (trainer_template_divides(&d.family, 0.01, &divides, &e)) fail_msg("%s", e.text);
+        mistaken = NONE;
+        if (divides != cases[i].divides) fail_msg("case %zu", i);
+        sdm_instance_free(shape);
+    }
+}
+
+// A design that is not ready at its time ends.
+static void late_design_ends(void **state)
+{
+    (void)state;
+    sdm_instance *shape = instance_of(&mechanism);
+    const sdm_grid grid = coarse_grid();
+    template_design d = blank(shape, &grid);
+    d.family.until = 1e-9;
+    sdm_error e = {0};
+    assert_int_equal(trainer_template_design(&d, &e), SDM_E_CANCELLED);
+    assert_non_null(strstr(e.text, "takes too long"));
+    trainer_template_design_dispose(&d);
+    sdm_instance_free(shape);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shapes_that_divide),       cmocka_unit_test(late_design_ends),
+
         cmocka_unit_test(components_join_vertices), cmocka_unit_test(mechanism_has_its_parts),
         cmocka_unit_test(other_meshes_are_refused), cmocka_unit_test(fine_grid_is_refused),
         cmocka_unit_test(some_shapes_are_one_part), cmocka_unit_test(ring_has_its_modes),

@@ -32,6 +32,14 @@ static const char ring_text[] =
     "data: {static: 0, static_share: 0, start: 40, online: 40, holdout: 4, memory_gb: 0.5}\n"
     "train: {steps: 150, batch: 16}\n";
 
+/* Boxes on joints, one of which bends: rigid parts, and one with a warp. */
+static const char mechanism_text[] =
+    "shape: {name: mechanism}\n"
+    "grid: {size: [48, 44, 40], spacing: 0.4, centre: [1.5, 0, 0]}\n"
+    "network: {degree: 2, width: 16, modes: 24}\n"
+    "data: {static: 0, static_share: 0, start: 400, online: 40, holdout: 8, memory_gb: 4}\n"
+    "train: {steps: 150, batch: 16}\n";
+
 /* Makes pod worse than the template. */
 #define FEW_MAPS "shape.options.limit=1", "data.start=20", "data.online=0", "train.steps=10"
 
@@ -114,6 +122,11 @@ static void assert_other(const sdm_train_report *r)
     const sdm_model_info *info = sdm_model_get_info(m);
     assert_string_equal(info->kind, pod ? "pod" : "template");
     assert_true(info->accuracy.rmse_mm == r->other.rmse_mm);
+    // the model file has rounded figures
+    if (isnan(info->quality.derivative_error))
+        assert_true(isnan(r->other_derivative));
+    else
+        assert_true(fabs(info->quality.derivative_error / r->other_derivative - 1) < 1e-6);
     assert_string_equal(info->quality.grade, sdm_grade_name(r->other_grade));
     sdm_model_free(m);
     assert_false(exists(pod ? "model-template.sdm" : "model-pod.sdm"));
@@ -355,6 +368,87 @@ static void no_time_for_trials(void **state)
     assert_true(60 * r.trial_minutes / 5 > 1.2 * strtod(strpbrk(seconds, "0123456789"), NULL));
 }
 
+/* Cancels a run that does not make the template first, or that trains pod after it. */
+static bool stop_unless_first(void *user)
+{
+    (void)user;
+    return (strstr(said, "exact maps a second") && !strstr(said, "template is made first")) ||
+           strstr(said, "pod is trained with");
+}
+
+/* Trains a mechanism with a budget of time that the trials exceed, and of which half holds its
+   template: runs that end at once tell the seconds that the trials take here. Returns whether the
+   run trains pod, too: it ends there. */
+static bool train_in_haste(const char *const *keys, size_t n, sdm_train_report *r)
+{
+    enum { TRIES = 40, KEYS = 8 };
+    const char *set[KEYS] = {"train.steps=0", "train.minutes=0.0001"};
+    const sdm_train_hooks hooks = {.cancelled = stop_unless_first, .message = listen};
+    char minutes[40];
+    sdm_instance *shape = instance_of(&mechanism);
+    assert_true(n + 2 <= KEYS);
+    if (n) memcpy(set + 2, keys, n * sizeof *keys);
+    for (int i = 0; i < TRIES; i++) {
+        const sdm_config c = parse_config(mechanism_text, set, n + 2);
+        sdm_error e = {0};
+        run_files_remove();
+        said[0] = '\0';
+        const sdm_status s = sdm_train(&c, shape, folder, false, &hooks, r, &e);
+        if (s && s != SDM_E_CANCELLED) fail_msg("%s: %s", e.text, said);
+        const bool second = strstr(said, "pod is trained with");
+        if (!s || second) {
+            sdm_instance_free(shape);
+            return second;
+        }
+        const char *at = strstr(said, "trials of both kinds would take about ");
+        // the trials take 0.3 of this, the template about 0.13
+        if (at)
+            snprintf(minutes, sizeof minutes, "train.minutes=%.4g",
+                     strtod(strpbrk(at, "0123456789"), NULL) / (0.3 * 60));
+        set[1] = at ? minutes : "train.minutes=0.0001";
+    }
+    fail_msg("the pace of maps changes too much: %s", said);
+    return false;
+}
+
+// A shape of few parameters that bends: where there is no time for trials but for a template of its
+// parts, this is made, and kept if it is good. Else pod is trained with the rest of the time.
+static void template_of_seconds_is_made(void **state)
+{
+    (void)state;
+    static const char *const fine[] = {"grid.size=[96, 88, 80]", "grid.spacing=0.2"},
+                             *const cuts[] = {"grid.size=[60, 88, 80]", "grid.spacing=0.2"};
+    sdm_train_report r = {0};
+    mistaken = BEND;
+    bool second = train_in_haste(fine, 2, &r);
+    if (second || !strstr(said, "auto: template is kept without a comparison: it is good"))
+        fail_msg("%s", said);
+    assert_kind("template");
+    assert_true(r.verdict.grade == SDM_GRADE_GOOD && r.steps == 0 && r.chosen);
+    assert_true(!r.compared && !r.tried && !r.unfinished && r.trial_minutes > 0);
+    // the grid cuts the shapes: no model is good
+    second = train_in_haste(cuts, 2, &r);
+    mistaken = NONE;
+    assert_kind("template");
+    if (!second || strstr(said, "without a comparison")) fail_msg("%s", said);
+}
+
+// Cheap maps make the design of a template seem short: it is given up, and pod is trained.
+static void long_design_is_given_up(void **state)
+{
+    (void)state;
+    static const char *const coarse[] = {
+        "grid={size: [24, 22, 20], spacing: 0.8, centre: [1.5, 0, 0]}"};
+    mistaken = BEND;
+    sdm_train_report r = {0};
+    assert_false(train_in_haste(coarse, 1, &r));
+    mistaken = NONE;
+    assert_kind("pod");
+    if (!strstr(said, "auto: template is left out: its design takes over half of train.minutes"))
+        fail_msg("%s", said);
+    assert_true(!r.compared && !r.tried && !r.unfinished && r.trial_minutes > 0);
+}
+
 /* Puts a folder in the place of the model before it is written: the run ends with a checkpoint. */
 static void block_model(void *user, const sdm_progress *p)
 {
@@ -495,6 +589,8 @@ int main(void)
                                        cmocka_unit_test(second_model_cannot_be_written),
                                        cmocka_unit_test(template_remains),
                                        cmocka_unit_test(no_time_for_trials),
+                                       cmocka_unit_test(template_of_seconds_is_made),
+                                       cmocka_unit_test(long_design_is_given_up),
                                        cmocka_unit_test(overlap_is_named),
                                        cmocka_unit_test(turns_share_the_budget),
                                        cmocka_unit_test(interpolation_is_trilinear)};

@@ -44,6 +44,8 @@ typedef struct trainer {
 
     sdm_phase phase;
     int64_t step, phase_step; /* optimiser steps of the run; of this phase */
+    double design_until;      /* sdm_clock() at which the design of a template is given up with
+                                 SDM_E_CANCELLED; 0: no limit */
     double started;           /* sdm_clock() at the start, minus the time used before a resume, s */
     /* Seconds since `started`. */
     double phase_started, last_report, last_checkpoint, last_evaluation;

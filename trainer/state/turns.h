@@ -25,6 +25,7 @@ typedef struct training_turns {
     double trial_minutes; /* train.minutes whose part for trials holds those of both kinds, if the
                              budget left out the trial of the kind that is not trained; else 0 */
     bool untried;         /* pod may be better, but the budget was too short for its trial */
+    bool if_good;         /* the first of two is kept without the second if its grade is good */
     bool tried_other;     /* the kind that is not trained, or trained later, had a trial: */
     turn_figures other;   /* its errors in the trial */
 } training_turns;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "data/streams.h"
+#include "sdm/internal/clock.h"
 #include "sdm/internal/sampling.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
@@ -109,6 +110,8 @@ void trainer_family_params(const family *f, size_t index, double *p)
 
 sdm_status trainer_family_mesh(const family *f, const double *p, sdm_mesh *mesh, sdm_error *err)
 {
+    if (f->until > 0 && sdm_clock() > f->until)
+        return sdm_fail(err, SDM_E_CANCELLED, "the design of the template takes too long");
     const sdm_status s = sdm_instance_mesh(f->shape, p, mesh, err);
     if (s) return s;
     if (mesh->n_vert == f->base.n_vert && mesh->n_tri == f->base.n_tri &&

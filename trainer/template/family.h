@@ -12,6 +12,7 @@ typedef struct family {
     const sdm_distribution *distribution; /* [n_params] */
     uint64_t seed;
     int n_threads;
+    double until;        /* sdm_clock() after which no more meshes are made; 0: no limit */
     sdm_mesh base;       /* at the default parameters */
     size_t n_components; /* sets of triangles that are connected through vertices */
     uint32_t *place;     /* [n_vert] first vertex at the same place */
@@ -32,5 +33,6 @@ void trainer_family_dispose(family *f);
 void trainer_family_params(const family *f, size_t index, double *p);
 
 /* *mesh = the mesh at p. SDM_E_UNSUPPORTED: it does not have as many vertices as the base mesh and
-   the same triangles, so that its vertices do not correspond to those of the base mesh. */
+   the same triangles, so that its vertices do not correspond to those of the base mesh.
+   SDM_E_CANCELLED: it is later than f->until. */
 sdm_status trainer_family_mesh(const family *f, const double *p, sdm_mesh *mesh, sdm_error *err);

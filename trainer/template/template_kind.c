@@ -192,6 +192,7 @@ static family family_of(const trainer *t)
                     .max = d->max,
                     .distribution = d->distribution,
                     .seed = t->config->seed,
+                    .until = t->design_until,
                     .n_threads = t->n_threads};
 }
 
@@ -199,6 +200,13 @@ sdm_status trainer_template_look(const trainer *t, bool *bends, sdm_error *err)
 {
     const family f = family_of(t);
     return trainer_template_bends(&f, TRAINER_RIGID * trainer_dataset_voxel(&t->data), bends, err);
+}
+
+sdm_status trainer_template_look_parts(const trainer *t, bool *divides, sdm_error *err)
+{
+    const family f = family_of(t);
+    return trainer_template_divides(&f, TRAINER_RIGID * trainer_dataset_voxel(&t->data), divides,
+                                    err);
 }
 
 /* Designs the network: from meshes, with a look at a few exact maps. */
@@ -217,6 +225,7 @@ static sdm_status make_design(const trainer *t, template_state *s, sdm_error *er
             "carried along, the template misses the surface by %.2g mm (%.1f voxels): "
             "parts of the mesh fold or turn too far for one warp; use network.kind: pod",
             e.near, e.near / t->config->grid.spacing[0]);
+    s->design.family.until = 0;
     s->corrected = s->design.n_parts == 1 &&
                    (s->design.parts[0].n_modes || s->design.parts[0].frame == SDM_FRAME_AFFINE);
     return s->corrected ? correction_grid(s, err) : SDM_OK;

@@ -355,6 +355,20 @@ sdm_status trainer_template_bends(const family *from, double tolerance, bool *ou
     return s;
 }
 
+sdm_status trainer_template_divides(const family *from, double tolerance, bool *out, sdm_error *err)
+{
+    family f = *from;
+    pieces found = {0};
+    sdm_status s = trainer_family_create(&f, err);
+    const bool whole = !s && is_whole(&f);
+    if (!s && !whole && f.n_components == 1)
+        s = trainer_pieces_find(&f, 0, tolerance, OVERLAP * tolerance, &found, err);
+    *out = !s && !whole && (f.n_components > 1 || found.n > 1);
+    trainer_pieces_dispose(&found);
+    trainer_family_dispose(&f);
+    return s;
+}
+
 sdm_status trainer_template_parts(template_design *d, double tolerance, sdm_error *err)
 {
     const bool whole = is_whole(&d->family);

@@ -17,6 +17,12 @@ sdm_status trainer_template_parts(template_design *d, double tolerance, sdm_erro
    *from are not set. tolerance, errors: as above. */
 sdm_status trainer_template_bends(const family *from, double tolerance, bool *out, sdm_error *err);
 
+/* *out = whether the template can be several parts although one bends, so that it needs no
+   correction: there are several components, or the only one has pieces. The meshes of *from are not
+   set. tolerance, errors: as above. */
+sdm_status trainer_template_divides(const family *from, double tolerance, bool *out,
+                                    sdm_error *err);
+
 /* *out = the motion of part c from the base mesh to `vert` of another mesh, by the type of its
    frame. Returns the root mean square distance that remains, mm. */
 double trainer_template_motion(const template_design *d, size_t c, const double *vert, motion *out);

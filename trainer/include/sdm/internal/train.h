@@ -79,12 +79,13 @@ typedef struct sdm_train_report {
     bool chosen;           /* by network.kind: auto */
     double map_ms; /* processor time of one map; NaN: not measured, as only one kind was trained */
     /* network.kind: auto has trained another kind, too, which was worse; its accuracy, its root
-       mean square error of the voxels within a voxel of the surface, its map_ms, its grade and its
+       mean square error of the voxels within a voxel of the surface, its map_ms, the error of its
+       derivatives as sdm_verdict.derivative_error has it (NaN: not measured), its grade and its
        model file, model-KIND.sdm beside model_path; "": it could not be written. */
     bool compared;
     sdm_network_kind other_kind;
     sdm_accuracy other;
-    double other_voxel_mm, other_ms;
+    double other_voxel_mm, other_ms, other_derivative;
     sdm_grade other_grade;
     char other_path[SDM_PATH_TEXT_MAX];
     /* It has only tried another kind, in a short trial: other_kind, other.rmse_mm, other_voxel_mm

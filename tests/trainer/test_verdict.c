@@ -506,8 +506,8 @@ static void uses_and_spacing(void **state)
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "fits by the network alone: the thinnest part, 2.3 mm in a few "
                                "held-out shapes, has 2.9 voxels across it, and 5 or more are safe; "
-                               "use sdmgen fit --exact --spacing 0.46, or 1.2 times the blur of "
-                               "the image if its blur is below 0.38 mm\n");
+                               "use sdmgen fit --exact --spacing 0.46 (an image with a blur "
+                               "below 0.38 mm: 1.2 times its blur)\n");
     // not 4 where there are nearly so many
     v.thickness_mm = 3.96 * v.coarse_mm;
     sdm_verdict_unfit(&v, lines);

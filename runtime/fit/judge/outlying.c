@@ -15,10 +15,10 @@
 
 #include "finding.h"
 #include "fit/trust/posterior.h"
-#include "noise.h"
 #include "residuals.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/vec3.h"
+#include "suffice.h"
 
 // most pairs of an outlying point and any point that are compared; of more points, every second,
 // third ... one
@@ -223,20 +223,6 @@ sdm_status sdm_fit_groups_find(const fit_distances *t, fit_groups *g, sdm_error 
     return s;
 }
 
-/* Standard deviation of the points about the surface: a robust one, or that which the options keep.
- */
-static sdm_status measure_sd(const fit_problem *p, double *sd, sdm_error *err)
-{
-    const size_t n = p->samples.n;
-    double *list = NULL;
-    const sdm_status s = SDM_ALLOC(&list, n, "points of the fit", err);
-    if (s) return s;
-    memcpy(list, p->samples.field, n * sizeof *list);
-    *sd = fmax(sdm_fit_robust_sd(list, n, 0), p->opts->keep_appearance ? p->opts->point_sd : 0);
-    sdm_free(list);
-    return SDM_OK;
-}
-
 /* Distance beyond which points with the standard deviation sd are outlying, mm. */
 static double far_off(const fit_problem *p, double sd)
 {
@@ -300,7 +286,8 @@ sdm_status sdm_fit_check_outlying(const fit_problem *p, sdm_fit_verdict *v, sdm_
     fit_distances t = {0};
     fit_groups groups = {0};
     double sd = 0;
-    sdm_status s = measure_sd(p, &sd, err);
+    sdm_status s = sdm_fit_points_sd(p, &sd, err);
+    if (p->opts->keep_appearance) sd = fmax(sd, p->opts->point_sd);
     if (!s) s = take_points(p, far_off(p, sd), &t, err);
     if (!s) s = sdm_fit_groups_find(&t, &groups, err);
     if (!s && groups.largest) doubt_patch(p, &t, &groups, sd, v);

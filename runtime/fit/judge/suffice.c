@@ -7,6 +7,7 @@
 
 #include "finding.h"
 #include "fit/data/shape_details.h"
+#include "fit/trust/posterior.h"
 #include "noise.h"
 #include "sdm/internal/fit_finding.h"
 #include "sdm/internal/shape_box.h"
@@ -128,18 +129,10 @@ typedef struct given_scatter {
     double limit; /* of `over`: a right fit exceeds it once in a thousand times */
 } given_scatter;
 
-/* Error of the maps of the fit's network near the surface, mm; exact maps: 0. It belongs to the
- * distances of the points, too. */
-static double network_error(const fit_problem *p)
-{
-    const sdm_model *model = fit_maps_direct(&p->maps) ? NULL : p->source->model;
-    return model ? sdm_model_get_info(model)->accuracy.rmse_near_mm : 0;
-}
-
 /* together: so many points share their error. */
 static given_scatter scatter_of(const fit_problem *p, double together)
 {
-    const double network = network_error(p);
+    const double network = sdm_fit_network_error(p);
     // the sum of the squares of n - unknowns normal errors
     double sum = 0;
     for (size_t i = 0; i < p->samples.n; i++) sum += p->samples.field[i] * p->samples.field[i];
@@ -150,27 +143,33 @@ static given_scatter scatter_of(const fit_problem *p, double together)
                            .limit = 1 + BY_CHANCE * sqrt(2 * together / free)};
 }
 
-/* Distances of which half are so many times as long as the given standard deviation explains are no
- * matter of its precision, nor of outliers. */
+// the robust standard deviation of the points over the given one, and over the root of the limit
 #define SCATTER_FAILED 3.0
 
-/* Median of the distances over that of normal errors with the given variance; NaN: no memory. */
-static double middle_over_given(const fit_problem *p)
+sdm_status sdm_fit_points_sd(const fit_problem *p, double *sd, sdm_error *err)
 {
     double *list = NULL;
-    if (SDM_ALLOC(&list, p->samples.n, "distances of the points", NULL)) return NAN;
-    for (size_t i = 0; i < p->samples.n; i++) list[i] = p->samples.field[i];
-    const double sd = sdm_fit_robust_sd(list, p->samples.n, 0);
+    const sdm_status s = SDM_ALLOC(&list, p->samples.n, "distances of the points", err);
+    if (s) return s;
+    memcpy(list, p->samples.field, p->samples.n * sizeof *list);
+    *sd = sdm_fit_robust_sd(list, p->samples.n, 0);
     sdm_free(list);
-    return sd / hypot(p->state.point_sd, network_error(p));
+    return SDM_OK;
+}
+
+/* Are most distances so long that neither outliers nor the precision of the given standard
+ * deviation explain them? */
+static bool is_far_scattered(const fit_problem *p, given_scatter g)
+{
+    double sd;
+    return g.over > g.limit && !(p->opts->tolerance > 0) && !sdm_fit_points_sd(p, &sd, NULL) &&
+           sd > SCATTER_FAILED * sqrt(g.limit) * hypot(p->state.point_sd, sdm_fit_network_error(p));
 }
 
 static void add_scatter(const fit_problem *p, given_scatter g, sdm_fit_verdict *v)
 {
-    const bool far =
-        !(p->opts->tolerance > 0) && middle_over_given(p) > SCATTER_FAILED * sqrt(g.limit);
     sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, g.over <= g.limit,
-                      far ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, g.over, g.limit,
+                      is_far_scattered(p, g) ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, g.over, g.limit,
                       "the points lie %.2g mm off the surface, %.2g times their standard deviation "
                       "as given: another shape, or their standard deviation is larger",
                       g.rms, sqrt(g.over));

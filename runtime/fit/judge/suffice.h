@@ -14,9 +14,13 @@ sdm_status sdm_fit_check_points(const fit_problem *p, const fit_residuals *s, do
  * deviation that the options keep, else doubtful. */
 void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v);
 
+/* *sd = robust standard deviation of the distances of the points from the surface, mm; outliers
+ * hardly change it. SDM_E_NOMEM. */
+sdm_status sdm_fit_points_sd(const fit_problem *p, double *sd, sdm_error *err);
+
 /* Of any fit to points whose options keep the standard deviation of the points: adds the finding
- * "residuals", doubtful, if the points lie farther off the surface than that. Returns whether it
- * did. */
+ * "residuals", doubtful or failed, if the points lie farther off the surface than that. Returns
+ * whether it did. */
 bool sdm_fit_doubt_given_scatter(const fit_problem *p, sdm_fit_verdict *v);
 
 /* What the voxels of the maps show. */

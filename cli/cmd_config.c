@@ -85,12 +85,10 @@ sdm_status cmd_config(const cli_args *args, sdm_error *err)
     sdm_registry *registry = NULL;
     sdm_instance *shape = NULL;
     size_t of_shape = 0;
-    double spacing;
     sdm_status s = cli_open_config(args, &config, &registry, &shape, err);
     if (!s && !args->dump) tell_vain_keys(config);
     if (!s && !args->dump)
-        of_shape =
-            cli_notice_survey(config, shape, cli_other_process(args, registry, shape), &spacing);
+        of_shape = cli_notice_survey(config, shape, cli_other_process(args, registry, shape), NULL);
     if (!s && !args->dump) s = cli_check_memory(config, shape, err);
     if (!s && args->dump) {
         sdm_config_dump(config, &text);

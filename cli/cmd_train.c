@@ -248,7 +248,6 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     sdm_instance *shape = NULL;
     sdm_comm *comm = NULL;
     sdm_map_store *store = NULL;
-    double thin_spacing;
     sdm_status s = cli_page_check_option(args, err);
     if (!s && (args->nodes || args->cores) && !args->plan)
         s = sdm_fail(err, SDM_E_ARG, "--nodes and --cores belong to --plan");
@@ -260,8 +259,7 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
         s = sdm_fail(err, SDM_E_ARG, "--out '%.100s...': the name is too long", args->out);
     if (!s && args->out) strcpy(config->output.folder, args->out);
     if (!s && !trains)
-        (void)cli_notice_survey(config, shape, cli_other_process(args, registry, shape),
-                                &thin_spacing);
+        (void)cli_notice_survey(config, shape, cli_other_process(args, registry, shape), NULL);
     if (!s && !trains) s = cli_plan_training(args, config, shape, err);
     if (!s && trains && !sdm_comm_rank(comm))
         s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);

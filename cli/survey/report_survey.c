@@ -104,7 +104,7 @@ static void notice(void *user, sdm_status weight, const char *line)
 size_t cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_repeat_process process,
                          double *thin_spacing)
 {
-    *thin_spacing = NAN;
+    if (thin_spacing) *thin_spacing = NAN;
     double min[SDM_MAX_PARAMS], max[SDM_MAX_PARAMS], range[SDM_MAX_PARAMS][2];
     sdm_distribution distribution[SDM_MAX_PARAMS];
     size_t n;
@@ -132,7 +132,7 @@ size_t cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_rep
     if (!s.found.cancelled)
         (void)cli_survey_tell(&s, CLI_ALL_STAGES & ~CLI_STAGE_GRID, notice, NULL, NULL);
     const size_t warnings = cli_warnings() - before;
-    if (!s.found.cancelled) *thin_spacing = cli_survey_thin_spacing(&s);
+    if (thin_spacing && !s.found.cancelled) *thin_spacing = cli_survey_thin_spacing(&s);
     if (!s.found.cancelled) (void)cli_survey_tell(&s, CLI_STAGE_GRID, notice, NULL, NULL);
     sdm_shape_survey_dispose(&s.found);
     return warnings;

@@ -21,7 +21,7 @@ void cli_survey_untested(const cli_survey *s, sdm_text *text);
 /* A survey of about a second of the shape of a configuration, over its ranges, distributions and
  * grid, told as warnings and notices; some meshes are made in the process, too. Returns the number
  * of warnings about the shape, without those about the grid; *thin_spacing =
- * cli_survey_thin_spacing(). Errors, such as that of an interrupt,
+ * cli_survey_thin_spacing() (NULL: not wanted). Errors, such as that of an interrupt,
  * are no notices: what follows meets them again. */
 size_t cli_notice_survey(const sdm_config *c, const sdm_instance *shape, sdm_repeat_process process,
                          double *thin_spacing);

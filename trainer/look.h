@@ -12,8 +12,8 @@ typedef struct trial_look {
     bool lacks_time; /* both trials take more than their part of train.minutes */
     bool divides;    /* it bends, lacks_time, and the template can be several parts, which need no
                         correction */
-    double per_map;  /* s an exact map, on all threads of all ranks */
-    double trials;   /* s, about, of the trials of both kinds */
+    double per_map;  /* time of an exact map on all threads of all ranks, s */
+    double trials;   /* estimated time of the trials of both kinds, s */
     dataset maps;    /* the maps made so far; trials and trainings of kind `pod` take them over */
 } trial_look;
 

@@ -146,8 +146,8 @@ static sdm_status measure(const trainer *r, turn_figures *out, sdm_error *err)
     return s;
 }
 
-/* Sets up the trial of an entrant. *allowed = whether its maps are made: else the shape does not
- * allow this kind, or it is dropped (entrant.dropped). */
+/* Prepares the trial of one kind of network. *allowed = false: the shape does not allow this kind,
+ * or the kind is given up (entrant.dropped says why); the trial then makes no maps. */
 static sdm_status set_up(trainer *t, entrant *e, bool *allowed, sdm_error *err)
 {
     sdm_error reason = {0};

@@ -1,5 +1,5 @@
-/* When a fit goes on with finer maps, and which voxels it advises. The fit itself is a stand-in.
- * Tests: fit_finer.c */
+/* Tests when a fit goes on with finer maps, and which voxel size it advises. A stand-in replaces
+ * the fit itself. Tests: fit_finer.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,8 +12,8 @@
 
 #include "fit/fit_command.h"
 
-static double spacing; // of the last finer grid; 0: none was made
-static int fits;       // number of fits with it
+static double spacing; // voxel (mm) of the last finer grid that was made; 0: none was made
+static int fits;       // number of fits that began on a finer grid
 
 double cli_fit_map_voxel(const cli_fit *f) { return f->source.grid.spacing[0]; }
 
@@ -93,7 +93,7 @@ static void test_advice_where_voxels_pass(void **state)
     assert_true(fabs(advice(&f) - 0.8) < 1e-12);
     add(&f, SDM_FIT_CHECK_BOUNDS, 1, 0);
     assert_true(advice(&f) == 0);
-    // points need no voxels
+    // a fit to points measures distances on the triangles of the shape: finer voxels do not help
     double points[3] = {0};
     f = fit_of(&args, 64, 0.55, 1.2);
     f.points = points;

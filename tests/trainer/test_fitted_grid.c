@@ -281,9 +281,9 @@ static int film_mesh(const void *self, const sdm_host *host, const sdm_option_va
     return scaled_plate(host, p, 8, out);
 }
 
-// A part that would be missing gets up to a million voxels in all, also where it is thin at an end
-// of its range alone, as far as the memory for maps allows. The thinnest plate is as thick as the
-// range begins.
+// The grid has up to a million voxels where a part would be missing on a coarser one, if the memory
+// for maps allows them; also where only an end of the range makes the part so thin. The thinnest
+// plate has the thickness at the lower end of the range.
 static void test_missing(void **state)
 {
     (void)state;

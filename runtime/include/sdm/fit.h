@@ -109,7 +109,8 @@ typedef struct sdm_fit_appearance {
     sdm_fit_law inside[SDM_FIT_LAWS], outside[SDM_FIT_LAWS];
 } sdm_fit_appearance;
 
-/* What explains the value of a voxel; the head of this file describes both. */
+/* How a fit explains the values of voxels: as a blurred mixture of the tissues (partial volume), or
+   with one tissue label for each voxel. The head of this file describes both models. */
 typedef enum sdm_fit_model { SDM_FIT_PARTIAL_VOLUME = 0, SDM_FIT_LABELS = 1 } sdm_fit_model;
 
 /* Rotations to try at the start. */
@@ -254,8 +255,9 @@ typedef struct sdm_fit_opts {
        for labels and points of SDM_FIT_CHECK_MISSING, too (each at least 0.05; images with
        SDM_FIT_LABELS 0.2). > 0: residuals and an offset alone do not fail the fit */
     double tolerance;
-    /* images, >= 0: largest volume of the inside's material beside the shape, as of other spaces,
-       over the volume of the shape (SDM_FIT_CHECK_MISSING) */
+    /* images, >= 0: a fit fails (SDM_FIT_CHECK_MISSING) if voxels beside the shape, such as those
+       of neighbouring spaces, have the values of the inside and a volume above this multiple of
+       the volume of the shape */
     double beside;
 
     /* how often a fit that its checks refuse may go on from another value of one parameter (points:

@@ -26,7 +26,8 @@ SDM_INTERNAL_API uint64_t sdm_crc64(uint64_t crc, const void *data, size_t size)
  * CRC-64 of the bytes before them, that CRC-64. [any thread] */
 uint64_t sdm_content_checksum(const void *data, size_t size);
 
-/* sdm_content_checksum() of a regular file. SDM_E_IO, SDM_E_NOMEM. [any thread] */
+/* *crc = checksum of the content of a regular file, as sdm_content_checksum() computes it.
+ * SDM_E_IO, SDM_E_NOMEM. [any thread] */
 sdm_status sdm_file_checksum(const char *path, uint64_t *crc, sdm_error *err);
 
 #ifdef __cplusplus

@@ -161,30 +161,31 @@ static double variance_of_mean(const cli_fit *f, const side_values *side)
     return (side->squares / side->n - mean * mean) / (side->n * share / 27);
 }
 
-/* Is the value clearly nearer to the inside than to every tissue outside? */
+/* Difference of the value from the mean inside. */
+static double from_inside(const sdm_fit_appearance *a, double value)
+{
+    return fabs(value - a->inside[0].mean);
+}
+
+/* Difference of the value from the nearest mean of the tissues outside; infinite for NaN. */
+static double from_outside(const sdm_fit_appearance *a, double value)
+{
+    double least = INFINITY;
+    for (size_t k = 0; k < a->n_outside; k++) // fmin() ignores NaN
+        least = fmin(least, fabs(value - a->outside[k].mean));
+    return least;
+}
+
+/* Is the value clearly nearer to the inside than to every tissue outside? NaN is not. */
 static bool is_like_inside(const sdm_fit_appearance *a, double value)
 {
-    const double own = fabs(value - a->inside[0].mean);
-    for (size_t k = 0; k < a->n_outside; k++)
-        if (!(own < CLEARLY * fabs(value - a->outside[k].mean))) return false;
-    return true;
+    return from_inside(a, value) < CLEARLY * from_outside(a, value);
 }
 
-/* Is the value nearer to the inside than to every tissue outside? NaN is. */
-static bool is_nearest_inside(const sdm_fit_appearance *a, double value)
-{
-    for (size_t k = 0; k < a->n_outside; k++)
-        if (fabs(value - a->outside[k].mean) < fabs(value - a->inside[0].mean)) return false;
-    return true;
-}
-
-/* Is the value clearly nearer to a tissue outside than to the inside? */
+/* Is the value clearly nearer to a tissue outside than to the inside? NaN is not. */
 static bool is_like_outside(const sdm_fit_appearance *a, double value)
 {
-    for (size_t k = 0; k < a->n_outside; k++)
-        if (fabs(value - a->outside[k].mean) < CLEARLY * fabs(value - a->inside[0].mean))
-            return true;
-    return false;
+    return from_outside(a, value) < CLEARLY * from_inside(a, value);
 }
 
 /* Have the voxels like the outside about the volume of the shape at the start, mm^3? Around a shape
@@ -233,11 +234,12 @@ static bool encloses_nothing(const cli_fit *f, double shape)
     const sdm_grid *g = &f->target.grid;
     const double voxel = g->spacing[0] * g->spacing[1] * g->spacing[2];
     const size_t count = sdm_grid_count(g);
-    unsigned char *mask = NULL;
+    const sdm_fit_appearance *a = &f->opts.appearance;
+    unsigned char *mask = NULL; // 1: nearer to the inside than to every tissue outside, or NaN
     size_t n = 0;
     if (SDM_ALLOC(&mask, count, "voxels of the image", NULL)) return false;
     for (size_t v = 0; v < count; v++)
-        mask[v] = is_nearest_inside(&f->opts.appearance, f->target.values[v]);
+        mask[v] = !(from_outside(a, f->target.values[v]) < from_inside(a, f->target.values[v]));
     const sdm_status s = cli_count_enclosed(g, mask, &n, NULL);
     sdm_free(mask);
     return !s && (double)n * voxel < ENCLOSED_MAX * shape;

@@ -35,9 +35,14 @@
 #define DENSE 3.0
 #define SAME 0.05
 #define FLAT 0.15
-// a place of the surface has no points if none is nearer than this multiple of the spacing: with
-// points drawn evenly, 6 are expected nearer, and there is none at 2 of 1000 places
+// a place of the surface has no points if none on its side of a wall is nearer than this multiple
+// of the spacing there: with points drawn evenly, 6 are expected nearer, and there is none at 2 of
+// 1000 places
 #define REACH 1.25
+// normals with at most this scalar product are of the two sides of a wall
+#define OPPOSITE (-0.5)
+// step of the differences for normals, in voxels
+#define NORMAL_STEP 0.25
 // shares that pass. A surface that is not covered shows a part of the shape, or the shape has grown
 // past its data: so it is with a small patch, or with many strays
 #define PATCH_DOUBTFUL 0.003
@@ -65,17 +70,20 @@
 
 typedef struct cloud {
     double (*x)[3];
+    double (*normal)[3]; // outward, of the surface nearest to a point; NULL: not known
     size_t n;
 } cloud;
 
 /* Squared distances from x to the k nearest points of a cloud, ascending, and their numbers; the
-   point number `self` is left out. */
-static void find_nearest(const cloud *c, const double x[3], size_t self, size_t k, double *d2,
-                         size_t *number)
+   point number `self` is left out, and so are points on the other side of a wall unless normal is
+   NULL. */
+static void find_nearest(const cloud *c, const double x[3], const double *normal, size_t self,
+                         size_t k, double *d2, size_t *number)
 {
     for (size_t i = 0; i < k; i++) d2[i] = INFINITY, number[i] = SIZE_MAX;
     for (size_t i = 0; i < c->n; i++) {
-        const double d = i == self ? INFINITY : v3_dist2(x, c->x[i]);
+        const bool left_out = i == self || (normal && v3_dot(normal, c->normal[i]) <= OPPOSITE);
+        const double d = left_out ? INFINITY : v3_dist2(x, c->x[i]);
         size_t at = k;
         for (; at > 0 && d < d2[at - 1]; at--)
             if (at < k) d2[at] = d2[at - 1], number[at] = number[at - 1];
@@ -83,14 +91,15 @@ static void find_nearest(const cloud *c, const double x[3], size_t self, size_t 
     }
 }
 
-/* Median distance of the points of a cloud from their FEW-th nearest one. */
-static sdm_status find_spacing(const cloud *c, double *spacing, sdm_error *err)
+/* Median distance of the points of a cloud from their FEW-th nearest one; one_side: from the FEW-th
+   nearest one on their side of a wall. */
+static sdm_status find_spacing(const cloud *c, bool one_side, double *spacing, sdm_error *err)
 {
     double *list = NULL, d2[FEW];
     size_t number[FEW];
     const sdm_status s = SDM_ALLOC(&list, c->n, "points of the fit", err);
     for (size_t i = 0; i < c->n && !s; i++) {
-        find_nearest(c, c->x[i], i, FEW, d2, number);
+        find_nearest(c, c->x[i], one_side ? c->normal[i] : NULL, i, FEW, d2, number);
         list[i] = sqrt(d2[FEW - 1]);
     }
     *spacing = s ? 0 : sdm_fit_median(list, c->n);
@@ -127,7 +136,7 @@ static patches find_patches(const cloud *strays, double spacing)
     for (size_t i = 0; i < strays->n && strays->n > MANY; i++) {
         double d2[MANY];
         size_t number[MANY + 1];
-        find_nearest(strays, strays->x[i], i, MANY, d2, number);
+        find_nearest(strays, strays->x[i], NULL, i, MANY, d2, number);
         number[MANY] = i;
         const double few = sqrt(d2[FEW - 1]);
         if (!(few > SAME * spacing &&
@@ -168,7 +177,22 @@ static void judge_patches(const fit_problem *p, const patches *found, size_t n_p
                       d < 0 ? "inside" : "outside", refused);
 }
 
-/* Splits points into those on the surface and strays, at most MOST in all. */
+/* Outward normal of the surface that is nearest to x, by differences of the signed distance. */
+static void find_normal(const fit_problem *p, const double x[3], double normal[3])
+{
+    const double step = NORMAL_STEP * fit_longest_edge(&p->maps.grid);
+    for (int a = 0; a < 3; a++) {
+        double below[3], above[3];
+        for (int b = 0; b < 3; b++) below[b] = above[b] = x[b];
+        below[a] -= step, above[a] += step;
+        normal[a] = sdm_fit_maps_at(&p->maps, &p->state, above) -
+                    sdm_fit_maps_at(&p->maps, &p->state, below);
+    }
+    const double length = v3_norm(normal);
+    for (int a = 0; a < 3; a++) normal[a] = length > 0 ? normal[a] / length : 0;
+}
+
+/* Splits points into those on the surface, with their normals, and strays, at most MOST in all. */
 static void split_points(const fit_problem *p, cloud *on, cloud *strays)
 {
     const size_t step = (p->samples.n + MOST - 1) / MOST;
@@ -177,21 +201,24 @@ static void split_points(const fit_problem *p, cloud *on, cloud *strays)
         if (i >= p->samples.n) break;
         cloud *c = sdm_fit_point_belongs(&p->observation, p->samples.field[i]) < 0.5 ? strays : on;
         for (size_t a = 0; a < 3; a++) c->x[c->n][a] = p->samples.world[3 * i + a];
+        if (c == on) find_normal(p, c->x[c->n], c->normal[c->n]);
         c->n++;
     }
 }
 
-/* bare[i]: place i of the surface has no points within REACH times the spacing. Strays count: they
-   may lie on the surface of another shape that touches this one. Returns the share of such places.
- */
-static double find_bare(const fit_places *surface, const cloud *on, const cloud *strays,
-                        double reach, bool *bare)
+/* bare[i]: place i of the surface has no points within reach on its side of a wall. Strays count:
+   they may lie on the surface of another shape that touches this one. Returns the share of such
+   places. */
+static double find_bare(const fit_problem *p, const fit_places *surface, const cloud *on,
+                        const cloud *strays, double reach, bool *bare)
 {
     size_t n = 0, number;
     for (size_t i = 0; i < surface->n; i++) {
-        double d2[2];
-        find_nearest(on, surface->world[i], SIZE_MAX, 1, &d2[0], &number);
-        find_nearest(strays, surface->world[i], SIZE_MAX, 1, &d2[1], &number);
+        const double *x = surface->world[i];
+        double normal[3], d2[2];
+        find_normal(p, x, normal);
+        find_nearest(on, x, normal, SIZE_MAX, 1, &d2[0], &number);
+        find_nearest(strays, x, NULL, SIZE_MAX, 1, &d2[1], &number);
         bare[i] = fmin(d2[0], d2[1]) > reach * reach;
         n += bare[i];
     }
@@ -229,7 +256,7 @@ static sdm_status find_within(const fit_places *surface, const bool *bare, doubl
     for (size_t i = 0; i < surface->n; i++) {
         double d2;
         size_t number;
-        find_nearest(&without, surface->world[i], SIZE_MAX, 1, &d2, &number);
+        find_nearest(&without, surface->world[i], NULL, SIZE_MAX, 1, &d2, &number);
         within[i] = d2 > WITHIN * WITHIN * reach * reach;
     }
     sdm_free(without.x);
@@ -310,18 +337,20 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
     cloud on = {0}, strays = {0};
     fit_places surface = {0};
     bool *bare_at = NULL, *within = NULL;
-    double spacing = 0;
+    double spacing = 0, reach = 0;
     sdm_status s = SDM_ALLOC(&on.x, MOST + 1, "points of the fit", err);
+    if (!s) s = SDM_ALLOC(&on.normal, MOST + 1, "points of the fit", err);
     if (!s) s = SDM_ALLOC(&strays.x, MOST + 1, "points of the fit", err);
     if (!s) s = SDM_ALLOC(&bare_at, MOST + 1, "places of the surface", err);
     if (!s) s = SDM_ALLOC(&within, MOST + 1, "places of the surface", err);
     if (!s) split_points(p, &on, &strays);
-    if (!s && on.n > MANY) s = find_spacing(&on, &spacing, err);
+    if (!s && on.n > MANY) s = find_spacing(&on, false, &spacing, err);
+    if (!s && on.n > MANY) s = find_spacing(&on, true, &reach, err);
+    reach = REACH * reach + 3 * p->state.point_sd;
     if (!s && on.n > MANY) s = sdm_fit_places_create(&p->maps, &p->state, MOST, &surface, err);
     if (!s && spacing > 0) {
         const patches found = find_patches(&strays, spacing);
-        const double sd = p->state.point_sd,
-                     bare = find_bare(&surface, &on, &strays, REACH * spacing + 3 * sd, bare_at),
+        const double bare = find_bare(p, &surface, &on, &strays, reach, bare_at),
                      stray = (double)strays.n / (double)(on.n + strays.n);
         const bool other = bare > MOSTLY_UNCOVERED && share_at_bounds(p) >= 0.5;
         const bool grown = stray > fmax(p->opts->tolerance, STRAYS_MAX_UNCOVERED);
@@ -338,7 +367,7 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
             snprintf(beside, sizeof beside,
                      "; or the voxels of the maps, %.2g mm, are too coarse to show its surface",
                      voxel);
-        s = find_within(&surface, bare_at, REACH * spacing + 3 * sd, within, err);
+        s = find_within(&surface, bare_at, reach, within, err);
         const unseen hidden = s ? (unseen){0} : find_unseen(p, r, &surface, bare_at, within);
         if (hidden.most > 0) describe_unseen(&hidden, unseen_text, sizeof unseen_text);
         const bool covered = bare <= UNCOVERED_MAX;
@@ -362,6 +391,7 @@ sdm_status sdm_fit_check_coverage(const fit_problem *p, const sdm_fit_result *r,
     sdm_free(bare_at);
     sdm_free(within);
     sdm_free(on.x);
+    sdm_free(on.normal);
     sdm_free(strays.x);
     sdm_fit_places_dispose(&surface);
     return s;

@@ -23,6 +23,8 @@
 /* A longer training of a kind that errs by more than this multiple of another makes it no better
    than the other. */
 #define MUCH_WORSE 1.5
+// bytes of the part of a note about a command that leaves the kind open
+#define OPEN_NOTE 240
 
 /* Appends an option and its value to a command. */
 static void add_option(sdm_text *command, const char *option, const char *value)
@@ -290,12 +292,19 @@ static bool is_open(const sdm_train_report *r)
     return r->trial_minutes > 0 && !r->tried && !r->compared && !sdm_verdict_broken(&r->verdict);
 }
 
+/* train.minutes that hold the trials of both kinds. factor: by which a map takes longer on the grid
+ * of the training. */
+static double least_minutes(const sdm_train_report *r, double factor)
+{
+    return ceil(10 * factor * r->trial_minutes - 1e-6) / 10;
+}
+
 /* Returns the changes of keys, with train.minutes raised so that they hold the trials of both
  * kinds. factor: by which a map takes longer on the grid of the changes. */
 static sdm_verdict with_trials(const sdm_train_report *r, const sdm_verdict *changes, double factor)
 {
     sdm_verdict v = *changes;
-    const double least = ceil(10 * factor * r->trial_minutes - 1e-6) / 10;
+    const double least = least_minutes(r, factor);
     if (!strcmp(v.key, "train.minutes"))
         v.to = fmax(v.to, least);
     else
@@ -309,16 +318,23 @@ static double finer_factor(const sdm_verdict *v)
     return strcmp(v->key, "grid.spacing") ? 1 : fmax(1, pow(v->from / v->to, 3));
 }
 
-/* The part of a note about a command that leaves the kind open; "": the command names a kind. */
-static const char *open_note(const sdm_train_report *r, char text[200])
+/* The part of a note about a command that leaves the kind open; "": the command names a kind.
+ * minutes: train.minutes that are enough for the kind of this run alone; 0: not known. factor: by
+ * which a map takes longer on the grid of the command. */
+static const char *open_note(const sdm_train_report *r, double minutes, double factor,
+                             char text[OPEN_NOTE])
 {
+    const bool pod = r->kind == SDM_NETWORK_POD;
+    char alone[80] = "";
     *text = '\0';
+    if (minutes > 0 && minutes < least_minutes(r, factor))
+        snprintf(alone, sizeof alone, "; with network.kind=%s %.3g are enough",
+                 pod ? "pod" : "template", minutes);
     if (is_open(r))
-        snprintf(text, 200,
-                 "network.kind stays auto: this run had no time to try %s; at its pace these "
-                 "train.minutes are enough for both kinds, those of the verdict for one%s; ",
-                 r->kind == SDM_NETWORK_POD ? "template" : "pod",
-                 r->kind == SDM_NETWORK_POD ? "; network.kind=template alone needs less" : "");
+        snprintf(text, OPEN_NOTE,
+                 "network.kind stays auto: this run had no time to try %s; at its pace the "
+                 "train.minutes of this command are enough for both kinds%s; ",
+                 pod ? "template" : "pod", alone);
     return text;
 }
 
@@ -345,16 +361,17 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
         return true;
     }
     if (!use || !(factor > 1 && factor <= FINER) || !args->files.n || args->dataset) return false;
-    char open[200];
+    char open[OPEN_NOTE];
     sdm_verdict finer = {.to = spacing,
                          .minutes = r->steps > 0 ? ceil(2 * factor * minutes) / 2 : 0};
     strcpy(finer.key, "grid.spacing");
+    const double alone = finer.minutes;
     if (is_open(r)) finer = with_trials(r, &finer, factor);
     if (!print_command("  better      ", args, r, &finer, is_open(r) ? NULL : kind)) return false;
     printf(
         "              (%sthe finer grid is for %s, see `not for`; it has %.2g times the voxels; "
         "%s, because the error at the surface is only %.2g voxels)\n",
-        open_note(r, open), use, factor, wait, voxels);
+        open_note(r, alone, factor, open), use, factor, wait, voxels);
     return true;
 }
 
@@ -362,14 +379,16 @@ static bool print_enough(const cli_args *args, const sdm_train_report *r, const 
 static void print_note(const sdm_train_report *r, const char *kind, double ms_map)
 {
     const sdm_verdict *v = &r->verdict;
-    char open[200], unfit[SDM_MODEL_UNFIT], time[60] = "";
+    char open[OPEN_NOTE], unfit[SDM_MODEL_UNFIT], time[60] = "";
     sdm_text note = {0};
     sdm_verdict_unfit(v, unfit);
     // the maps of another grid take another time
     if (strncmp(v->key, "grid.", 5))
         snprintf(time, sizeof time, ", whose maps take %.3g ms", ms_map);
     if (is_open(r))
-        sdm_text_add(&note, "%s", open_note(r, open));
+        sdm_text_add(&note, "%s",
+                     open_note(r, strcmp(v->key, "train.minutes") ? v->minutes : v->to,
+                               finer_factor(v), open));
     else if (kind && isfinite(ms_map))
         sdm_text_add(&note, "the kind stays %s%s; without network.kind=%s auto chooses again; ",
                      kind, time, kind);

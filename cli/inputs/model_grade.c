@@ -78,6 +78,7 @@ void cli_print_quality(const sdm_model_info *m)
     // the lines `not for` tell larger errors, of each parameter
     if (!isnan(q->volume_derivative_error) && !strstr(q->unfit, "derivatives of the volume by"))
         cli_print(
-            "             derivatives of volumes are off by %.3g %% for the worst parameter\n",
+            "             derivatives of volumes are off by %.3g %% for the worst parameter (%% of "
+            "the derivative, or of 5 %% of the volume over the range if that is larger)\n",
             100 * q->volume_derivative_error);
 }

@@ -70,9 +70,9 @@ static void print_derivatives(const sdm_verdict *v)
         (int)v->derivative_shapes, cli_percent(v->derivative_error, text), v->derivative_by);
     if (v->volume_derivatives_bad[0] || v->volume_derivatives_small[0])
         printf("; of volumes: see `not for`");
-    else if (isfinite(v->volume_derivative_error))
-        printf(", of volumes by %s %% (by %s)", cli_percent(v->volume_derivative_error, text),
-               v->volume_derivative_by);
+    else if (isfinite(v->volume_own_error))
+        printf(", of volumes by %s %% (by %s)", cli_percent(v->volume_own_error, text),
+               v->volume_own_by);
     printf("\n");
 }
 

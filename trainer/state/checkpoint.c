@@ -335,9 +335,9 @@ static bool report_is_sound(const sdm_train_report *r)
            ends(v->volume_derivatives_small, SDM_VERDICT_LIST) &&
            ends(v->volume_causes, SDM_VERDICT_LIST) && ends(v->still_params, SDM_VERDICT_LIST) &&
            ends(v->derivative_by, sizeof v->derivative_by) &&
-           ends(v->volume_derivative_by, sizeof v->volume_derivative_by) && r->steps >= 0 &&
-           r->seconds >= 0 && ends(r->model_path, sizeof r->model_path) &&
-           ends(r->other_path, sizeof r->other_path) &&
+           ends(v->volume_derivative_by, sizeof v->volume_derivative_by) &&
+           ends(v->volume_own_by, sizeof v->volume_own_by) && r->steps >= 0 && r->seconds >= 0 &&
+           ends(r->model_path, sizeof r->model_path) && ends(r->other_path, sizeof r->other_path) &&
            (unsigned)r->other_grade <= SDM_GRADE_POOR && is_bool(&r->compared) &&
            is_bool(&r->tried) && is_bool(&r->unfinished) && is_bool(&r->chosen) &&
            is_bool(&v->limited) && (unsigned)v->grade <= SDM_GRADE_POOR &&

@@ -437,7 +437,7 @@ static void set_derivatives(const trainer *t, const derivative_check *c, sdm_ver
     v->derivative_shapes = (int64_t)c->shapes;
     v->derivative_error = c->slope;
     v->volume_derivative_error = c->volume_slope;
-    v->volume_derivative_voxels = NAN;
+    v->volume_derivative_voxels = v->volume_own_error = NAN;
     if (c->shapes) trainer_list_still(p, c->still, n, v->still_params);
     if (isfinite(c->slope)) trainer_list_derivatives(p, c->slopes, n, v->derivatives_bad);
     if (isfinite(c->volume_slope)) {
@@ -445,6 +445,10 @@ static void set_derivatives(const trainer *t, const derivative_check *c, sdm_ver
         for (size_t k = 0; k < n; k++) {
             large[k] = c->volume_small[k] ? NAN : c->volume_own[k];
             small[k] = c->volume_small[k] ? c->volume_own[k] : NAN;
+            if (!(c->volume_own[k] <= v->volume_own_error) && isfinite(c->volume_own[k])) {
+                v->volume_own_error = c->volume_own[k];
+                snprintf(v->volume_own_by, sizeof v->volume_own_by, "%.60s", p[k].name);
+            }
         }
         trainer_list_derivatives(p, large, n, v->volume_derivatives_bad);
         trainer_list_causes(p, large, c->voxels_slopes, n, v->volume_causes);

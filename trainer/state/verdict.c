@@ -197,6 +197,8 @@ void sdm_verdict_json(sdm_json *j, const sdm_verdict *v)
     sdm_json_text(j, "derivative_by", v->derivative_by);
     sdm_json_real(j, "volume_derivative_error", v->volume_derivative_error);
     sdm_json_text(j, "volume_derivative_by", v->volume_derivative_by);
+    sdm_json_real(j, "volume_own_error", v->volume_own_error);
+    sdm_json_text(j, "volume_own_by", v->volume_own_by);
     sdm_json_real(j, "volume_derivative_voxels", v->volume_derivative_voxels);
     sdm_json_text(j, "triangles_by", v->triangles_by);
     sdm_json_real(j, "fall", v->fall);

@@ -108,6 +108,11 @@ typedef struct sdm_verdict {
     /* a parameter that changes the numbers of vertices or the triangles of the mesh, so that
        vertices do not correspond; "": none was found */
     char triangles_by[64];
+    /* error of the derivative of the volume over its own root mean square, however small, of the
+       parameter for which it is worst, and the name of this parameter; NaN, "": not measured, or
+       no parameter changes the volume */
+    double volume_own_error;
+    char volume_own_by[64];
     double saved_seconds; /* that train.patience has saved */
     bool limited;         /* false: nothing that could be measured limits the model */
     sdm_cause limit;

@@ -93,8 +93,9 @@ static void show_progress(void *user, const sdm_fit_progress *p)
         snprintf(text, sizeof text, "candidate %zu of %zu, ", w->f->candidate, w->f->n_candidates);
     if (w->f->at_mirror) strcat(text, "mirror image, ");
     const size_t used = strlen(text), n = p->iteration - w->before,
-                 most = 2 *
-                        (p->phase == SDM_FIT_POLISH ? o->max_polish_iterations : o->max_iterations);
+                 most = 2 * (p->phase == SDM_FIT_POLISH && o->max_polish_iterations
+                                 ? o->max_polish_iterations
+                                 : o->max_iterations);
     // a fit that goes on from another pose or value may need more
     char limit[40] = "";
     if (n <= most) snprintf(limit, sizeof limit, " of at most %zu", most);

@@ -93,14 +93,16 @@ void cli_fit_print_next(const cli_fit *f)
     for (size_t i = 0; i < a->files.n; i++) cli_add_next_word(&t, a->files.items[i]);
     for (size_t i = 0; i < a->n_given; i++) {
         const cli_option *o = a->given[i].option;
-        if (is_left_out(o->name, more && !finer)) continue;
+        if (is_left_out(o->name, more && !finer && !r->polished)) continue;
         if (o->kind == CLI_FLAG) {
             sdm_text_add(&t, " --%s", o->name);
         } else {
             add_option(&t, o->name, a->given[i].value);
         }
     }
-    if (f->model_path && !more) sdm_text_add(&t, voxels ? " --exact" : " --polish");
+    // a polish is over that ran out of iterations: exact maps from its end go on
+    if (f->model_path && (!more || r->polished))
+        sdm_text_add(&t, voxels || more ? " --exact" : " --polish");
     if (more && !lacks)
         sdm_text_add(&t, " --max-iterations=%zu", iterations > usual ? iterations : usual);
     if ((voxels && !more) || finer) {

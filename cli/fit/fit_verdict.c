@@ -175,7 +175,7 @@ static bool a_part_by_network(const cli_fit *f)
  * data show nothing, the errors of its map pass for data. */
 static bool tells_usable(const cli_fit *f)
 {
-    const bool network = f->model_path && !f->args->fit.exact && !f->args->fit.polish;
+    const bool network = f->source.model && !f->result.polished;
     return passed_with_open(f) || (only_a_part(f) && cli_fit_knows_usable(f) && !network);
 }
 

@@ -338,12 +338,22 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
     if (!average || !(exact || end->flat))
         return maximise_between(p, newton, end, max_iterations, eps, err);
     // averaged gradient
+    const fit_state plain = p->state;
+    const fit_newton_end first = *end;
+    const fit_recent recent = p->recent;
+    const double objective = sdm_fit_objective(p);
     newton->averaged = true;
     newton->max_iterations = max_iterations;
     newton->eps = eps;
     newton->max_flat = 0;
     sdm_fit_averaging_begin(p);
     if (near) s = maximise_settled(p, newton, end, err);
+    // of points, whose likelihood has no error of maps, plain steps may have come higher
+    if (!s && fit_maps_direct(&p->maps) && sdm_fit_objective(p) < objective - GAIN_EVEN) {
+        p->state = plain, *end = first, p->recent = recent;
+        p->maps_params[0] = NAN;
+        return sdm_fit_evaluate(p, err);
+    }
     if (!s) s = maximise_between(p, newton, end, max_iterations, eps, err);
     sdm_fit_averaging_end(p);
     return s ? s : sdm_fit_evaluate(p, err);
@@ -413,7 +423,17 @@ static sdm_status start_find(fit_problem *p, sdm_fit_result *out, sdm_error *err
     return s;
 }
 
-/* Runs the main phase and, if the options set max_polish_iterations, a polish: more iterations with
+/* Largest number of iterations of a polish after the main phase. A fit to points that does not
+ * converge with a network goes on with exact distances, which need no maps. */
+static size_t polish_iterations(const fit_problem *p, const fit_newton_end *end)
+{
+    const bool points = p->target->kind == SDM_FIT_POINTS;
+    if (!p->source->model || !p->source->shape || (!end->converged && !points)) return 0;
+    if (p->opts->max_polish_iterations) return p->opts->max_polish_iterations;
+    return end->converged || p->is_rival ? 0 : p->opts->max_iterations;
+}
+
+/* Runs the main phase and, if the options or points ask for it, a polish: more iterations with
  * exact maps after a fit with a network. */
 static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
@@ -430,12 +450,13 @@ static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     const char *what = p->source->model ? "fit" : "fit with exact maps";
     // polish: the appearance restarts, because it may have modelled the network's errors as a
     // tissue
-    if (!s && end.converged && p->source->model && p->source->shape && o->max_polish_iterations) {
+    const size_t polish = s ? 0 : polish_iterations(p, &end);
+    if (polish) {
         p->maps.exact = true;
         p->state.appearance = o->appearance;
         p->maps_params[0] = NAN;
         newton.phase = SDM_FIT_POLISH;
-        newton.max_iterations = o->max_polish_iterations;
+        newton.max_iterations = polish;
         what = "polish with exact maps";
         s = maximise_twice(p, &newton, &end, err);
     }

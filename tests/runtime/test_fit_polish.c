@@ -42,10 +42,10 @@ static const sdm_shape knob = {.abi = SDM_SHAPE_ABI,
                                .n_params = KNOB_PARAMS,
                                .mesh = knob_mesh};
 
-// The points of the surface draw the end of the rod back, as in a fit without a network.
-static void test_polish_draws_an_end_back(void **state)
+// Fits points of the knob with a network and then with exact distances, in at most so many
+// iterations. The caller disposes of the result.
+static sdm_fit_result fit_knob(size_t max_iterations, size_t max_polish_iterations)
 {
-    (void)state;
     const sdm_grid grid = sdm_grid_centred((int64_t[3]){17, 17, 17}, 0.5, (double[3]){0, 0, 1});
     sdm_model *ball = ball_model("length", &grid, NULL);
     sdm_instance *shape = NULL;
@@ -58,22 +58,47 @@ static void test_polish_draws_an_end_back(void **state)
     const sdm_fit_source source = {.model = ball, .shape = shape};
     const sdm_fit_target target = {.kind = SDM_FIT_POINTS, .points = x, .n_points = POINTS};
     sdm_fit_opts o = sdm_fit_defaults();
-    o.max_polish_iterations = 120;
+    o.max_iterations = max_iterations;
+    o.max_polish_iterations = max_polish_iterations;
     sdm_fit_result r;
     sdm_error err = {0};
     const sdm_status s = sdm_fit(&source, &target, &o, &r, &err);
     if (s && s != SDM_E_QUALITY) fail_msg("%s", err.text);
-    if (!(r.polished && fabs(r.params[LENGTH] - TRUTH[LENGTH]) < 0.02))
-        fail_msg("polished %d, length %g +- %g: %s", r.polished, r.params[LENGTH], r.sd[LENGTH],
-                 err.text);
-    sdm_fit_dispose(&r);
     sdm_mesh_dispose(&m);
     sdm_instance_free(shape);
     sdm_model_free(ball);
+    return r;
+}
+
+// The points of the surface draw the end of the rod back, as in a fit without a network. The polish
+// is made whether the network's fit converges or not, and then also if it was not asked for.
+static void test_polish_draws_an_end_back(void **state)
+{
+    (void)state;
+    static const struct {
+        size_t iterations, polish;
+    } cases[] = {{60, 120}, {1, 120}, {3, 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        sdm_fit_result r = fit_knob(cases[i].iterations, cases[i].polish);
+        if (!(r.polished && fabs(r.params[LENGTH] - TRUTH[LENGTH]) < 0.02))
+            fail_msg("%zu: polished %d, length %g +- %g, %s", i, r.polished, r.params[LENGTH],
+                     r.sd[LENGTH], r.reason);
+        sdm_fit_dispose(&r);
+    }
+}
+
+// A network's fit that converges has no polish, unless it was asked for.
+static void test_no_polish(void **state)
+{
+    (void)state;
+    sdm_fit_result r = fit_knob(60, 0);
+    if (r.polished || !r.converged) fail_msg("polished %d: %s", r.polished, r.reason);
+    sdm_fit_dispose(&r);
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_polish_draws_an_end_back)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_polish_draws_an_end_back),
+                                       cmocka_unit_test(test_no_polish)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -42,6 +42,10 @@
 // averaged gradients: an acceleration changes no unknown by more than this factor times the largest
 // component of the plain step
 #define ACCELERATION_FACTOR 4.0
+// averaged gradients of points: a step that loses more log-likelihood is halved, so many times at
+// most
+#define DROP_MAX 1.0
+#define HALVINGS_MAX 8
 
 void sdm_fit_state_move(const fit_problem *p, const fit_state *from, const double *step,
                         fit_state *to)
@@ -302,8 +306,26 @@ static sdm_status accelerated_step(fit_problem *p, const fit_newton_opts *opts, 
     return s;
 }
 
-/* One accelerated step with the averaged gradient. The objective is not tested: the step may cross
- * the kink that is the maximum. */
+/* Moves by a step with the averaged gradient and evaluates. The objective may drop a little: the
+ * step may cross the kink that is the maximum. Where it drops further, the difference quotients of
+ * points mislead: *step is halved until it does not. *whole: it was not halved. */
+static sdm_status averaged_move(fit_problem *p, double *step, bool *whole, sdm_error *err)
+{
+    const fit_state from = p->state;
+    const double least = sdm_fit_objective(p) - DROP_MAX;
+    *whole = true;
+    for (int halving = 0;; halving++) {
+        sdm_fit_state_move(p, &from, step, &p->state);
+        const sdm_status s = sdm_fit_evaluate(p, err);
+        if (s || !fit_maps_direct(&p->maps) || sdm_fit_objective(p) >= least ||
+            halving == HALVINGS_MAX)
+            return s;
+        for (size_t i = 0; i < p->information.n_unknowns; i++) step[i] *= 0.5;
+        *whole = false;
+    }
+}
+
+/* One accelerated step with the averaged gradient. */
 static sdm_status averaged_step(fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
                                 double *step, double *plain, double *work, fit_try *out,
                                 sdm_error *err)
@@ -317,10 +339,10 @@ static sdm_status averaged_step(fit_problem *p, const fit_newton_opts *opts, fit
     out->deviations = deviations_of(p, step);
     memcpy(plain, step, p->information.n_unknowns * sizeof *plain);
     step_accelerate(p, opts, r, step);
-    const fit_state from = p->state;
-    sdm_fit_state_move(p, &from, step, &p->state);
-    s = sdm_fit_evaluate(p, err);
-    if (!s) acceleration_advance(p, opts, r, step);
+    bool whole;
+    s = averaged_move(p, step, &whole, err);
+    if (!s && whole) acceleration_advance(p, opts, r, step);
+    if (!whole) r->anderson.count = 0;
     return s;
 }
 

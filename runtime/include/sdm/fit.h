@@ -226,7 +226,8 @@ typedef struct sdm_fit_opts {
        its end have as many again */
     size_t max_iterations;
     /* largest number of iterations of the polish, with the exact engine after a network's fit,
-       counted in the same way; 0: no polish; 40 are enough */
+       counted in the same way; 40 are enough. 0: no polish, unless a fit to points has not
+       converged in the main phase: it goes on with at most max_iterations of exact distances */
     size_t max_polish_iterations;
     /* > 0: the steps end when the largest component of a step is at most eps. Components are the
        change of a parameter over its range, of the rotation in rad, and of the translation over the

@@ -67,7 +67,9 @@ static void print_stages(const sdm_train_work *w, const sdm_train_plan *p)
 static void print_budget(const sdm_config *c, const sdm_train_work *w, const sdm_train_plan *p)
 {
     char a[32], b[32], made[64], all[64], later[64];
-    const double online = (double)c->data.online, before = w->n_holdout + w->n_maps - online,
+    // a template without a correction needs held-out maps only
+    const double online = w->n_maps > 0 ? (double)c->data.online : 0,
+                 before = w->n_holdout + w->n_maps - online,
                  seconds = p->seconds[SDM_PLAN_DESIGN] +
                            p->seconds[SDM_PLAN_MAPS] * before / (w->n_holdout + w->n_maps),
                  half = 30 * c->train.minutes;

@@ -71,6 +71,7 @@ expect 0 - sdmgen train "$source_folder/configs/linkage.yaml" network.kind=auto 
 has '^  trials   7 maps +[0-9.e-]+ s  0 B +short trainings'
 # A template whose parts need no correction makes no maps for the training and no steps.
 expect 0 - sdmgen train "$source_folder/configs/linkage.yaml" network.kind=template grid=auto grid.voxels=24 --plan -q
+has '^  budget   train\.minutes is 4: the maps before training take [0-9.e-]+ m?s of it, the rest is for as many steps as fit$'
 has '^  maps     [0-9]+ maps '
 grep -q '^  refine' out && bad 'steps of a template without a correction'
 expect 2 '--nodes and --cores belong to --plan' sdmgen train "$tiny" --nodes 2

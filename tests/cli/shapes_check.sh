@@ -38,6 +38,15 @@ has '^21 of 21 shapes have groups of parts that meet no other part'
 expect 0 - sdmgen shapes check faulty -O fault=meets --plugin "$plugin" --samples 64
 has "^note +part 1 of 2 \(12 triangles, .*\) and part 2 of 2 \(.*\) meet in [0-9]+ of 69 shapes and lie apart in the others: 'reach' decides, they meet up to about reach=1\.[56][0-9]*; the surface joins or splits there, where a network errs most"
 
+# Where another part covers them, the surface neither joins nor splits. Parts that stand in another one join above it.
+for fault in hidden grows; do
+    expect 0 - sdmgen shapes check faulty -O fault=$fault --plugin "$plugin" --samples 64
+    has '^fine: '
+    if grep -q 'joins or splits' out; then bad "parts that meet inside of another one: $(cat out)"; fi
+done
+expect 0 - sdmgen shapes check faulty -O fault=posts --plugin "$plugin" --samples 64
+has "^note +part 2 of 3 \(.*\) and part 3 of 3 \(.*\) meet in [0-9]+ of 69 shapes and lie apart in the others: 'reach' decides, they meet from about reach=1\.[56][0-9]*; the surface joins or splits there"
+
 # faulty FAULT CODE PATTERN: the finding is a line of the output.
 faulty() {
     local word=warning

@@ -1,5 +1,5 @@
 /* Audits of the parts of a mesh: boxes whose volumes, unions and orientations are known.
- * Tests: part_audit.c part_fold.c part_gap.c part_thickness.c */
+ * Tests: part_audit.c part_fold.c part_gap.c part_meeting.c part_thickness.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -435,6 +435,165 @@ static void test_loop_in_another_part(void **state)
     }
 }
 
+/* A box low .. high. */
+typedef struct box {
+    double low[3], high[3];
+} box;
+
+/* Adds the box; inside_out: its triangles are reversed. */
+static void add(sdm_mesh *m, const box *b, bool inside_out)
+{
+    sdm_mesh one = {0};
+    mesh_box(&one, b->low, b->high);
+    if (inside_out) mesh_flip(&one);
+    const size_t v = m->n_vert, t = m->n_tri;
+    if (sdm_mesh_reserve(m, v + one.n_vert, t + one.n_tri, &err)) fail_msg("%s", err.text);
+    memcpy(m->vert + 3 * v, one.vert, 3 * one.n_vert * sizeof *one.vert);
+    for (size_t i = 0; i < 3 * one.n_tri; i++) m->tri[3 * t + i] = one.tri[i] + (uint32_t)v;
+    sdm_mesh_dispose(&one);
+}
+
+static sdm_part_audit meetings_of(const sdm_mesh *m)
+{
+    sdm_part_audit a;
+    if (sdm_part_audit_make(m, SDM_AUDIT_MEETINGS, NULL, &a, &err)) fail_msg("%s", err.text);
+    return a;
+}
+
+// Two bars and a body. They meet inside of the body, outside, through its wall, in its cavity, and
+// on its flat bottom, which covers them.
+static void test_meetings_in_a_third_part(void **state)
+{
+    (void)state;
+    enum { NONE, INSIDE, PARTLY, OUTSIDE };
+    static const box body = {{-2, -2, -2}, {2, 2, 2}}, hole = {{-1, -1, -1}, {1, 1, 1}};
+    static const struct {
+        box a, b;
+        bool hole;
+        int meet;
+    } cases[] = {
+        {{{-0.5, -0.4, -0.4}, {4, 0.4, 0.4}}, {{-0.3, -0.3, -0.3}, {0.3, 0.3, 4}}, false, INSIDE},
+        {{{-0.5, -0.4, -0.4}, {4, 0.4, 0.4}}, {{-0.3, -0.3, -0.3}, {0.3, 0.3, 4}}, true, OUTSIDE},
+        {{{-0.5, -0.4, -0.4}, {4, 0.4, 0.4}}, {{2.5, -0.3, -0.3}, {3, 0.3, 4}}, false, OUTSIDE},
+        {{{-0.5, -0.4, -0.4}, {4, 0.4, 0.4}}, {{1.5, -0.3, -0.3}, {3, 0.3, 4}}, false, PARTLY},
+        {{{-0.5, -0.4, -0.4}, {4, 0.4, 0.4}}, {{-0.3, -0.3, 1}, {0.3, 0.3, 4}}, false, NONE},
+        {{{-0.5, -0.4, -2}, {0.5, 0.4, 1}}, {{-0.3, -0.6, -2}, {0.3, 0.3, 1.5}}, false, INSIDE},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        for (int turned = 0; turned < 2; turned++) { // the engine turns the whole mesh
+            sdm_mesh m = {0};
+            add(&m, &cases[i].a, turned);
+            add(&m, &body, turned);
+            add(&m, &cases[i].b, turned);
+            if (cases[i].hole) add(&m, &hole, !turned);
+            sdm_part_audit a = meetings_of(&m);
+            for (size_t k = 0; k < 3; k += 2) {
+                const uint32_t other = (uint32_t)1 << (2 - k);
+                if (!(a.part[k].meets & other) != (cases[i].meet == NONE) ||
+                    !(a.part[k].meets_outside & other) != (cases[i].meet != OUTSIDE) ||
+                    !(a.part[k].meets_partly & other) != (cases[i].meet != PARTLY))
+                    fail_msg("case %zu, part %zu: %x, %x, %x", i, k, a.part[k].meets,
+                             a.part[k].meets_outside, a.part[k].meets_partly);
+            }
+            sdm_part_audit_dispose(&a);
+            sdm_mesh_dispose(&m);
+        }
+}
+
+// Two bars side by side on a body share a face, or an edge only; inside of the body they share a
+// face, too.
+static void test_meetings_of_shared_edges(void **state)
+{
+    (void)state;
+    static const box body = {{-2, -2, -2}, {2, 2, 2}};
+    for (int inside = 0; inside < 2; inside++)
+        for (int edge = 0; edge < 2; edge++) {
+            const double low = inside ? -1 : 3, y = edge ? 1 : 0;
+            const box a = {{0, 0, low}, {1, 1, low + 1}}, b = {{1, y, low}, {1.5, y + 1, low + 1}},
+                      foot = {{-0.5, 0.3, -1}, {0.5, 0.5, low + 0.5}};
+            sdm_mesh m = {0};
+            add(&m, &body, false);
+            add(&m, &a, false);
+            add(&m, &b, false);
+            add(&m, &foot, false);
+            sdm_part_audit audit = meetings_of(&m);
+            assert_int_equal(audit.n, 4);
+            assert_true(audit.part[1].meets & 4);
+            assert_int_equal(!(audit.part[1].meets_outside & 4), inside);
+            assert_int_equal(!(audit.part[2].meets_outside & 2), inside);
+            sdm_part_audit_dispose(&audit);
+            sdm_mesh_dispose(&m);
+        }
+}
+
+/* Does the box hold x, if it is larger by this on each side? */
+static bool holds(const box *b, const double x[3], double larger)
+{
+    bool in = true;
+    for (int d = 0; d < 3; d++) in = in && x[d] > b->low[d] - larger && x[d] < b->high[d] + larger;
+    return in;
+}
+
+// Random boxes against the corners of the curve along which two of them meet: those of their common
+// box that lie on a face of each.
+static void test_meetings_of_random_boxes(void **state)
+{
+    (void)state;
+    uint32_t seed = 7;
+    size_t seen[3] = {0};
+    for (int n = 0; n < 4000; n++) {
+        box b[3];
+        for (int i = 0; i < 3; i++)
+            for (int d = 0; d < 3; d++) {
+                double x[2];
+                for (int k = 0; k < 2; k++)
+                    x[k] = (seed = seed * 1664525 + 1013904223) / 4294967296.0;
+                b[i].low[d] = 4 * x[0];
+                b[i].high[d] = b[i].low[d] + 1 + (i ? 2 : 5) * x[1];
+            }
+        bool meet = true, reached = true, clear = true;
+        for (int d = 0; d < 3; d++) {
+            const double low = fmax(b[1].low[d], b[2].low[d]),
+                         high = fmin(b[1].high[d], b[2].high[d]);
+            meet = meet && high > low + 0.1;
+            // the third box reaches the common one
+            reached = reached && low < b[0].high[d] + 0.1 && high > b[0].low[d] - 0.1;
+        }
+        size_t corners = 0, out = 0;
+        for (int c = 0; c < 8 && meet; c++) {
+            double x[3];
+            int of[2] = {0, 0};
+            for (int d = 0; d < 3; d++) {
+                const bool upper = c >> d & 1;
+                const double u = upper ? b[1].high[d] : b[1].low[d],
+                             v = upper ? b[2].high[d] : b[2].low[d];
+                const int from = (u < v) != upper; // whose face it is
+                x[d] = from ? v : u;
+                of[from]++;
+            }
+            if (!of[0] || !of[1]) continue;
+            corners++;
+            out += !holds(&b[0], x, 0);
+            clear = clear && holds(&b[0], x, 0.1) == holds(&b[0], x, -0.1);
+        }
+        if (!corners || !clear) continue;
+        sdm_mesh m = {0};
+        for (int i = 0; i < 3; i++) add(&m, &b[i], false);
+        sdm_part_audit a = meetings_of(&m);
+        const sdm_part *p = &a.part[1];
+        const bool outside = p->meets_outside >> 2 & 1, partly = p->meets_partly >> 2 & 1;
+        if (!(p->meets >> 2 & 1) || (outside && partly) || (outside || partly) != (out > 0) ||
+            (!reached && !outside))
+            fail_msg("boxes %d: %zu of %zu corners outside, %d, %d", n, out, corners, outside,
+                     partly);
+        seen[outside ? 2 : partly]++;
+        sdm_part_audit_dispose(&a);
+        sdm_mesh_dispose(&m);
+    }
+    if (!(seen[0] > 50 && seen[1] > 50 && seen[2] > 50))
+        fail_msg("%zu, %zu, %zu", seen[0], seen[1], seen[2]);
+}
+
 // Vertices of no triangle: their number, and the first run of them.
 static void test_unused_vertices(void **state)
 {
@@ -580,6 +739,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_overlapping_parts),
         cmocka_unit_test(test_unused_vertices),
+        cmocka_unit_test(test_meetings_in_a_third_part),
+        cmocka_unit_test(test_meetings_of_shared_edges),
+        cmocka_unit_test(test_meetings_of_random_boxes),
         cmocka_unit_test(test_parts_that_share_an_edge),
         cmocka_unit_test(test_boxes_with_a_common_face),
         cmocka_unit_test(test_cavity_and_parts_apart),

@@ -21,7 +21,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
      "meets|groups|crumb|spare|offset|around|unlisted|sticky|diagonal|negative|window|swapped|"
-     "cache|caches|lapse|pair",
+     "cache|caches|lapse|pair|hidden|grows|posts",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -58,6 +58,35 @@ static inline void faulty_wound(const double *p, size_t boxes, sdm_mesh_out *out
         for (size_t k = 0; k < 12; k++)
             out->tri[36 * boxes + 12 * i + k] = (uint32_t)(8 * boxes) + tri[k];
     }
+}
+
+/* A mast and a handle that meet from a reach of 1.6 on inside of the body (`hidden`), that meet
+ * inside of the body always and from there on above it (`grows`), or that stand in the body and
+ * meet from there on (`posts`). */
+static inline int faulty_is_posts(const char *fault)
+{
+    return !strcmp(fault, "hidden") || !strcmp(fault, "grows") || !strcmp(fault, "posts");
+}
+
+static inline void faulty_posts(const char *fault, const double *p, sdm_mesh_out *out,
+                                double handle[2][3])
+{
+    static const double MAST[2][3] = {{-0.3, -0.3, 0}, {0.3, 0.3, 4}};
+    const int grows = !strcmp(fault, "grows"), posts = !strcmp(fault, "posts");
+    handle[0][0] = grows ? -0.1 : 1.9 - p[1];
+    if (posts) handle[1][0] = handle[0][0] + 0.5;
+    if (grows) handle[1][2] = p[0] + p[1] - 1.6;
+    if (posts) handle[1][2] = 3.5;
+    faulty_box(out, 2, MAST[0], MAST[1], 0);
+}
+
+/* How fast vertex v of the handle and the mast moves along axis d, by the size and by the reach. */
+static inline void faulty_posts_velocity(const char *fault, size_t v, size_t d, double by[2])
+{
+    const int grows = !strcmp(fault, "grows"), posts = !strcmp(fault, "posts"),
+              far = v & 1 && !posts, top = d == 2 && v >> 2 & 1 && grows;
+    by[0] = v < 16 && ((d == 0 && far) || top);
+    by[1] = v >= 16 ? 0 : d == 0 ? (far ? 1 : grows ? 0 : -1) : top;
 }
 
 /* Faults that a process of its own keeps from the program. */
@@ -147,7 +176,10 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     }
     const int groups = !strcmp(fault, "groups"); // body and mast, handle and knob
     const int crumb = !strcmp(fault, "crumb");   // a part in m, which lies inside the body
-    const size_t boxes = groups ? 4 : crumb || (!strcmp(fault, "sizes") && is_large) ? 3 : 2;
+    const int stand = faulty_is_posts(fault);
+    const size_t boxes = groups                                                    ? 4
+                         : stand || crumb || (!strcmp(fault, "sizes") && is_large) ? 3
+                                                                                   : 2;
     const size_t less = !strcmp(fault, "open");
     // 8 vertices far away, which no triangle uses
     const size_t spare = strcmp(fault, "spare") ? 0 : 8;
@@ -196,7 +228,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         faulty_box(out, 2, knob[0], knob[1], 0);
         faulty_box(out, 3, mast[0], mast[1], 0);
     }
-    if (boxes == 3) {
+    if (stand) faulty_posts(fault, p, out, handle);
+    if (boxes == 3 && !stand) {
         const double unit = crumb ? 0.001 : 1, edge = crumb ? 15 * unit : 11;
         const double far[2][3] = {{10 * unit, 10 * unit, 10 * unit}, {edge, edge, edge}};
         faulty_box(out, 2, far[0], far[1], 0);
@@ -238,6 +271,13 @@ static int faulty_velocity(const void *self, const sdm_host *host, const sdm_opt
     memset(velocity, 0, 6 * n_vert * sizeof *velocity);
     for (size_t v = 0; v < n_vert; v++) {
         for (size_t d = 0; d < 3 && v < 8; d++) velocity[3 * v + d] = v >> d & 1 ? 1 : -1;
+        for (size_t d = 0; d < 3 && v >= 8 && faulty_is_posts(options[0].text); d++) {
+            double by[2];
+            faulty_posts_velocity(options[0].text, v, d, by);
+            velocity[3 * v + d] = by[0];
+            velocity[3 * (n_vert + v) + d] = by[1];
+        }
+        if (faulty_is_posts(options[0].text)) continue;
         if (v < 8 || v >= 24 || (spare && v >= 16)) continue;
         velocity[3 * v] = 1;
         velocity[3 * (n_vert + v)] = moves || v >= 16 || v & 1 ? (wrong ? 1.01 : 1) : 0;

@@ -78,6 +78,31 @@ static void parts_begin_to_meet(void **state)
     }
 }
 
+// Parts that begin to meet inside of another part, or whose meeting grows out of another part, do
+// not count. Parts that stand in another part and meet above and in it count.
+static void parts_meet_in_another(void **state)
+{
+    (void)state;
+    static const char *const covered[] = {"hidden", "grows"};
+    for (size_t i = 0; i < 2; i++) {
+        sdm_shape_survey s = survey(covered[i]);
+        assert_int_equal(s.failed.shapes + s.open.shapes + s.apart.shapes, 0);
+        assert_int_equal(s.meeting.pairs, 0);
+        sdm_shape_survey_dispose(&s);
+    }
+    sdm_shape_survey s = survey("posts");
+    const sdm_survey_meeting *m = &s.meeting;
+    size_t meet = 0;
+    for (size_t i = 0; i < s.n; i++) meet += s.p[2 * i + 1] > 1.6;
+    assert_int_equal(m->pairs, 1);
+    assert_true(m->part[0] == 1 && m->part[1] == 2);
+    assert_int_equal(m->meet, meet);
+    assert_int_equal(m->apart, s.n - meet);
+    assert_true(m->param == 1 && !m->below && m->odd == 0);
+    if (!(fabs(m->value - 1.6) < 0.05)) fail_msg("at %g", m->value);
+    sdm_shape_survey_dispose(&s);
+}
+
 // The survey finds a parameter that moves only vertices inside of another part, and finds no other
 // parameter. A brief survey does not look for such parameters, nor does one of broken meshes.
 static void parameters_that_move_no_surface(void **state)
@@ -818,6 +843,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(parameters_that_move_no_surface),
         cmocka_unit_test(parts_begin_to_meet),
+        cmocka_unit_test(parts_meet_in_another),
         cmocka_unit_test(without_faults),
         cmocka_unit_test(parts_that_are_inside_out),
         cmocka_unit_test(broken_meshes),

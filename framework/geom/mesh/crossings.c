@@ -36,11 +36,33 @@ static int ray_meets_box(const sdm_bvh_node *n, const ray *r)
     return r->direction > 0 ? n->hi[x] >= r->p[0] : n->lo[x] <= r->p[0];
 }
 
-static int is_skipped(uint32_t t, const uint32_t *skip, size_t n_skip)
+/* The triangles that do not count: skip[n_skip], and those of two parts unless part_of is NULL. */
+typedef struct left_out {
+    const uint32_t *skip, *part_of;
+    size_t n_skip;
+    uint32_t part[2];
+} left_out;
+
+static int is_left_out(uint32_t t, const left_out *l)
 {
-    for (size_t i = 0; i < n_skip; i++)
-        if (skip[i] == t) return 1;
-    return 0;
+    for (size_t i = 0; i < l->n_skip; i++)
+        if (l->skip[i] == t) return 1;
+    return l->part_of && (l->part_of[t] == l->part[0] || l->part_of[t] == l->part[1]);
+}
+
+static int count_crossings(const sdm_mesh *m, const sdm_bvh *tree, const ray *r, const left_out *l)
+{
+    uint32_t stack[SDM_BVH_DEPTH];
+    int top = 0, winding = 0;
+    if (ray_meets_box(&tree->node[0], r)) stack[top++] = 0;
+    while (top) {
+        const sdm_bvh_node *n = &tree->node[stack[--top]];
+        for (uint32_t i = n->first; n->count && i < n->first + n->count; i++)
+            if (!is_left_out(tree->order[i], l)) winding += ray_crossing(m, tree->order[i], r);
+        for (uint32_t c = n->first; !n->count && c < n->first + 2; c++)
+            if (ray_meets_box(&tree->node[c], r)) stack[top++] = c;
+    }
+    return winding;
 }
 
 int sdm_ray_winding(const sdm_mesh *m, const sdm_bvh *tree, const double p[3], int axis,
@@ -48,18 +70,7 @@ int sdm_ray_winding(const sdm_mesh *m, const sdm_bvh *tree, const double p[3], i
 {
     const int y = (axis + 1) % 3, z = (axis + 2) % 3;
     const ray r = {{p[axis], p[y], p[z]}, {axis, y, z}, direction};
-    uint32_t stack[SDM_BVH_DEPTH];
-    int top = 0, winding = 0;
-    if (ray_meets_box(&tree->node[0], &r)) stack[top++] = 0;
-    while (top) {
-        const sdm_bvh_node *n = &tree->node[stack[--top]];
-        for (uint32_t i = n->first; n->count && i < n->first + n->count; i++)
-            if (!is_skipped(tree->order[i], skip, n_skip))
-                winding += ray_crossing(m, tree->order[i], &r);
-        for (uint32_t c = n->first; !n->count && c < n->first + 2; c++)
-            if (ray_meets_box(&tree->node[c], &r)) stack[top++] = c;
-    }
-    return winding;
+    return count_crossings(m, tree, &r, &(left_out){.skip = skip, .n_skip = n_skip});
 }
 
 int sdm_ray_winding_along(const sdm_mesh *m, const sdm_bvh *tree, const double p[3],
@@ -69,4 +80,11 @@ int sdm_ray_winding_along(const sdm_mesh *m, const sdm_bvh *tree, const double p
     for (int i = 1; i < 3; i++)
         if (fabs(n[i]) > fabs(n[axis])) axis = i;
     return sdm_ray_winding(m, tree, p, axis, n[axis] > 0 ? 1 : -1, skip, n_skip);
+}
+
+int sdm_ray_winding_of_others(const sdm_mesh *m, const sdm_bvh *tree, const double p[3],
+                              const uint32_t *part_of, uint32_t a, uint32_t b)
+{
+    const ray r = {{p[0], p[1], p[2]}, {0, 1, 2}, 1};
+    return count_crossings(m, tree, &r, &(left_out){.part_of = part_of, .part = {a, b}});
 }

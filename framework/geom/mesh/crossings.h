@@ -13,3 +13,8 @@ int sdm_ray_winding(const sdm_mesh *m, const sdm_bvh *tree, const double p[3], i
 /* The same for a ray along the coordinate axis and direction closest to the vector n. */
 int sdm_ray_winding_along(const sdm_mesh *m, const sdm_bvh *tree, const double p[3],
                           const double n[3], const uint32_t *skip, size_t n_skip);
+
+/* The same for a ray along x; the triangles of the parts a and b do not count. part_of[triangle]:
+ * number of its part. */
+int sdm_ray_winding_of_others(const sdm_mesh *m, const sdm_bvh *tree, const double p[3],
+                              const uint32_t *part_of, uint32_t a, uint32_t b);

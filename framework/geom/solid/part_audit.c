@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "part_fold.h"
+#include "part_meeting.h"
 #include "part_thickness.h"
 #include "parts.h"
 #include "sdm/internal/vec3.h"
@@ -395,6 +396,8 @@ sdm_status sdm_part_audit_make(const sdm_mesh *m, unsigned what, const sdm_exact
     sdm_status s = find_parts(&j, err);
     if (!s) s = sdm_part_audit_unused(m, out, err);
     if (!s && (what & SDM_AUDIT_WALLS)) s = measure_thickness(&j, err);
+    if (!s && (what & SDM_AUDIT_MEETINGS) && out->mesh.closed)
+        s = sdm_part_meetings(&j.turned, &j.survey, out->part_of, stop, out->part, out->n, err);
     if (!s && (what & SDM_AUDIT_UNION)) s = measure_union(&j, err);
     job_dispose(&j);
     if (s) sdm_part_audit_dispose(out);

@@ -1,5 +1,5 @@
-/* Finds parts that meet in some shapes of a family and not in others, and the parameter that
- * decides. */
+/* Finds parts that meet on the surface in some shapes of a family and not in others, and the
+ * parameter that decides. */
 #include "survey_meeting.h"
 
 #include <math.h>
@@ -19,7 +19,9 @@ void sdm_survey_contacts(const sdm_part_audit *a, survey_contacts *out)
     *out = (survey_contacts){.n = n};
     for (size_t i = 0; i < n; i++) {
         const sdm_part *p = &a->part[i];
-        out->meets[i] = p->meets;
+        out->meets[i] = p->meets_outside;
+        out->partly[i] = p->meets_partly;
+        out->covered[i] = p->meets & ~(p->meets_outside | p->meets_partly);
         for (size_t k = 0; k < n; k++)
             if (k != i && !(p->meets >> k & 1) && !sdm_part_is_within(p, &a->part[k]) &&
                 !sdm_part_is_within(&a->part[k], p))
@@ -27,15 +29,37 @@ void sdm_survey_contacts(const sdm_part_audit *a, survey_contacts *out)
     }
 }
 
-/* Counts the shapes in which parts i and k meet, and are apart. */
+typedef enum relation { UNKNOWN, APART, COVERED, MEET } relation;
+
+/* How parts i and k of a shape meet. grows: their meeting grows out of a further part, so that it
+ * neither joins nor splits the surface as long as this part covers a piece of it. */
+static relation relation_of(const survey_contacts *c, size_t i, size_t k, bool grows)
+{
+    if (c->n <= k) return UNKNOWN;
+    if (c->meets[i] >> k & 1) return MEET;
+    if (c->partly[i] >> k & 1) return grows ? COVERED : MEET;
+    if (c->covered[i] >> k & 1) return COVERED;
+    return c->apart[i] >> k & 1 ? APART : UNKNOWN;
+}
+
+/* Does a further part cover the whole meeting of parts i and k in any of the shapes? */
+static bool is_growing(const survey_contacts *contacts, size_t n, size_t i, size_t k)
+{
+    for (size_t s = 0; s < n; s++)
+        if (contacts[s].n > k && contacts[s].covered[i] >> k & 1) return true;
+    return false;
+}
+
+/* Counts the shapes in which parts i and k meet on the surface, and do not. */
 static void count_pair(const survey_contacts *contacts, size_t n, size_t i, size_t k,
                        sdm_survey_meeting *out)
 {
     *out = (sdm_survey_meeting){.part = {i, k}};
+    const bool grows = is_growing(contacts, n, i, k);
     for (size_t s = n; s-- > 0;) {
-        if (contacts[s].n <= k) continue;
-        if (contacts[s].meets[i] >> k & 1) out->meet++, out->shape[1] = s;
-        if (contacts[s].apart[i] >> k & 1) out->apart++, out->shape[0] = s;
+        const relation r = relation_of(&contacts[s], i, k, grows);
+        if (r == MEET) out->meet++, out->shape[1] = s;
+        if (r == APART || r == COVERED) out->apart++, out->shape[0] = s;
     }
 }
 
@@ -70,14 +94,13 @@ static void find_param(const survey_contacts *contacts, size_t n, const double *
                        entry *e, sdm_survey_meeting *out)
 {
     const size_t i = out->part[0], k = out->part[1];
+    const bool grows = is_growing(contacts, n, i, k);
     out->odd = SIZE_MAX;
     for (size_t param = 0; param < n_params; param++) {
         size_t used = 0;
         for (size_t s = 0; s < n; s++) {
-            if (contacts[s].n <= k) continue;
-            const bool meets = contacts[s].meets[i] >> k & 1;
-            if (meets || contacts[s].apart[i] >> k & 1)
-                e[used++] = (entry){p[s * n_params + param], meets};
+            const relation r = relation_of(&contacts[s], i, k, grows);
+            if (r != UNKNOWN) e[used++] = (entry){p[s * n_params + param], r == MEET};
         }
         qsort(e, used, sizeof *e, by_value);
         separate(e, used, param, out);

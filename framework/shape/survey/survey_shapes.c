@@ -107,13 +107,13 @@ static sdm_status examine(void *user, size_t i, sdm_mesh *m, sdm_error *err)
     finding *out = &v->found[i];
     sdm_part_audit audit;
     survey_stop stop;
+    const unsigned what = SDM_AUDIT_WALLS | (v->opts->brief ? 0 : SDM_AUDIT_MEETINGS);
     if (!out->made) return SDM_OK;
     survey_stop_set(&stop, v, i ? PARTS_END : 1, i ? 0 : FIRST_SECONDS);
     out->status = is_left_out(v, i, PARTS_END)
                       ? SDM_E_CANCELLED
                       : sdm_instance_mesh(v->family.shape, survey_params(v, i), m, err);
-    if (!out->status)
-        out->status = sdm_part_audit_make(m, SDM_AUDIT_WALLS, &stop.opts, &audit, err);
+    if (!out->status) out->status = sdm_part_audit_make(m, what, &stop.opts, &audit, err);
     out->untested = out->status == SDM_E_CANCELLED;
     if (out->status) return out->status == SDM_E_NOMEM ? SDM_E_NOMEM : SDM_OK;
     for (size_t k = 0; k < audit.n; k++) {

@@ -65,6 +65,11 @@ typedef struct sdm_part {
     /* share of the area in triangles that pass through others of this part; triangles that touch or
      * share a vertex do not count */
     double crossing;
+    /* some bits of `meets`. meets_outside: the two parts meet along a curve that no further part
+     * covers. meets_partly: they do not, but further parts cover only pieces of a curve. In the
+     * other cases further parts cover all places at which they meet. Only of a closed mesh, and if
+     * SDM_AUDIT_MEETINGS asks for it; else 0 */
+    uint32_t meets_outside, meets_partly;
 } sdm_part;
 
 /* A larger share is a mistake; tubes that bend sharply have a smaller one: of the ducts whose
@@ -105,8 +110,9 @@ typedef struct sdm_part_audit {
 
 /* What an audit measures besides edges, contacts and orientations. */
 enum {
-    SDM_AUDIT_WALLS = 1, /* sdm_part.thick, doubled, folded; else NaN, false, 0 */
-    SDM_AUDIT_UNION = 2  /* the union, which takes much longer where triangles meet */
+    SDM_AUDIT_WALLS = 1,   /* sdm_part.thick, doubled, folded; else NaN, false, 0 */
+    SDM_AUDIT_UNION = 2,   /* the union, which takes much longer where triangles meet */
+    SDM_AUDIT_MEETINGS = 4 /* sdm_part.meets_outside, meets_partly */
 };
 
 /* Audits the mesh and its parts. what: a sum of SDM_AUDIT_... In an open mesh, where the engine

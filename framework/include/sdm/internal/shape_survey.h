@@ -73,13 +73,14 @@ typedef struct sdm_survey_jump {
     double mm;     /* JUMP: how far */
 } sdm_survey_jump;
 
-/* Two parts that meet in some of the shapes and lie apart in others: the union joins or splits in
- * between. */
+/* Two parts that meet on the surface of the union in some of the shapes and not in others: it joins
+ * or splits in between. A meeting that a further part covers does not count, nor one that grows out
+ * of a further part: in some shapes that part covers all of it, in others a piece. */
 typedef struct sdm_survey_meeting {
     size_t pairs;       /* pairs of parts of which this is so; 0: none, and no more is known */
     size_t part[2];     /* the pair that changes most often */
-    size_t meet, apart; /* in so many shapes they meet, and are apart */
-    size_t shape[2]; /* index of the first shape in which they are apart, and in which they meet */
+    size_t meet, apart; /* in so many shapes they meet on the surface, and do not */
+    size_t shape[2]; /* index of the first shape in which they do not meet, and in which they do */
     /* The parameter that decides: in all but `odd` of these shapes they meet if it is below `value`
      * (below: true), or above. */
     size_t param, odd;

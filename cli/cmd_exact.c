@@ -350,7 +350,7 @@ static void notice_mesh(job *j)
                                 j->args->mesh ? CLI_MEND_FILE : CLI_MEND_SHAPE);
     else {
         cli_warn_audit(a);
-        if (j->report.turned) cli_notice("the mesh is inside out; maps turn it");
+        if (j->report.turned) cli_notice("the whole mesh is inside out; maps turn it");
     }
     // a part that is too thin, told above, is the cause of both
     if (map && !j->thin && inside) warn_torn(j);

@@ -399,19 +399,29 @@ static void warn_inside_out(const sdm_part_audit *audit, const char *mend)
     sdm_text_dispose(&text);
 }
 
+bool cli_is_turned(const sdm_part_audit *a)
+{
+    size_t turned = 0;
+    for (size_t i = 0; i < a->n; i++) turned += a->part[i].turned;
+    return turned > 0 && turned == a->n;
+}
+
+void cli_describe_turned(const sdm_part_audit *a, sdm_text *text)
+{
+    if (cli_is_turned(a))
+        sdm_text_add(text, "the whole mesh is inside out; maps turn it");
+    else if (count_parts(a, is_mended))
+        sdm_text_add(text, add_parts(a, is_mended, false, text) > 1
+                               ? "are inside out; maps turn them"
+                               : "is inside out; maps turn it");
+}
+
 /* Parts that are inside out and that maps turn. */
 static void notice_turned(const sdm_part_audit *audit)
 {
-    size_t turned = 0;
     sdm_text text = {0};
     if (audit->inside_out || !count_parts(audit, is_mended)) return;
-    for (size_t i = 0; i < audit->n; i++) turned += audit->part[i].turned;
-    if (turned == audit->n)
-        sdm_text_add(&text, "the mesh is inside out; maps turn it");
-    else if (add_parts(audit, is_mended, false, &text) > 1)
-        sdm_text_add(&text, "are inside out; maps turn them");
-    else
-        sdm_text_add(&text, "is inside out; maps turn it");
+    cli_describe_turned(audit, &text);
     if (!text.failed) cli_notice("%s", text.data);
     sdm_text_dispose(&text);
 }

@@ -32,6 +32,13 @@ void cli_describe_apart(const sdm_mesh *mesh, const sdm_part_audit *audit, sdm_t
  * vertices and boxes of the first four. Appends nothing if there are none. */
 void cli_describe_inside_out(const sdm_part_audit *a, sdm_text *text);
 
+/* Appends a sentence about the parts that are inside out and that the exact engine turns: the whole
+ * mesh, or the first four of them. Appends nothing if there are none. */
+void cli_describe_turned(const sdm_part_audit *a, sdm_text *text);
+
+/* Does the engine turn all parts? */
+bool cli_is_turned(const sdm_part_audit *a);
+
 /* Writes one line about the part with most open edges to `text`: where it is, where its first open
  * edge is, and what to do; nothing if the mesh is closed. */
 void cli_describe_open(const sdm_part_audit *a, sdm_text *text);
@@ -74,4 +81,5 @@ sdm_status cli_turn_parts(sdm_mesh *mesh, sdm_error *err);
 
 /* What to do about an inside-out part: of the mesh of a shape, and of a mesh file. */
 #define CLI_MEND_SHAPE "reverse the vertices of these triangles in mesh() of the shape"
+#define CLI_MEND_WHOLE "exchange two vertices of every triangle in mesh() of the shape"
 #define CLI_MEND_FILE "--turn-parts mends this"

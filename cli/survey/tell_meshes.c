@@ -155,8 +155,19 @@ static void tell_turned(teller *t)
     const sdm_survey_count *c = &t->s->found.turned;
     sdm_text text = {0};
     if (!c->shapes || t->s->found.inside_out.shapes > 0) return; // tell_inside_out() has told them
-    teller_add_count(t->s, c, "parts that are inside out and that the exact engine turns", &text);
-    sdm_text_add(&text, "; for each of these parts: " CLI_MEND_SHAPE);
+    const sdm_part_audit *audit = teller_audit(t, c->worst);
+    if (!audit) {
+        teller_tell_count(t, SDM_E_QUALITY, c, "parts that are inside out and that maps turn");
+        return;
+    }
+    const bool whole = cli_is_turned(audit);
+    cli_describe_turned(audit, &text);
+    // in other shapes it may be another part
+    sdm_text_add(&text, " (at ");
+    teller_add_params(t->s, c->worst, SIZE_MAX, &text);
+    sdm_text_add(&text, "; %s inside out ", whole ? "meshes are" : "parts are");
+    teller_add_share(t->s, c, &text);
+    sdm_text_add(&text, "); %s", whole ? CLI_MEND_WHOLE : CLI_MEND_SHAPE);
     teller_tell(t, SDM_E_QUALITY, &text);
 }
 

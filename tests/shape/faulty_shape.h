@@ -21,7 +21,8 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "exit|trained|metres|hang|flood|heap|beyond|before|print|write|shared|"
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
      "meets|groups|crumb|spare|offset|around|unlisted|sticky|diagonal|negative|window|swapped|"
-     "cache|caches|lapse|pair|hidden|grows|posts",
+     "cache|caches|lapse|pair|hidden|grows|posts|"
+     "inverted|averted",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -180,6 +181,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     const size_t boxes = groups                                                    ? 4
                          : stand || crumb || (!strcmp(fault, "sizes") && is_large) ? 3
                                                                                    : 2;
+    const int inverted = !strcmp(fault, "inverted"); // the whole mesh
     const size_t less = !strcmp(fault, "open");
     // 8 vertices far away, which no triangle uses
     const size_t spare = strcmp(fault, "spare") ? 0 : 8;
@@ -210,10 +212,12 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
                  reach = !strncmp(fault, "cache", 5) ? kept_reach
                          : strcmp(fault, "step")     ? p[1]
                                                      : 1 + (p[1] > 1.75);
-    // `meets`: the handle meets the body up to a reach of 1.6
+    // `meets`: the handle meets the body up to a reach of 1.6; `averted`: it is inside out beside it
     const double begin = !strcmp(fault, "meets")
                              ? p[0] + reach - 1.6
-                             : p[0] + (strcmp(fault, "apart") && !groups ? -0.5 : 0.5);
+                             : p[0] + (strcmp(fault, "apart") && strcmp(fault, "averted") && !groups
+                                           ? -0.5
+                                           : 0.5);
     double handle[2][3] = {{begin, -half, -half + shift}, {p[0] + reach, half, half + shift}};
     // `negative`: the height of the handle becomes negative at size 2; `swapped`: its ends change
     // places there; `pair`: the height becomes negative at a reach of the size and 0.25
@@ -234,13 +238,13 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
         const double far[2][3] = {{10 * unit, 10 * unit, 10 * unit}, {edge, edge, edge}};
         faulty_box(out, 2, far[0], far[1], 0);
     }
-    faulty_box(out, 0, body[0], body[1], !strcmp(fault, "body"));
+    faulty_box(out, 0, body[0], body[1], !strcmp(fault, "body") || inverted);
     // the last box, so that `open` leaves out its last triangle
     sdm_mesh_out all = *out;
     uint32_t tri[72];
     if (less) all.tri = tri;
     faulty_box(&all, 1, handle[0], handle[1],
-               !strcmp(fault, "handle") || (!strcmp(fault, "late") && is_large) ||
+               inverted || !strcmp(fault, "averted") || !strcmp(fault, "handle") || (!strcmp(fault, "late") && is_large) ||
                    (!strcmp(fault, "window") && p[1] > 1.25 && p[1] < 1.75 && p[0] < 2.9));
     if (less) memcpy(out->tri + 36, tri + 36, 33 * sizeof *tri);
     if (!strcmp(fault, "wires") && is_large) {

@@ -3,6 +3,9 @@
 
 #include "report/report_audit.h"
 
+/* Degrees of a rad. */
+static const double SPIN = 57.29577951308232;
+
 sdm_status cli_survey_cause(const cli_survey *s)
 {
     const sdm_shape_survey *f = &s->found;
@@ -47,7 +50,13 @@ static void tell_swings(teller *t)
     const sdm_param *p = &sdm_instance_params(t->s->shape, NULL)[c->angle];
     sdm_text text = {0};
     if (!c->swings) return;
-    if (c->poles)
+    if (c->spins)
+        sdm_text_add(&text,
+                     "over its range of %g rad the parameter '%s' turns vertex %zu by %.3g rad: "
+                     "are degrees taken for rad in mesh()? cos() and sin() want rad: do not "
+                     "multiply '%s' by 57.3" TELLER_MEND_FIRST,
+                     p->max - p->min, p->name, c->spin_vertex, SPIN * (p->max - p->min), p->name);
+    else if (c->poles)
         sdm_text_add(
             &text,
             "the vertices move beyond all bounds %zu times, at %.4g, %.4g and so on, while the "
@@ -60,8 +69,9 @@ static void tell_swings(teller *t)
             "the vertices turn back %zu times while the parameter '%s' goes from %g to %g%s%s, as "
             "cos() and sin() of so many rad do",
             c->swings, p->name, p->min, p->max, *p->unit ? " " : "", p->unit);
-    sdm_text_add(&text, "; if these are degrees, multiply them by 0.017453 in "
-                        "mesh()" TELLER_MEND_FIRST);
+    if (!c->spins)
+        sdm_text_add(&text, "; if these are degrees, multiply them by 0.017453 in "
+                            "mesh()" TELLER_MEND_FIRST);
     teller_tell_cause(t, SDM_E_QUALITY, &text);
 }
 

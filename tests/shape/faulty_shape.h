@@ -212,12 +212,12 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
                  reach = !strncmp(fault, "cache", 5) ? kept_reach
                          : strcmp(fault, "step")     ? p[1]
                                                      : 1 + (p[1] > 1.75);
-    // `meets`: the handle meets the body up to a reach of 1.6; `averted`: it is inside out beside it
-    const double begin = !strcmp(fault, "meets")
-                             ? p[0] + reach - 1.6
-                             : p[0] + (strcmp(fault, "apart") && strcmp(fault, "averted") && !groups
-                                           ? -0.5
-                                           : 0.5);
+    // `meets`: the handle meets the body up to a reach of 1.6; `averted`: it is inside out beside
+    // it
+    const double begin =
+        !strcmp(fault, "meets")
+            ? p[0] + reach - 1.6
+            : p[0] + (strcmp(fault, "apart") && strcmp(fault, "averted") && !groups ? -0.5 : 0.5);
     double handle[2][3] = {{begin, -half, -half + shift}, {p[0] + reach, half, half + shift}};
     // `negative`: the height of the handle becomes negative at size 2; `swapped`: its ends change
     // places there; `pair`: the height becomes negative at a reach of the size and 0.25
@@ -244,7 +244,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     uint32_t tri[72];
     if (less) all.tri = tri;
     faulty_box(&all, 1, handle[0], handle[1],
-               inverted || !strcmp(fault, "averted") || !strcmp(fault, "handle") || (!strcmp(fault, "late") && is_large) ||
+               inverted || !strcmp(fault, "averted") || !strcmp(fault, "handle") ||
+                   (!strcmp(fault, "late") && is_large) ||
                    (!strcmp(fault, "window") && p[1] > 1.25 && p[1] < 1.75 && p[0] < 2.9));
     if (less) memcpy(out->tri + 36, tri + 36, 33 * sizeof *tri);
     if (!strcmp(fault, "wires") && is_large) {

@@ -594,6 +594,9 @@ static int swinging_mesh(const void *self, const sdm_host *host, const sdm_optio
     const double z = wave(options[1].text, p[0] * options[0].number);
     faulty_box(out, 0, (const double[3]){-2, -2, -2}, (const double[3]){2, 2, 2}, 0);
     faulty_box(out, 1, (const double[3]){1, -1, z - 0.5}, (const double[3]){4, 1, z + 0.5}, 0);
+    // the vertices of a twisted bar: the last one turns by the whole angle
+    for (int i = 0; i < 8 && !strcmp(options[1].text, "twist"); i++)
+        out->vert[3 * (8 + i) + 2] += sin(p[0] * options[0].number * (i + 1) / 8) - z;
     return 0;
 }
 
@@ -601,8 +604,8 @@ static int swinging_mesh(const void *self, const sdm_host *host, const sdm_optio
 static sdm_shape_survey survey_swinging(sdm_param param, const char *function, const char *factor)
 {
     static const sdm_option options[] = {
-        {"factor", SDM_OPTION_REAL, "", 0, 1, 1, NULL, "x"},
-        {"function", SDM_OPTION_CHOICE, "", 0, 0, 0, "sin|tan|half|secant|steep|saw", "x"}};
+        {"factor", SDM_OPTION_REAL, "", 0, 500, 1, NULL, "x"},
+        {"function", SDM_OPTION_CHOICE, "", 0, 0, 0, "sin|tan|half|secant|steep|saw|twist", "x"}};
     const sdm_shape shape = {.abi = SDM_SHAPE_ABI,
                              .size = sizeof(sdm_shape),
                              .name = "swinging",
@@ -655,6 +658,44 @@ static void degrees_that_go_to_sin(void **state)
         if (!(i % 2)) assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
         sdm_shape_survey_dispose(&s);
     }
+}
+
+// An angle in rad that mesh() multiplies by 180 / pi, and angles with other factors, such as
+// numbers of teeth: a vertex comes back after another change of the angle.
+static void rad_that_become_degrees(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *factor, *unit;
+        double max;
+        size_t swings;
+    } cases[] = {{"57.29577951308232", "rad", 0.9, 4},
+                 {"57.3", "rad", 0.9, 4},
+                 {"57.3", "rad", 5, 42},
+                 {"57.3", "rad", 0.65, 0},
+                 {"57.3", "", 0.9, 0},
+                 {"1", "rad", 6.8, 0},
+                 {"20", "rad", 0.9, 0},
+                 {"57", "rad", 0.9, 0},
+                 {"58", "rad", 0.9, 0},
+                 {"115", "rad", 0.9, 0},
+                 {"172", "rad", 0.9, 0},
+                 {"401", "rad", 0.9, 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        sdm_shape_survey s =
+            survey_swinging((sdm_param){"angle", cases[i].unit, 0.5, cases[i].max, 0.6, "x"}, "sin",
+                            cases[i].factor);
+        if (s.scale.spins != (cases[i].swings > 0) || s.scale.swings != cases[i].swings)
+            fail_msg("%s times up to %g %s: %zu", cases[i].factor, cases[i].max, cases[i].unit,
+                     s.scale.swings);
+        if (s.scale.spins) assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+        sdm_shape_survey_dispose(&s);
+    }
+    // a single vertex of eight comes back
+    sdm_shape_survey s =
+        survey_swinging((sdm_param){"twist", "rad", 0.5, 0.9, 0.6, "x"}, "twist", "57.3");
+    assert_false(s.scale.spins);
+    sdm_shape_survey_dispose(&s);
 }
 
 // The same for functions with poles: tan(), also of half of the angle, and a division by cos(). A
@@ -862,6 +903,7 @@ int main(void)
         cmocka_unit_test(rad_that_are_converted),
         cmocka_unit_test(degrees_that_go_to_sin),
         cmocka_unit_test(degrees_that_go_to_tan),
+        cmocka_unit_test(rad_that_become_degrees),
         cmocka_unit_test(callbacks),
         cmocka_unit_test(meshes_made_again),
         cmocka_unit_test(state_is_no_jump),

@@ -197,6 +197,9 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
         status = sdm_survey_poles(f, s->p, k, c->pole, &c->swings, err);
         c->poles = c->swings > 0;
         if (!status && !c->poles) status = sdm_survey_swings(f, s->p, k, &c->swings, err);
+        if (!status && !c->swings)
+            status = sdm_survey_spins(f, s->p, k, &c->spins, &c->spin_vertex, err);
+        if (c->spins) c->swings = (size_t)ceil((f->max[k] - f->min[k]) / SDM_SURVEY_SPIN);
         c->angle = k;
     }
     if (status) return status;

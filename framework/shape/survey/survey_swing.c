@@ -1,4 +1,6 @@
-/* Counts how often vertices turn back along one parameter. */
+/* Counts how often vertices turn back along one parameter, and looks whether they come back to the
+ * same place after each step of 2 pi / 57.3, as cos() and sin() do of an angle that mesh() converts
+ * from rad to degrees. */
 #include "survey_swing.h"
 
 #include <math.h>
@@ -87,4 +89,110 @@ sdm_status sdm_survey_swings(const shape_family *f, const double *p, size_t k, s
     if ((double)*swings < 1.5 * turns || (double)*swings > 3 * turns + 2) *swings = 0;
     sdm_mesh_dispose(&m);
     return s == SDM_E_NOMEM ? s : SDM_OK;
+}
+
+/* SPIN_STEPS: in a period; SPIN_ALL: in the one and a half that are looked at. */
+enum { SPIN_STEPS = 16, SPIN_ALL = 24 };
+
+/* A vertex comes back if it misses its place by less than this share of its way: the factors 57.2
+ * and 57.4 miss by more. */
+static const double BACK = 0.005;
+/* Vertices count that move by this share of the size of the shape. */
+static const double FAR = 0.01;
+static const double SPINNING = 0.25;
+
+/* The vertices that are followed, and where they are at each step. */
+typedef struct spin {
+    size_t vertex[FOLLOWED], n;
+    double x[SPIN_ALL + 1][FOLLOWED][3];
+} spin;
+
+static double distance(const double a[3], const double b[3])
+{
+    double square = 0;
+    for (int d = 0; d < 3; d++) square += (a[d] - b[d]) * (a[d] - b[d]);
+    return sqrt(square);
+}
+
+/* Makes the mesh where parameter k is `periods` above its lowest value. *same: it has n_vert
+ * vertices. SDM_E_NOMEM. */
+static sdm_status mesh_after(const shape_family *f, double *p, size_t k, double periods,
+                             size_t n_vert, sdm_mesh *m, bool *same, sdm_error *err)
+{
+    p[k] = f->min[k] + periods * SDM_SURVEY_SPIN;
+    const sdm_status s = sdm_instance_mesh(f->shape, p, m, err);
+    *same = !s && m->n_vert == n_vert;
+    return s == SDM_E_NOMEM ? s : SDM_OK;
+}
+
+/* Chooses vertices that move and are back after a period, if these are a share SPINNING of those
+ * that move: of a twisted bar some vertices come back after any change of the twist. m: meshes at
+ * 0, 1/3 and 1 period. */
+static void choose_spinning(const sdm_mesh m[3], double size, spin *out)
+{
+    size_t moved = 0, back = 0;
+    for (size_t v = 0; v < m[0].n_vert; v++) {
+        const double *x = m[0].vert + 3 * v, way = distance(m[1].vert + 3 * v, x);
+        if (!(way > FAR * size)) continue;
+        moved++;
+        if (!(distance(m[2].vert + 3 * v, x) <= BACK * way)) continue;
+        back++;
+        if (out->n < FOLLOWED) out->vertex[out->n++] = v;
+    }
+    if ((double)back < SPINNING * (double)moved) out->n = 0;
+}
+
+/* Does followed vertex i move without jumps, and is it in the same place after every period? */
+static bool is_spinning(const spin *s, size_t i, double size)
+{
+    double span = 0, step = 0, miss = 0;
+    for (int k = 0; k <= SPIN_ALL; k++) {
+        span = fmax(span, distance(s->x[k][i], s->x[0][i]));
+        if (k) step = fmax(step, distance(s->x[k][i], s->x[k - 1][i]));
+        if (k >= SPIN_STEPS) miss = fmax(miss, distance(s->x[k][i], s->x[k - SPIN_STEPS][i]));
+    }
+    return span > FAR * size && step < 0.5 * span && miss <= BACK * span;
+}
+
+static sdm_status follow_spins(const shape_family *f, double *p, size_t k, size_t n_vert,
+                               double size, spin *spins, bool *found, size_t *vertex,
+                               sdm_error *err)
+{
+    sdm_mesh m = {0};
+    sdm_status s = SDM_OK;
+    bool same = true;
+    for (int step = 0; step <= SPIN_ALL && !s && same; step++) {
+        s = mesh_after(f, p, k, (double)step / SPIN_STEPS, n_vert, &m, &same, err);
+        for (size_t i = 0; i < spins->n && !s && same; i++)
+            memcpy(spins->x[step][i], m.vert + 3 * spins->vertex[i], sizeof spins->x[step][i]);
+    }
+    for (size_t i = spins->n; i-- > 0 && !s && same;)
+        if (is_spinning(spins, i, size)) *found = true, *vertex = spins->vertex[i];
+    sdm_mesh_dispose(&m);
+    return s;
+}
+
+sdm_status sdm_survey_spins(const shape_family *f, const double *p, size_t k, bool *found,
+                            size_t *vertex, sdm_error *err)
+{
+    static const double AT[3] = {0, 1.0 / 3, 1};
+    double at[SHAPE_PARAMS_MAX];
+    sdm_mesh m[3] = {{0}};
+    spin spins = {.n = 0};
+    sdm_status s = SDM_OK;
+    bool same = true;
+    *found = false;
+    if (strcmp(f->shape->params[k].unit, "rad") != 0 ||
+        f->max[k] - f->min[k] < (double)SPIN_ALL / SPIN_STEPS * SDM_SURVEY_SPIN)
+        return SDM_OK;
+    memcpy(at, p, f->shape->n_params * sizeof *p);
+    for (int i = 0; i < 3 && !s && same; i++) {
+        s = mesh_after(f, at, k, AT[i], m[0].n_vert, &m[i], &same, err);
+        same = !s && m[i].n_vert && m[i].n_vert == m[0].n_vert;
+    }
+    const double size = same ? size_of(&m[0]) : 0;
+    if (same) choose_spinning(m, size, &spins);
+    if (!s && spins.n) s = follow_spins(f, at, k, m[0].n_vert, size, &spins, found, vertex, err);
+    for (int i = 0; i < 3; i++) sdm_mesh_dispose(&m[i]);
+    return s;
 }

@@ -1,4 +1,5 @@
-/* Finds angles in degrees that mesh() gives to cos() or sin(). */
+/* Finds angles in degrees that mesh() gives to cos() or sin(), also those that it has converted
+ * from rad. */
 #pragma once
 
 #include "shape_family.h"
@@ -9,3 +10,15 @@
  * cannot be made or change their vertices. SDM_E_NOMEM. [any thread] */
 sdm_status sdm_survey_swings(const shape_family *f, const double *p, size_t k, size_t *swings,
                              sdm_error *err);
+
+/* Change of a parameter in rad after which cos() and sin() of it in degrees come back: 2 pi over
+ * 180 / pi. */
+#define SDM_SURVEY_SPIN 0.10966227112321508
+
+/* *found: a quarter of the vertices that move, *vertex among them, come back whenever parameter k,
+ * which is in rad, goes on by 2 pi / 57.296, the others as in p[n_params]. So it is where mesh()
+ * gives 180 / pi times the parameter to cos() or sin(); no whole number of teeth, turns or joints
+ * has this period. false for ranges of less than 0.165 rad, and if meshes cannot be made or change
+ * their vertices. SDM_E_NOMEM. [any thread] */
+sdm_status sdm_survey_spins(const shape_family *f, const double *p, size_t k, bool *found,
+                            size_t *vertex, sdm_error *err);

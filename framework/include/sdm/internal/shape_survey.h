@@ -109,6 +109,10 @@ typedef struct sdm_survey_scale {
      * the parameter is pole[] */
     bool poles;
     double pole[2];
+    /* nor do they swing so few times: `angle` is in rad and mesh() is likely to multiply it
+     * by 57.3, so that this vertex goes round `swings` times, a part of the last time included */
+    bool spins;
+    size_t spin_vertex;
     /* the unit that would explain both, and its length in mm; NULL: none would */
     const char *unit;
     double unit_mm;

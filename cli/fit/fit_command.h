@@ -293,6 +293,13 @@ bool cli_fit_is_unfinished(const cli_fit *f);
  * Neither another start nor more iterations help it. */
 bool cli_fit_lacks_data(const cli_fit *f);
 
+/* Did the fit only fail to converge, and did an unknown go to and fro at the end? More iterations
+ * do not help it. */
+bool cli_fit_swings(const cli_fit *f);
+
+/* Do residuals refuse the fit, and is another shape their most probable cause? */
+bool cli_fit_shows_other(const cli_fit *f);
+
 /* After the fit: a shape that was changed after the training of the network makes the check of the
  * network doubtful. */
 void cli_fit_doubt_changed_shape(cli_fit *f);

@@ -75,7 +75,7 @@ void cli_fit_print_next(const cli_fit *f)
     const bool voxels = isfinite(cli_fit_finer_voxel(f));
     // --exact and --polish need the exact shape
     const bool more = cli_fit_is_unfinished(f),
-               refused = f->doubt.status && !cli_fit_voxels_refuse(f),
+               refused = f->doubt.status && (!cli_fit_voxels_refuse(f) || cli_fit_shows_other(f)),
                exact = !f->source.model || f->shape || f->judge_shape;
     if ((!exact && !more) || (refused && !more) || f->other_side || f->n_candidates ||
         a->cohort.cases ||
@@ -87,6 +87,8 @@ void cli_fit_print_next(const cli_fit *f)
     const bool lacks = cli_fit_lacks_data(f), finer = more && !lacks && !f->source.model &&
                                                       f->opts.max_iterations >= usual &&
                                                       isfinite(r->advised_voxel_mm);
+    // the same iterations would go to and fro, too
+    if (more && !lacks && !finer && cli_fit_swings(f)) return;
     sdm_text t = {0};
     char text[96], price[240] = "";
     sdm_text_add(&t, "sdmgen fit");

@@ -11,6 +11,13 @@ bool cli_fit_found(const cli_fit *f, sdm_fit_check_kind kind, sdm_fit_grade grad
     return x && x->grade >= grade && !(x->figure < figure);
 }
 
+/* Does the text of this check contain `words`? */
+static bool says(const cli_fit *f, sdm_fit_check_kind kind, const char *words)
+{
+    const sdm_fit_finding *x = sdm_fit_finding_of(&f->result.verdict, kind);
+    return x && strstr(x->text, words);
+}
+
 bool cli_fit_is_unfinished(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
@@ -24,8 +31,20 @@ bool cli_fit_is_unfinished(const cli_fit *f)
 
 bool cli_fit_lacks_data(const cli_fit *f)
 {
-    const sdm_fit_finding *x = sdm_fit_finding_of(&f->result.verdict, SDM_FIT_CHECK_CONVERGED);
-    return x && cli_fit_is_unfinished(f) && strstr(x->text, "the data hardly determine");
+    return cli_fit_is_unfinished(f) &&
+           says(f, SDM_FIT_CHECK_CONVERGED, "): the data hardly determine");
+}
+
+bool cli_fit_swings(const cli_fit *f)
+{
+    return cli_fit_is_unfinished(f) && says(f, SDM_FIT_CHECK_CONVERGED, "still goes to and fro");
+}
+
+bool cli_fit_shows_other(const cli_fit *f)
+{
+    return cli_fit_found(f, SDM_FIT_CHECK_RESIDUALS, SDM_FIT_FAILED, -INFINITY) &&
+           (says(f, SDM_FIT_CHECK_RESIDUALS, ": another shape lies there") ||
+            says(f, SDM_FIT_CHECK_RESIDUALS, "the fit is not on the shape of the "));
 }
 
 bool cli_fit_voxels_refuse(const cli_fit *f)

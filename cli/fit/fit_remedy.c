@@ -83,7 +83,7 @@ const char *cli_fit_remedy(const cli_fit *f, char *text, size_t size)
     const char *suspicion = f->suspicion ? f->suspicion : "";
     *text = '\0';
     if (f->exchanged || cli_fit_lacks_data(f)) return text;
-    if (f->found && !r->converged && a->max_iterations &&
+    if (f->found && !r->converged && a->max_iterations && !cli_fit_swings(f) &&
         r->n_iterations >= (size_t)a->max_iterations)
         snprintf(text, size, "; --max-iterations %lld ended it too early to judge the fit%s",
                  (long long)a->max_iterations, suspicion);

@@ -260,7 +260,7 @@ static sdm_status maximise_settled(fit_problem *p, fit_newton_opts *newton, fit_
         // small and flat steps do not resolve small changes of region and weights
         const bool last =
             end->small || end->flat ? change < WEIGHT_ROUGH : !changed && !(change > 0);
-        if (s || (round > 0 && newton->eps <= eps && last)) return s;
+        if (s || (round > 0 && (newton->eps <= eps || end->at_rest) && last)) return s;
         // set the number of iterations left, and a coarse eps until region and weights settle
         const size_t used = p->n_iterations - before;
         if (used >= most) {

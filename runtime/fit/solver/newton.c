@@ -11,6 +11,7 @@
 #include "objective.h"
 #include "open_motions.h"
 #include "prior.h"
+#include "recent.h"
 #include "sdm/internal/heap.h"
 #include "sdm/internal/mat3.h"
 #include "sdm/internal/rotation.h"
@@ -46,6 +47,14 @@
 // most
 #define DROP_MAX 1.0
 #define HALVINGS_MAX 8
+// Averaged steps swing where an unknown goes to and fro by more than SWING_MAX of its standard
+// deviation, and by no less than SWING_SAME times as much as FIT_RECENT steps before. They are then
+// scaled down until they swing by no more than SWING_RELAXED, to RELAXATION_MIN of their size at
+// least.
+#define SWING_MAX 0.1
+#define SWING_SAME 0.9
+#define SWING_RELAXED 0.05
+#define RELAXATION_MIN (1.0 / 64)
 
 void sdm_fit_state_move(const fit_problem *p, const fit_state *from, const double *step,
                         fit_state *to)
@@ -105,6 +114,17 @@ static double step_size(const fit_problem *p, const double *step)
     return most;
 }
 
+// gradient[n] and negative second derivatives a[n][n] of the quadratic model
+static void equations_set(const fit_problem *p, bool observed, double *gradient, double *a)
+{
+    const size_t n = p->information.n_unknowns;
+    memcpy(gradient, p->information.gradient, n * sizeof *gradient);
+    memcpy(a, observed ? p->information.observed : p->information.complete, n * n * sizeof *a);
+    (void)sdm_fit_prior(p, &p->state, gradient, a, NULL);
+    sdm_fit_add_weak_prior(p, a);
+    sdm_fit_open_motions_stop(p, a);
+}
+
 // step[n] that maximises the quadratic model within the limits; observed: use the observed
 // information, else the complete one. work: 3 n n numbers. False: the information is not positive
 // definite
@@ -113,11 +133,7 @@ static bool step_find(const fit_problem *p, const fit_newton_opts *opts, double 
 {
     const size_t n = p->information.n_unknowns;
     double gradient[FIT_UNKNOWNS_MAX], *a = work;
-    memcpy(gradient, p->information.gradient, n * sizeof *gradient);
-    memcpy(a, observed ? p->information.observed : p->information.complete, n * n * sizeof *a);
-    (void)sdm_fit_prior(p, &p->state, gradient, a, NULL);
-    sdm_fit_add_weak_prior(p, a);
-    sdm_fit_open_motions_stop(p, a);
+    equations_set(p, observed, gradient, a);
     fit_limits limits;
     limits_set(p, opts, &limits);
     if (!sdm_fit_bounded_step(n, a, gradient, damping, &limits, step, work + n * n)) return false;
@@ -325,10 +341,57 @@ static sdm_status averaged_move(fit_problem *p, double *step, bool *whole, sdm_e
     }
 }
 
-/* One accelerated step with the averaged gradient. */
+/* Relaxation of averaged steps. Where the gradient falls steeply across a kink, full steps lead
+ * from one side to the other and back, or round several kinks. Steps that are scaled down come to
+ * rest between them. */
+typedef struct fit_relaxation {
+    /* the steps are scaled by this; 1: they are full and accelerated */
+    double factor;
+    /* number of averaged steps */
+    size_t n;
+    /* largest swing in the FIT_RECENT steps before the last n % FIT_RECENT ones, in standard
+     * deviations */
+    double swing;
+} fit_relaxation;
+
+// the largest movement moves() of an unknown in the last steps, in standard deviations by the
+// quadratic model; 0 where these are unknown
+static double largest_movement(const fit_problem *p, const fit_newton_opts *opts,
+                               double (*moves)(const fit_problem *p, size_t i), double *work)
+{
+    const size_t n = p->information.n_unknowns;
+    double gradient[FIT_UNKNOWNS_MAX], sd[FIT_UNKNOWNS_MAX], most = 0;
+    fit_limits limits;
+    limits_set(p, opts, &limits);
+    equations_set(p, true, gradient, work);
+    bool known = sdm_fit_deviations(n, work, limits.kept, sd, work + n * n);
+    if (!known) equations_set(p, false, gradient, work);
+    if (!known) known = sdm_fit_deviations(n, work, limits.kept, sd, work + n * n);
+    for (size_t i = 0; i < p->n_params + 6 && known; i++)
+        if (sd[i] > 0) most = fmax(most, moves(p, i) / (sd[i] * sqrt(p->noise_factor)));
+    return most;
+}
+
+// after an averaged step: scales the next ones down while they swing; whether those that are scaled
+// down have come to rest
+static bool relaxation_adapt(const fit_problem *p, const fit_newton_opts *opts, fit_relaxation *x,
+                             double *work)
+{
+    if (++x->n % FIT_RECENT) return false;
+    const double before = x->swing;
+    x->swing = largest_movement(p, opts, sdm_fit_swing, work);
+    const bool lasts = before > SWING_MAX && x->swing > fmax(SWING_MAX, SWING_SAME * before),
+               relaxed = x->factor < 1;
+    if (relaxed && largest_movement(p, opts, sdm_fit_unrest, work) <= SWING_RELAXED) return true;
+    if ((lasts || (relaxed && x->swing > SWING_RELAXED)) && x->factor > RELAXATION_MIN)
+        x->factor *= 0.5;
+    return false;
+}
+
+/* One step with the averaged gradient, accelerated unless it is scaled down by `relaxed` < 1. */
 static sdm_status averaged_step(fit_problem *p, const fit_newton_opts *opts, fit_acceleration *r,
-                                double *step, double *plain, double *work, fit_try *out,
-                                sdm_error *err)
+                                double relaxed, double *step, double *plain, double *work,
+                                fit_try *out, sdm_error *err)
 {
     sdm_status s = sdm_fit_average_gradient(p, err);
     if (s) return s;
@@ -338,39 +401,14 @@ static sdm_status averaged_step(fit_problem *p, const fit_newton_opts *opts, fit
     out->size = step_size(p, step);
     out->deviations = deviations_of(p, step);
     memcpy(plain, step, p->information.n_unknowns * sizeof *plain);
-    step_accelerate(p, opts, r, step);
+    const bool accelerated = !(relaxed < 1);
     bool whole;
+    if (accelerated) step_accelerate(p, opts, r, step);
+    for (size_t i = 0; i < p->information.n_unknowns && !accelerated; i++) step[i] *= relaxed;
     s = averaged_move(p, step, &whole, err);
-    if (!s && whole) acceleration_advance(p, opts, r, step);
+    if (!s && accelerated && whole) acceleration_advance(p, opts, r, step);
     if (!whole) r->anderson.count = 0;
     return s;
-}
-
-// remembers where the step leads and, plain[n_params + 6], where the undamped one would lead; NULL:
-// there is none, or the damping hides it
-static void iteration_remember(fit_problem *p, const double *step, const double *plain)
-{
-    fit_recent *r = &p->recent;
-    const size_t n = p->n_params + 6, now = r->n % FIT_RECENT,
-                 before = (r->n + FIT_RECENT - 1) % FIT_RECENT;
-    for (size_t i = 0; i < n; i++) {
-        r->position[now][i] = (r->n ? r->position[before][i] : 0) + step[i];
-        r->step[now][i] = plain ? plain[i] : INFINITY;
-    }
-    r->n++;
-}
-
-double sdm_fit_unrest(const fit_problem *p, size_t i)
-{
-    const fit_recent *r = &p->recent;
-    double low = INFINITY, high = -INFINITY, mean = 0;
-    if (r->n < FIT_RECENT) return INFINITY;
-    for (size_t k = 0; k < FIT_RECENT; k++) {
-        low = fmin(low, r->position[k][i]);
-        high = fmax(high, r->position[k][i]);
-        mean += r->step[k][i] / FIT_RECENT;
-    }
-    return fmax(0.5 * (high - low), fabs(mean));
 }
 
 void sdm_fit_tell_progress(const fit_problem *p, sdm_fit_phase phase, double step)
@@ -414,13 +452,14 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
     const size_t n = p->information.n_unknowns;
     double step[FIT_UNKNOWNS_MAX], plain[FIT_UNKNOWNS_MAX], *work = NULL;
     fit_acceleration acceleration = {0};
+    fit_relaxation relaxation = {.factor = 1};
     fit_damping damping = {.factor = opts->phase == SDM_FIT_SEARCH ? 1e-2 : 1e-4};
     double taken_before = INFINITY, best = -INFINITY;
     int idle = 0; // small steps since the objective last rose by more than a negligible gain
     *out = (fit_newton_end){.step = INFINITY};
     sdm_status s = SDM_ALLOC(&work, 3 * n * n, "matrices of the fit", err);
     if (!s) s = sdm_fit_evaluate(p, err);
-    for (size_t i = 0; i < opts->max_iterations && !s && !out->converged; i++) {
+    for (size_t i = 0; i < opts->max_iterations && !s && !out->converged && !out->at_rest; i++) {
         // tissues
         acceleration.n_appearance =
             opts->keep_appearance ? 0 : sdm_fit_appearance_pack(p, acceleration.from);
@@ -430,7 +469,8 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
         bool undamped = true;
         fit_try t = {.size = INFINITY, .deviations = INFINITY};
         if (opts->averaged)
-            s = averaged_step(p, opts, &acceleration, step, plain, work, &t, err);
+            s = averaged_step(p, opts, &acceleration, relaxation.factor, step, plain, work, &t,
+                              err);
         else if (out->step <= ACCELERATED_BELOW)
             s = accelerated_step(p, opts, &acceleration, &damping, step, plain, work, &t, err);
         if (!s && !t.taken && !opts->averaged) {
@@ -450,8 +490,8 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
             break;
         }
         // converged?
-        iteration_remember(p, step, undamped ? plain : NULL);
-        const double taken_size = step_size(p, step);
+        sdm_fit_remember(p, step, undamped ? plain : NULL);
+        const double taken_size = step_size(p, step) / relaxation.factor;
         const bool steep = opts->averaged && t.size <= STEEP_MAX * opts->eps &&
                            fmax(taken_size, taken_before) <= opts->eps;
         taken_before = taken_size;
@@ -466,6 +506,8 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
         out->flat = !out->converged && !out->small && opts->max_flat > 0 &&
                     (damping.flat >= opts->max_flat || idle >= IDLE_MAX);
         out->converged = out->converged || out->small || out->flat;
+        out->at_rest =
+            opts->averaged && !out->converged && relaxation_adapt(p, opts, &relaxation, work);
         s = iteration_record(p, opts, out->step, err);
     }
     sdm_free(work);

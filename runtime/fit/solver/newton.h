@@ -32,21 +32,20 @@ typedef struct fit_newton_end {
     /* the iterations ended because of eps_sd (small) or of max_flat (flat), before the size of the
        steps fell to eps */
     bool small, flat;
+    /* not converged, but steps that went to and fro were scaled down until they moved no unknown by
+       more than a small share of its standard deviation; see sdm_fit_accept_small_steps() */
+    bool at_rest;
     /* size of the last step, in the units of sdm_fit_opts.eps */
     double step;
 } fit_newton_end;
 
 /* Moves problem->state by iterations towards the maximum, and leaves *problem evaluated at the last
    state. Each iteration re-estimates the tissues and takes one step in the other unknowns: damped
-   (Levenberg 1944, Marquardt 1963) far from the maximum, Anderson-accelerated near it. *out: how
-   the iterations ended; reaching max_iterations is no error. */
+   (Levenberg 1944, Marquardt 1963) far from the maximum, Anderson-accelerated near it. Averaged
+   steps that go to and fro are scaled down. *out: how the iterations ended; reaching max_iterations
+   is no error. */
 sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newton_end *out,
                           sdm_error *err);
-
-/* How much unknown i of n_params + 6 still moves: half of the range of its values in the last
-   FIT_RECENT iterations, or the mean of the undamped steps in them, if that is larger; infinite if
-   there were fewer iterations, or if damping hid the steps. In the unit of the covariance. */
-double sdm_fit_unrest(const fit_problem *p, size_t i);
 
 /* Calls sdm_fit_opts.progress, if there is one, with the state of *p. step: as in sdm_fit_progress.
  */

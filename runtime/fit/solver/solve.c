@@ -40,14 +40,39 @@ void sdm_fit_solve(size_t n, const double *factor, const double *scale, double *
     for (size_t i = 0; i < n; i++) x[i] *= scale[i];
 }
 
+// rest[] = the unknowns that are not held; their number
+static size_t free_ones(size_t n, const bool *held, size_t *rest)
+{
+    size_t m = 0;
+    for (size_t i = 0; i < n; i++)
+        if (!held[i]) rest[m++] = i;
+    return m;
+}
+
+bool sdm_fit_deviations(size_t n, const double *a, const bool *held, double *sd, double *work)
+{
+    size_t rest[FIT_UNKNOWNS_MAX];
+    double x[FIT_UNKNOWNS_MAX], scale[FIT_UNKNOWNS_MAX], *matrix = work, *factor = work + n * n;
+    const size_t m = free_ones(n, held, rest);
+    for (size_t i = 0; i < m; i++)
+        for (size_t j = 0; j < m; j++) matrix[i * m + j] = a[rest[i] * n + rest[j]];
+    if (!sdm_fit_cholesky(m, matrix, factor, scale)) return false;
+    memset(sd, 0, n * sizeof *sd);
+    for (size_t i = 0; i < m; i++) {
+        for (size_t j = 0; j < m; j++) x[j] = i == j;
+        sdm_fit_solve(m, factor, scale, x);
+        sd[rest[i]] = sqrt(x[i]);
+    }
+    return true;
+}
+
 // solves for the unknowns that are not held, with the held ones at their values in step[n]
 static bool free_step(size_t n, const double *a, const double *gradient, double damping,
                       const bool *held, double *step, double *work)
 {
-    size_t rest[FIT_UNKNOWNS_MAX], m = 0;
+    size_t rest[FIT_UNKNOWNS_MAX];
     double x[FIT_UNKNOWNS_MAX], scale[FIT_UNKNOWNS_MAX], *matrix = work, *factor = work + n * n;
-    for (size_t i = 0; i < n; i++)
-        if (!held[i]) rest[m++] = i;
+    const size_t m = free_ones(n, held, rest);
     for (size_t i = 0; i < m; i++) {
         x[i] = gradient[rest[i]];
         for (size_t k = 0; k < n; k++)

@@ -11,6 +11,10 @@ bool sdm_fit_cholesky(size_t n, const double *a, double *factor, double *scale);
 /* x[n] := a^-1 x, with factor and scale from sdm_fit_cholesky(). */
 void sdm_fit_solve(size_t n, const double *factor, const double *scale, double *x);
 
+/* sd[n] = square roots of the diagonal of the inverse of a without the unknowns that are held; 0
+   for these. work: 2 n n numbers. False: a without them is not positive definite. */
+bool sdm_fit_deviations(size_t n, const double *a, const bool *held, double *sd, double *work);
+
 /* Limits of a step. kept: the unknown does not move; else min <= step <= max, with min <= 0 <= max.
  */
 typedef struct fit_limits {

@@ -8,6 +8,7 @@
 
 #include "fit/data/source_params.h"
 #include "fit/solver/newton.h"
+#include "fit/solver/recent.h"
 #include "sdm/internal/hardly_known.h"
 
 // an unknown has converged when it moves by no more than this share of its sd
@@ -64,46 +65,71 @@ static void name_hardly_known(const fit_problem *p, const sdm_fit_result *r, cha
     }
 }
 
-static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
+static const char *unknown_name(const fit_problem *p, size_t i)
 {
     static const char *const pose[6] = {"rotation about x",    "rotation about y",
                                         "rotation about z",    "translation along x",
                                         "translation along y", "translation along z"};
-    double most, low, high;
-    const char *name;
-    const size_t worst = most_restless(p, r, movement, &most);
-    if (worst < p->n_params)
-        sdm_fit_bounds(p->source, worst, &low, &high, &name);
+    double low, high;
+    const char *name = NULL;
+    if (i >= p->n_params) return pose[i - p->n_params];
+    sdm_fit_bounds(p->source, i, &low, &high, &name);
+    return name;
+}
+
+// text[size] = what may end the iterations, besides more of them and another start. worst: the
+// unknown that moves most; hidden: the damping hides it; swings: it goes to and fro; unknown: the
+// parameters that the data hardly determine
+static void name_remedy(const fit_problem *p, const sdm_fit_result *r, size_t worst, bool hidden,
+                        bool swings, const char *unknown, char *text, size_t size)
+{
+    const bool own = worst < p->n_params, many = strchr(unknown, ',');
+    // what the data do not determine moves on with more iterations, too; where damping hides what
+    // moves, it is the likeliest; and the others go to and fro with it
+    if (*unknown && (hidden || swings || (own && sdm_fit_hardly_known(r, worst))))
+        snprintf(text, size,
+                 "the data hardly determine %s: keep %s (sdm_fit_opts.kept), or give data that "
+                 "determine %s",
+                 unknown, many ? "them at known values" : "it at a known value",
+                 many ? "them" : "it");
+    else if (*unknown)
+        snprintf(text, size,
+                 "a nearer start, or known values (sdm_fit_opts.kept) of %s, which the "
+                 "data hardly determine",
+                 unknown);
+    else if (own && !hidden)
+        snprintf(text, size,
+                 "a nearer start, or data that determine %.60s, or keep it at a known value "
+                 "(sdm_fit_opts.kept)",
+                 unknown_name(p, worst));
     else
-        name = pose[worst - p->n_params];
-    char moves[200] = "", keep[300] = "data that determine what still moves", unknown[200] = "";
+        snprintf(text, size, "a nearer start, or data that determine what still moves");
+}
+
+static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
+{
+    double most;
+    const size_t worst = most_restless(p, r, movement, &most);
+    const char *name = unknown_name(p, worst);
+    char moves[200] = "", remedy[400], unknown[200];
+    const bool swings = isfinite(most) && sdm_fit_swing(p, worst) > UNREST_MAX * r->sd[worst];
     if (isnan(r->sd[worst]))
         snprintf(moves, sizeof moves, "; %.100s may still move, its standard deviation is unknown",
                  name);
     else if (isfinite(most))
         snprintf(moves, sizeof moves,
-                 "; %.100s still moves by %.2g of its standard deviation, need %.2g", name, most,
-                 UNREST_MAX);
-    // what the data do not determine moves on with more iterations, too; where damping hides what
-    // moves, it is the likeliest
-    const bool may_be = !*moves || (worst < p->n_params && sdm_fit_hardly_known(r, worst));
-    if (may_be) name_hardly_known(p, r, unknown, sizeof unknown);
-    if (*unknown)
-        snprintf(keep, sizeof keep,
-                 "the data hardly determine %s: keep %s (sdm_fit_opts.kept), or give "
-                 "data that determine %s",
-                 unknown, strchr(unknown, ',') ? "them at known values" : "it at a known value",
-                 strchr(unknown, ',') ? "them" : "it");
-    else if (*moves && worst < p->n_params)
-        snprintf(keep, sizeof keep,
-                 "data that determine %.60s, or keep it at a known value (sdm_fit_opts.kept)",
-                 name);
-    // whoever has allowed more iterations already is not told to allow more
-    const bool many = p->opts->max_iterations > FIT_ITERATIONS_USUAL;
-    sdm_fail(err, SDM_E_QUALITY, "not converged after %zu iterations (%s%s): %s%s%s",
-             r->n_iterations, r->reason, moves,
-             many || *unknown ? "" : "more of them (sdm_fit_opts.max_iterations), ",
-             *unknown ? "" : "a nearer start, or ", keep);
+                 swings ? "; %.100s still goes to and fro by %.2g of its standard deviation, need "
+                          "%.2g"
+                        : "; %.100s still moves by %.2g of its standard deviation, need %.2g",
+                 name, most, UNREST_MAX);
+    name_hardly_known(p, r, unknown, sizeof unknown);
+    name_remedy(p, r, worst, !*moves, swings, unknown, remedy, sizeof remedy);
+    // whoever has allowed more iterations already is not told to allow more; nor where they did not
+    // lessen what moves
+    const bool more = p->opts->max_iterations <= FIT_ITERATIONS_USUAL && !swings &&
+                      strncmp(remedy, "the data", 8) != 0;
+    sdm_fail(err, SDM_E_QUALITY, "not converged after %zu iterations (%s%s): %s%s", r->n_iterations,
+             r->reason, moves, more ? "more of them (sdm_fit_opts.max_iterations), " : "", remedy);
 }
 
 void sdm_fit_name_restless(const fit_problem *p, sdm_fit_result *r, sdm_error *err)

@@ -96,10 +96,16 @@ def _doubts_of(model: Model) -> Doubts:
         try:
             model.check_use(use)
         except QualityError as error:
-            texts[use] = f"{'model' if model.path is None else model.path}: {error.text}"
+            texts[use] = error.text
         except UnsupportedError:  # not measured
             pass
-    return Doubts(texts)
+    # the check passes parameters that hardly change the volume, whatever their error
+    for line in model.quality.unfit:
+        if line.startswith("derivatives of the volume by ") and " % of their own size" in line:
+            before = [texts["volume_derivative"]] if "volume_derivative" in texts else []
+            texts["volume_derivative"] = "; ".join([*before, f"do not use the {line}"])
+    name = "model" if model.path is None else model.path
+    return Doubts({use: f"{name}: {text}" for use, text in texts.items()})
 
 
 @dataclass(frozen=True)
@@ -212,7 +218,8 @@ class Model:
     def check_use(self, use: str) -> None:
         """Raises QualityError, with the measured figure, if the training found the model not good
         enough for a use: "surface", "volume" (of maps), "derivative" (of maps by the parameters),
-        "volume_derivative", "distance" (far from the surface) or "surface_volume" (inside surfaces of
+        "volume_derivative" (passes parameters that hardly change the volume, whatever their error:
+        `quality.unfit` names them), "distance" (far from the surface) or "surface_volume" (inside surfaces of
         maps). Raises UnsupportedError if the training did not measure it. Else returns None."""
         call("sdm_model_check_use", self, choice(use, USES, "use"))
 
@@ -406,7 +413,8 @@ class Model:
         """The transposed Jacobian times `adjoint` [z, y, x]. If the adjoint is the derivative of a
         function of the map by the voxels, the result [k] is the derivative of this function by the
         parameters. Warns once if the training found derivatives off by over 20 %: those of the volume
-        for an adjoint of `Map.volume_adjoint`, else those of maps."""
+        for an adjoint of `Map.volume_adjoint`, also by a parameter that hardly changes it, else those of
+        maps."""
         p = self.values(params, **named)
         w = float32(adjoint, self.grid.shape, "adjoint")
         opts, slopes, result = self._opts(policy, threads), np.empty(len(p)), make("sdm_result")

@@ -313,6 +313,36 @@ static void refusals_quote_the_training(toy *t)
     }
 }
 
+/* A model whose derivatives of the volume are good enough names beside SDM_OK the parameters that
+ * hardly change the volume and whose own error is large; other uses and other lines do not count.
+ */
+static void small_parameters_beside_ok(toy *t)
+{
+    static const struct {
+        const char *unfit, *text;
+    } cases[] = {
+        {"volumes of maps: off by 3 %\n"
+         "derivatives of the volume by open: off by 395 % of their own size; by pin: off by 42 %: "
+         "these parameters hardly change the volume\nits tips\n",
+         "do not use the derivatives of the volume by open: off by 395 % of their own size; by "
+         "pin: "
+         "off by 42 %: these parameters hardly change the volume"},
+        {"derivatives of maps by open: off by 30 %\nits tips, off by 3 % of their own size\n", ""},
+        {"", ""}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        sdm_error err = {.text = "an earlier error"};
+        t->info.quality = (sdm_model_quality){.grade = "usable", .volume_derivative_error = 0.1};
+        snprintf(t->info.quality.unfit, sizeof t->info.quality.unfit, "%s", cases[i].unfit);
+        sdm_model *m = toy_open(t);
+        assert_int_equal(sdm_model_check_use(m, SDM_USE_VOLUME, &err), SDM_OK);
+        assert_string_equal(err.text, "an earlier error");
+        assert_int_equal(sdm_model_check_use(m, SDM_USE_VOLUME_DERIVATIVE, &err), SDM_OK);
+        assert_string_equal(err.text, cases[i].text);
+        assert_int_equal(sdm_model_check_use(m, SDM_USE_VOLUME_DERIVATIVE, NULL), SDM_OK);
+        sdm_model_free(m);
+    }
+}
+
 // The verdict of the training is kept; without one the file has no section for it, as the files of
 // earlier versions.
 static void quality_is_kept(void **state)
@@ -377,6 +407,7 @@ static void quality_is_kept(void **state)
     assert_int_equal(sdm_model_check_use(NULL, SDM_USE_VOLUME, &err), SDM_E_ARG);
     sdm_model_free(m);
     refusals_quote_the_training(&t);
+    small_parameters_beside_ok(&t);
     // an unknown grade and an impossible share are damage
     const sdm_model_quality wrong[] = {{.grade = "fine"},
                                        {.grade = "good", .cut = 1.5},

@@ -15,6 +15,7 @@ from conftest import SOURCE, ball, in_threads
 
 import sdmgen
 from sdmgen._errors import with_arguments
+from sdmgen._model import _doubts_of
 
 P = {"a": 4.1, "alpha": 0.5}
 WORDS = ["-p", "a=4.1", "-p", "alpha=0.5"]
@@ -127,6 +128,47 @@ def test_derivatives_and_volumes_that_are_bad_warn_once(model_file, tmp_path):
         fresh.sample([[0, 0, 0]], P)
         assert fresh(P, max_error=0.001).volume > 0
         assert pickle.loads(pickle.dumps(sdmgen.Map(fresh(P).values, fresh.grid))).volume > 0
+
+
+SMALL = """
+shape: {name: linkage, options: {links: 1}, ranges: {q1: [-0.4, 0.4]}}
+grid: {size: [56, 32, 32], spacing: 0.3, centre: [1, 0, 0]}
+network: {kind: template, depth: 0}
+data: {start: 60, online: 0, holdout: 8, memory_gb: 0.5}
+train: {steps: 10, batch: 64, refine: 0}
+"""
+
+
+def test_derivatives_of_a_volume_that_hardly_changes_warn_once(run, tmp_path):
+    """A joint that turns hardly changes the volume: the check of the whole model passes, the derivative is wrong."""
+    (tmp_path / "small.yaml").write_text(SMALL)
+    run("train", tmp_path / "small.yaml", "--out", tmp_path / "run")
+    file = tmp_path / "run" / "model.sdm"
+    model = sdmgen.Model(file)
+    model.check_use("volume_derivative")
+    k = [p.name for p in model.params].index("q1")
+    text = f"{file}: do not use the derivatives of the volume by q1: off by "
+    with pytest.warns(UserWarning, match=re.escape(text)) as caught:
+        slopes = model.vjp(model(q1=0.2).volume_adjoint(), q1=0.2)
+        model.vjp(model().volume_adjoint())
+    assert len(caught) == 1 and caught[0].filename == __file__ and "hardly changes the volume" in str(caught[0].message)
+
+    def volume(q1):  # of the mesh
+        return next(m.value for m in model.shape.measures(q1=q1) if m.name == "volume")
+
+    by_mesh = (volume(0.25) - volume(0.15)) / 0.1
+    assert abs(slopes[k] - by_mesh) > 0.2 * abs(by_mesh)
+    # only derivatives of volumes are told
+    fresh = sdmgen.Model(file)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fresh.vjp(np.ones(fresh.grid.shape, np.float32))
+    # beside a check that fails, too
+    bad = sdmgen.Model(file)
+    bad.check_use = lambda use: (_ for _ in ()).throw(sdmgen.QualityError("quality", "off by 30 % for length"))
+    doubts = _doubts_of(bad)
+    with pytest.warns(UserWarning, match="off by 30 % for length; do not use the derivatives of the volume by q1"):
+        doubts.warn("volume_derivative")
 
 
 def test_wrong_distances_far_from_the_surface_warn_once(model_file):

@@ -89,8 +89,8 @@ typedef enum sdm_model_use {
     SDM_USE_VOLUME = 1,            /* of maps: volume_error > SDM_VOLUME_BAD */
     SDM_USE_DERIVATIVE = 2,        /* of maps by the parameters, as of sdm_generate_jacobian() and
                                       --jacobian: derivative_error > SDM_DERIVATIVE_BAD */
-    SDM_USE_VOLUME_DERIVATIVE = 3, /* volume_derivative_error > SDM_DERIVATIVE_BAD; for parameters
-                                      that hardly change the volume see `unfit` */
+    SDM_USE_VOLUME_DERIVATIVE = 3, /* volume_derivative_error > SDM_DERIVATIVE_BAD; parameters that
+                                      hardly change the volume: sdm_model_check_use() */
     SDM_USE_DISTANCE = 4,          /* far from the surface: far_error_mm > a voxel */
     SDM_USE_SURFACE_VOLUME = 5     /* inside surfaces: surface_volume_error > SDM_VOLUME_BAD */
 } sdm_model_use;
@@ -145,10 +145,14 @@ SDM_API const sdm_model_info *sdm_model_get_info(const sdm_model *m);
 
 /* SDM_OK: the training found the model good enough for this use. SDM_E_QUALITY: not good enough;
    the message has the figure, as in "derivatives of volumes of its maps are off by 165 % for alpha,
-   more than 20 %". SDM_E_UNSUPPORTED: the training did not measure it (slow kinds of network,
-   earlier versions). SDM_E_ARG: m is NULL, or there is no such use. Functions that compute maps,
-   volumes and derivatives do not call this function: call it before you use their results. [any
-   thread] */
+   more than 20 %". A model passes SDM_USE_VOLUME_DERIVATIVE with a parameter that hardly changes
+   the volume, whatever the error of the derivative by it, even where its sign is wrong. So after
+   SDM_OK of this use err->text names such parameters with an error above 20 %: "do not use the
+   derivatives of the volume by open: off by 167 % of their own size: ..."; "": there are none.
+   `unfit` has the same line. SDM_E_UNSUPPORTED: the training did not measure it (slow kinds of
+   network, earlier versions). SDM_E_ARG: m is NULL, or there is no such use. Functions that compute
+   maps, volumes and derivatives do not call this function: call it before you use their results.
+   [any thread] */
 SDM_API sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error *err);
 
 /* Index of a parameter in the parameter vectors of the model; -1 if there is none of this name, or

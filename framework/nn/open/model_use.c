@@ -68,6 +68,21 @@ static worst_param find_worst(const char *unfit, const char *begin, double error
     return worst;
 }
 
+/* SDM_OK, with the parameters that hardly change the volume in the text of *err: those of the line
+ * of `unfit` about errors of their own size. "": there are none. */
+static sdm_status tell_small(const char *unfit, const char *begin, sdm_error *err)
+{
+    static const char own[] = " % of their own size";
+    for (const char *at = unfit; *at;) {
+        const size_t length = strcspn(at, "\n");
+        const char *found = strstr(at, own);
+        if (!strncmp(at, begin, strlen(begin)) && found && found < at + length)
+            return sdm_fail(err, SDM_OK, "do not use the %.*s", (int)length, at);
+        at += length + (at[length] == '\n');
+    }
+    return sdm_fail(err, SDM_OK, "%s", "");
+}
+
 static sdm_status check_grade(const sdm_model_quality *q, sdm_error *err)
 {
     if (!q->grade[0]) return sdm_fail(err, SDM_E_UNSUPPORTED, "the model has no grade");
@@ -127,6 +142,8 @@ sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error 
     if (isnan(f->error))
         return sdm_fail(err, SDM_E_UNSUPPORTED, "the training did not measure the errors of %s",
                         f->name);
+    if (f->error <= f->bad && use == SDM_USE_VOLUME_DERIVATIVE)
+        return tell_small(q->unfit, f->lines, err);
     if (f->error <= f->bad) return SDM_OK;
     const worst_param worst = find_worst(q->unfit, f->lines, f->error, f->bad);
     return sdm_fail(err, SDM_E_QUALITY, "%s are off by %s%s%s, more than %g %%%s", f->name,

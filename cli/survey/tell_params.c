@@ -9,7 +9,8 @@ void tell_unit(teller *t)
     const sdm_survey_scale *c = &t->s->found.scale;
     sdm_text text = {0};
     // the size and the speed are those of a part in another unit: tell_tiny() has told it
-    if ((!c->odd_size && !c->odd_speed) || t->s->found.tiny.shapes) return;
+    if (!c->odd_size && !c->odd_speed) return;
+    if (t->s->found.tiny.shapes && !sdm_survey_stretches(&t->s->found)) return;
     if (c->odd_size) sdm_text_add(&text, "the shape is %.3g mm in size", c->size);
     if (c->odd_speed)
         sdm_text_add(&text, "%s1 mm of the parameter '%s' moves its vertices by %.2g mm",
@@ -19,9 +20,10 @@ void tell_unit(teller *t)
     // an angle in degrees that tan() or a division makes huge
     if (c->degrees && c->size > SDM_SURVEY_SIZE_MAX)
         teller_add_degrees(t->s, &text);
+    else if (c->odd_speed && !c->swings)
+        sdm_survey_ask_unit(&t->s->found, t->s->shape, c->param, &text);
     else if (c->unit && !c->swings)
-        sdm_text_add(&text, ": if the vertices are in %s, multiply them by %g", c->unit,
-                     c->unit_mm);
+        sdm_text_add(&text, ": are the vertices in %s? Multiply them by %g", c->unit, c->unit_mm);
     teller_tell(t, SDM_E_QUALITY, &text);
 }
 
@@ -37,7 +39,7 @@ void tell_params(teller *t)
             sdm_text_add(&slow, "the parameter '%s' moves no vertex: does mesh() use it?",
                          params[k].name);
             teller_tell_cause(t, SDM_E_QUALITY, &slow);
-        } else if (sdm_survey_is_narrow(f, t->s->shape, k)) {
+        } else if (sdm_survey_is_narrow(f, t->s->shape, k) && !sdm_survey_stretches(f)) {
             sdm_text_add(&slow,
                          "the parameter '%s' ranges from %g to %g mm, which moves no vertex of a "
                          "shape of %.3g mm by more than %.2g mm",
@@ -154,12 +156,26 @@ static void tell_slow(teller *t)
                          f->speed[k] * (params[k].max - params[k].min));
             teller_tell(t, SDM_E_QUALITY, &slow);
         } else if (sdm_survey_is_slow(f, t->s->shape, k) && !f->scale.odd_speed && !jumps) {
-            sdm_text_add(&slow,
-                         "1 mm of the parameter '%s' moves no vertex by more than %.2g mm: are the "
-                         "vertices of a part in another unit than mm?",
-                         params[k].name, f->speed[k]);
+            sdm_survey_add_slow(f, t->s->shape, k, &slow);
             teller_tell(t, SDM_E_QUALITY, &slow);
         }
+    }
+}
+
+/* Lengths that move one part as a length in m does. */
+static void tell_mixed(teller *t)
+{
+    const sdm_shape_survey *f = &t->s->found;
+    for (size_t k = 0; k < f->n_params && f->unit; k++) {
+        const sdm_survey_unit *u = &f->unit[k];
+        sdm_text text = {0};
+        if (!(u->mixed > 0)) continue;
+        sdm_text_add(&text,
+                     "'%s' moves part %zu by %.2g mm per mm, part %zu by %.2g: is it in m in one "
+                     "place?",
+                     sdm_instance_params(t->s->shape, NULL)[k].name, u->mixed_part + 1, u->mixed,
+                     u->fair_part + 1, u->fair);
+        teller_tell(t, SDM_OK, &text);
     }
 }
 
@@ -183,4 +199,5 @@ void tell_motion(teller *t)
     tell_jumps(t);
     tell_slow(t);
     tell_callbacks(t);
+    tell_mixed(t);
 }

@@ -32,7 +32,7 @@ static void tell_tiny(teller *t)
     const sdm_survey_count *c = &t->s->found.tiny;
     sdm_text text = {0};
     size_t part[2] = {0};
-    if (!c->shapes) return;
+    if (!c->shapes || sdm_survey_stretches(&t->s->found)) return;
     const sdm_part_audit *audit = teller_audit(t, c->worst);
     if (!audit || !(sdm_survey_part_lengths(audit, &part[0], &part[1]) > 0)) {
         teller_tell_count(t, SDM_E_QUALITY, c, "parts much smaller than others");
@@ -57,9 +57,9 @@ static void tell_flat(teller *t)
     const sdm_survey_count *c = &t->s->found.flat;
     sdm_text text = {0};
     size_t i = 0;
-    // tell_tiny(), tell_unit() and tell_params() explain lengths in m
+    // tell_tiny(), tell_unit(), tell_params() and tell_motion() explain lengths in m
     if (!c->shapes || t->s->found.tiny.shapes >= c->shapes || t->s->found.narrow ||
-        t->s->found.scale.odd_size)
+        t->s->found.scale.odd_size || sdm_survey_converts(&t->s->found))
         return;
     const sdm_part_audit *audit = teller_audit(t, c->worst);
     if (!audit) {

@@ -120,13 +120,23 @@ expect 3 "shape 'faulty' at .*: mesh\(\) reads p\[3\], but the last parameter is
 faulty unlisted 3 "^broken +mesh\(\) reads p\[2\], but the last parameter is p\[1\], 'reach'; "
 
 faulty open 3 '^broken +open or badly oriented edges in all 21 shapes, up to 3 at .*: part 2 of 2 \(11 triangles, vertices 8 \.\. 15, .* has 3 edges .*, the first at [0-9.]+ -?[0-9.]+ -?[0-9.]+ mm: add the triangles'
-faulty metres 4 '^warning +the shape is 0\.008 mm in size, 1 mm of the parameter .size. moves its vertices by 0\.0017 mm; the unit of sdmgen is mm: if the vertices are in m, multiply them by 1000$'
+faulty metres 4 '^warning +the shape is 0\.008 mm in size, 1 mm of the parameter .size. moves its vertices by 0\.0017 mm; the unit of sdmgen is mm: are the vertices in m\? Multiply them by 1000$'
 # A part in metres beside one in millimetres: named with its size, and no other line explains it.
 faulty crumb 4 '^warning +part 3 of 3 \(12 triangles, vertices 16 \.\. 23, box 0\.01 0\.01 0\.01 \.\. 0\.015 0\.015 0\.015 mm\) is 1200 times smaller than part 1 of 3 \(.*\) at size=3 reach=[0-9.]+ \(in all 21 shapes\): are the vertices of one of them in another unit than mm\? Multiply those in m by 1000, those in um by 0\.001; if it is a leftover speck, remove it$'
 expect 4 mend sdmgen shapes check faulty -O fault=crumb --plugin "$plugin" --samples 4 --json
 has '"tiny": \{"shapes": 9, "most": 12[0-9.]+, "at": '
 faulty small 4 '^warning +part 2 of 2 \(.*\) is [0-9]+ times smaller than part 1 of 2 \('
 if grep -q 'are its vertices in m?' out; then bad "a part in metres is told twice: $(cat out)"; fi
+# A length in metres among others in millimetres: both commands ask for the factor, in the same words.
+told="1 mm of the parameter 'reach' moves no vertex of part 2 of 2 by more than 0\.001 mm, and no other part: does mesh\(\) multiply 'reach' by 0\.001\?$"
+faulty converted 4 "^warning +$told"
+[ "$(grep -cE '^(warning|broken)' out)" -eq 1 ] || bad "a converted length has consequences: $(cat out)"
+sdmgen shapes test faulty -O fault=converted --plugin "$plugin" --samples 4 >out 2>err
+has "^doubtful units +$told"
+expect 0 - sdmgen shapes check faulty -O fault=mixed --plugin "$plugin" --samples 16
+has "^note +'size' moves part 2 by 0\.0005 mm per mm, part 1 by 1\.7: is it in m in one place\?$"
+expect 0 - sdmgen shapes check faulty -O fault=lever --plugin "$plugin" --samples 16
+if grep -q 'in m in one place' out; then bad "a small motion is taken for metres: $(cat out)"; fi
 faulty fail 3 "^broken +no mesh in [0-9]+ of 21 shapes: shape 'faulty' at size=2\.5 reach=1\.5: too large"
 faulty wall 4 '^warning +walls pass through each other in [0-9]+ of the [0-9]+ shapes that were followed from the default shape: on the way from the default shape to size=1 reach=[12] [0-9]+ % of the surface turns over, at about size=1\.[78][0-9]* reach='
 faulty step 4 '^warning +vertex (9|1[0-5]) jumps by 1 mm at reach=1\.75'

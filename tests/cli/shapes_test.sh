@@ -30,7 +30,7 @@ fi
 sed 's/p\[RADIUS\]/p[RADIUS] \/ 1000/g' "$source_folder/examples/plugin/octahedron.c" >metres.c
 cc -shared -fPIC -I"$source_folder/framework/include" metres.c -o metres.so -lm || bad 'the plug-in metres.so was not built'
 expect 0 - sdmgen shapes test ./metres.so --samples 4
-has '^doubtful units +the shape is 0\.01 mm in size, 1 mm of .radius. moves its vertices by 0\.001 mm: are they in m\? Multiply them by 1000$'
+has '^doubtful units +the shape is 0\.01 mm in size, 1 mm of the parameter .radius. moves its vertices by 0\.001 mm: are the vertices in m\? Multiply them by 1000$'
 has '^fine: .*, with doubts$'
 
 # a shape that crashes is tested to the end

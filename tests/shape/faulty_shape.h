@@ -22,7 +22,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
      "meets|groups|crumb|spare|offset|around|unlisted|sticky|diagonal|negative|window|swapped|"
      "cache|caches|lapse|pair|hidden|grows|posts|"
-     "inverted|averted",
+     "inverted|averted|converted|mixed|lever",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -224,6 +224,14 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "negative")) handle[0][1] = -1, handle[1][1] = 1 - p[0];
     if (!strcmp(fault, "pair")) handle[0][1] = -1, handle[1][1] = p[0] - p[1] - 0.75;
     if (!strcmp(fault, "swapped") && is_large) handle[0][1] = half, handle[1][1] = -half;
+    // `converted`: a length in m among others in mm; `mixed`: the size is in m in the handle alone;
+    // `lever`: it moves the handle as little, but not everywhere alike
+    if (!strcmp(fault, "converted")) handle[1][0] = p[0] + 0.001 * reach;
+    if (!strcmp(fault, "mixed") || !strcmp(fault, "lever")) {
+        const double more = !strcmp(fault, "mixed") ? 0.0005 * p[0] : 0.0001 * p[0] * p[0];
+        handle[0][0] = 0.5, handle[1][0] = 2.5 + reach;
+        handle[0][1] -= more, handle[1][1] += more;
+    }
     if (!strcmp(fault, "within")) handle[0][0] -= 1, handle[1][0] -= 2.2;
     if (!strcmp(fault, "twins")) memcpy(handle, body, sizeof handle);
     if (groups) {
@@ -269,7 +277,7 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
 static int faulty_velocity(const void *self, const sdm_host *host, const sdm_option_value *options,
                            const double *p, size_t n_vert, double *velocity)
 {
-    (void)self, (void)host, (void)p;
+    (void)self, (void)host;
     const int wrong = !strcmp(options[0].text, "velocity"),
               moves = !strcmp(options[0].text, "meets"), // both ends of the handle
         spare = !strcmp(options[0].text, "spare");
@@ -287,6 +295,13 @@ static int faulty_velocity(const void *self, const sdm_host *host, const sdm_opt
         velocity[3 * v] = 1;
         velocity[3 * (n_vert + v)] = moves || v >= 16 || v & 1 ? (wrong ? 1.01 : 1) : 0;
     }
+    const double by_size = !strcmp(options[0].text, "mixed")   ? 0.0005
+                           : !strcmp(options[0].text, "lever") ? 0.0002 * p[0]
+                                                               : 0;
+    for (size_t v = 8; v < 16 && by_size > 0; v++)
+        velocity[3 * v] = 0, velocity[3 * v + 1] = v >> 1 & 1 ? by_size : -by_size;
+    for (size_t v = 8; v < 16 && !strcmp(options[0].text, "converted"); v++)
+        velocity[3 * (n_vert + v)] *= 0.001;
     for (size_t d = 0; d < 2 && !strcmp(options[0].text, "diagonal"); d++)
         velocity[18 + d] = d ? -0.02 : 0.02;
     return 0;

@@ -167,8 +167,9 @@ static void a_part_in_metres(void **state)
     has(SDM_TEST_UNITS, SDM_TEST_DOUBTFUL, "times smaller than another one in 13 of 13 shapes");
     // the speed by `reach` of the vertices in metres, 1000 times less than in millimetres
     has(SDM_TEST_UNITS, SDM_TEST_DOUBTFUL,
-        "1 mm of 'reach' moves no vertex by more than 0.001 mm: are these vertices in m? Multiply "
-        "them by 1000");
+        "1 mm of the parameter 'reach' moves no vertex of part 2 of 2 by more than 0.001 mm, and "
+        "no "
+        "other part: are the vertices of part 2 of 2 in m? Multiply them by 1000");
     assert_true(found.test[SDM_TEST_UNITS].has_params);
 }
 

@@ -1,8 +1,8 @@
 /* Surveys of families of shapes: each fault of faulty_shape.h is found, with its place and amount
  * known from the source; shapes without faults pass.
  * Tests: shape_survey.c survey_fold.c survey_follow.c survey_line.c survey_meeting.c survey_pole.c
- * survey_scale.c survey_shapes.c survey_state.c survey_still.c survey_swing.c shape_beside.c
- * units.c */
+ * survey_scale.c survey_shapes.c survey_state.c survey_still.c survey_swing.c survey_unit.c
+ * shape_beside.c units.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -251,6 +251,87 @@ static int bar_mesh(const void *self, const sdm_host *host, const sdm_option_val
     if (!failed)
         faulty_box(out, 0, (const double[3]){0, -50, -50}, (const double[3]){p[0], 50, 50}, 0);
     return failed;
+}
+
+/* A bar whose length mesh() converts to m, while its width is in mm. */
+static int converted_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                          const double *p, sdm_mesh_out *out)
+{
+    const double length = 0.001 * p[0];
+    return bar_mesh(self, host, options, &length, out);
+}
+
+/* A bar whose length and width mesh() converts to m. */
+static int metre_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                      const double *p, sdm_mesh_out *out)
+{
+    const int failed = bar_mesh(self, host, options, p, out);
+    for (size_t i = 0; i < 24 && !failed; i++) out->vert[i] *= 0.001;
+    return failed;
+}
+
+/* A bar of 100 mm whose length is a thousand times too large. */
+static int stretched_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                          const double *p, sdm_mesh_out *out)
+{
+    const double length = 1000 * p[0];
+    return bar_mesh(self, host, options, &length, out);
+}
+
+// A length that mesh() converts by itself is told from vertices that are all in another unit: who
+// multiplies these by 1000 would make right coordinates wrong.
+static void lengths_that_are_converted(void **state)
+{
+    (void)state;
+    static const struct {
+        int (*mesh)(const void *, const sdm_host *, const sdm_option_value *, const double *,
+                    sdm_mesh_out *);
+        const char *question;
+    } cases[] = {{converted_mesh, ": does mesh() multiply 'length' by 0.001?"},
+                 {metre_mesh, ": are the vertices in m? Multiply them by 1000"},
+                 {stretched_mesh, ": does mesh() multiply 'length' by 1000?"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const sdm_param length = {"length", "mm", 100, 150, 120, "x"};
+        const sdm_shape shape = {.abi = SDM_SHAPE_ABI,
+                                 .size = sizeof(sdm_shape),
+                                 .name = "bar",
+                                 .summary = "test",
+                                 .params = &length,
+                                 .n_params = 1,
+                                 .mesh = cases[i].mesh};
+        sdm_instance *instance = NULL;
+        sdm_shape_survey s;
+        sdm_text text = {0};
+        if (sdm_instance_create(&shape, NULL, 0, NULL, &instance, &err) ||
+            sdm_shape_survey_make(instance, &(sdm_survey_opts){.brief = true}, &s, &err))
+            fail_msg("%s", err.text);
+        assert_true(s.scale.odd_speed);
+        sdm_survey_ask_unit(&s, instance, 0, &text);
+        assert_string_equal(text.data, cases[i].question);
+        assert_int_equal(sdm_survey_converts(&s), i != 1);
+        assert_int_equal(sdm_survey_stretches(&s), i == 2);
+        sdm_text_dispose(&text);
+        sdm_shape_survey_dispose(&s);
+        sdm_instance_free(instance);
+    }
+}
+
+// The size counts in m in one of its two uses: the motion of the handle by it is 0.0005 mm per mm
+// everywhere. A motion that differs from size to size, such as that of a lever, is none.
+static void a_length_in_metres_in_one_place(void **state)
+{
+    (void)state;
+    sdm_shape_survey s = survey("mixed");
+    assert_true(fabs(s.unit[0].mixed - 5e-4) < 1e-9 && fabs(s.unit[0].fair - sqrt(3)) < 1e-6);
+    assert_true(s.unit[0].mixed_part == 1 && s.unit[0].fair_part == 0 && s.unit[1].mixed == 0);
+    assert_int_equal(sdm_shape_survey_verdict(&s), SDM_OK);
+    sdm_shape_survey_dispose(&s);
+    static const char *const none[] = {"lever", "none", "small", "converted"};
+    for (size_t i = 0; i < sizeof none / sizeof *none; i++) {
+        s = survey(none[i]);
+        if (s.unit[0].mixed != 0 || s.unit[1].mixed != 0) fail_msg("%s", none[i]);
+        sdm_shape_survey_dispose(&s);
+    }
 }
 
 // A shape of over 1 m is in mm where a length in mm moves its vertices by as many mm.
@@ -891,6 +972,8 @@ int main(void)
         cmocka_unit_test(parts_in_the_same_place),
         cmocka_unit_test(vertices_in_metres),
         cmocka_unit_test(large_shape_in_mm),
+        cmocka_unit_test(lengths_that_are_converted),
+        cmocka_unit_test(a_length_in_metres_in_one_place),
         cmocka_unit_test(a_part_in_metres),
         cmocka_unit_test(a_part_without_volume),
         cmocka_unit_test(a_box_winds_once),

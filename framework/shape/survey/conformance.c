@@ -166,20 +166,6 @@ static bool jumps_along(const sdm_shape_survey *f, size_t k)
     return f->jump && f->jump[k].kind != SDM_BREAK_NONE;
 }
 
-/* A length of which 1 mm hardly moves a vertex: vertices in m, where it moves them by 0.001 mm. */
-static void add_slow(sdm_text *text, const sdm_param *p, double speed)
-{
-    double length;
-    const char *unit = sdm_unit_near(1 / speed, &length);
-    sdm_text_add(text,
-                 "%s1 mm of '%s' moves no vertex by more than %.2g mm: are these vertices in ",
-                 text->data ? "; " : "", p->name, speed);
-    if (unit)
-        sdm_text_add(text, "%s? Multiply them by %g", unit, length);
-    else
-        sdm_text_add(text, "another unit than mm?");
-}
-
 /* The size and the motion by the parameters. */
 static void tell_units(tests *t)
 {
@@ -194,10 +180,13 @@ static void tell_units(tests *t)
     if (c->odd_size || c->odd_speed) {
         sdm_text_add(&text, "the shape is %.3g mm in size", c->size);
         if (c->odd_speed)
-            sdm_text_add(&text, ", 1 mm of '%s' moves its vertices by %.2g mm",
+            sdm_text_add(&text, ", 1 mm of the parameter '%s' moves its vertices by %.2g mm",
                          params[c->param].name, c->speed);
-        if (c->unit)
-            sdm_text_add(&text, ": are they in %s? Multiply them by %g", c->unit, c->unit_mm);
+        if (c->odd_speed)
+            sdm_survey_ask_unit(f, t->instance, c->param, &text);
+        else if (c->unit)
+            sdm_text_add(&text, ": are the vertices in %s? Multiply them by %g", c->unit,
+                         c->unit_mm);
     }
     for (size_t k = 0; k < f->n_params; k++)
         if (sdm_survey_is_other_length(&params[k]))
@@ -211,13 +200,16 @@ static void tell_units(tests *t)
                          "%s'%s' moves a shape of %.3g mm by %.2g mm per rad: does mesh() convert "
                          "it from degrees?",
                          text.data ? "; " : "", params[k].name, c->size, f->speed[k]);
-        else if (sdm_survey_is_narrow(f, t->instance, k))
+        else if (sdm_survey_is_narrow(f, t->instance, k) && !sdm_survey_stretches(f))
             sdm_text_add(
                 &text, "%s'%s' ranges from %g to %g mm in a shape of %.3g mm: are these m?",
                 text.data ? "; " : "", params[k].name, params[k].min, params[k].max, c->size);
-        else if (sdm_survey_is_slow(f, t->instance, k) && !c->odd_speed && !jumps_along(f, k))
-            add_slow(&text, &params[k], f->speed[k]);
-    if (f->tiny.shapes)
+        else if (sdm_survey_is_slow(f, t->instance, k) && !c->odd_speed && !jumps_along(f, k)) {
+            if (text.data) sdm_text_add(&text, "; ");
+            sdm_survey_add_slow(f, t->instance, k, &text);
+        }
+    const bool tiny = f->tiny.shapes && !sdm_survey_stretches(f);
+    if (tiny)
         sdm_text_add(&text,
                      "%sa part is %.0f times smaller than another one in %zu of %zu shapes: are "
                      "the vertices of one of them in another unit than mm, or is it a leftover "
@@ -226,7 +218,7 @@ static void tell_units(tests *t)
     sdm_test_result *r =
         result(t, SDM_TEST_UNITS, text.data ? SDM_TEST_DOUBTFUL : SDM_TEST_PASSED, c->size, "%s",
                text.data ? text.data : "the size fits to mm, every parameter moves vertices");
-    if (f->tiny.shapes) at_shape(t, r, f->tiny.worst);
+    if (tiny) at_shape(t, r, f->tiny.worst);
     sdm_text_dispose(&text);
 }
 

@@ -80,6 +80,7 @@ static sdm_status look_closer(survey *v, int n_threads, sdm_error *err)
     survey_stop_set(&stop, v, 1, 0);
     sdm_status status = survey_unions(v, n_threads, err);
     if (!status) status = survey_follow(v, n_threads, err);
+    if (!status && !survey_is_late(v, 1)) status = sdm_survey_find_mixed(&v->family, s, err);
     s->box_untested = survey_is_late(v, 1);
     if (!status && !s->box_untested) status = widen_box(v, err);
     if (status || s->failed.shapes || s->open.shapes || s->inside_out.shapes) return status;
@@ -131,6 +132,7 @@ sdm_status sdm_shape_survey_make(const sdm_instance *shape, const sdm_survey_opt
     if (out->repeat.cause == SDM_REPEAT_THREADS) n_threads = 1;
     if (!s) s = survey_meshes(&v, n_threads, err);
     if (!s) s = sdm_survey_measure_scale(&v.family, out, err);
+    if (!s) s = sdm_survey_find_units(&v.family, out, err);
     bool more = !s && goes_on(&v, SDM_SURVEY_MESHES);
     if (more) s = survey_parts(&v, n_threads, err);
     more = more && !s && goes_on(&v, SDM_SURVEY_PARTS);
@@ -155,6 +157,7 @@ void sdm_shape_survey_dispose(sdm_shape_survey *s)
     sdm_free(s->p);
     sdm_free(s->jump);
     sdm_free(s->speed);
+    sdm_free(s->unit);
     sdm_free(s->still);
     *s = (sdm_shape_survey){0};
 }

@@ -182,6 +182,7 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
     sdm_survey_scale *c = &s->scale;
     *c = (sdm_survey_scale){.speed = NAN};
     sdm_status status = SDM_ALLOC(&s->speed, s->n_params, "speeds of parameters", err);
+    if (!status) status = SDM_ALLOC(&s->unit, s->n_params, "units of parameters", err);
     for (size_t k = 0; k < s->n_params && !status; k++) {
         s->speed[k] = NAN;
         const sdm_param *p = &f->shape->params[k];

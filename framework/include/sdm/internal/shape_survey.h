@@ -6,6 +6,7 @@
 #include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/shape_repeat.h"
+#include "sdm/internal/text.h"
 #include "sdm/registry.h"
 
 #ifdef __cplusplus
@@ -118,6 +119,29 @@ typedef struct sdm_survey_scale {
     double unit_mm;
 } sdm_survey_scale;
 
+/* Parts that a message names at most. */
+enum { SDM_SURVEY_NAMED = 4 };
+
+/* Why a length in mm moves vertices by too little or too much, and whether it does so in one part
+ * alone. */
+typedef struct sdm_survey_unit {
+    /* the parts that the parameter moves, of the n_parts of the first shape; n_parts 0: not known
+     */
+    size_t moved, n_parts;
+    size_t part[SDM_SURVEY_NAMED]; /* indices of the first of them */
+    /* the unit (m, inches, cm, um) that explains the speed, and its length in mm; NULL: none does
+     */
+    const char *name;
+    double mm;
+    /* all coordinates of these parts are in this unit: in it they are about as large as the other
+     * parts and as the lengths that move them. false: mesh() is likely to convert the parameter */
+    bool whole;
+    /* mm per mm in the part mixed_part, which a length in m would explain, while the parameter
+     * moves the part fair_part as a length in mm does; 0: there is no such part */
+    double mixed, fair;
+    size_t mixed_part, fair_part;
+} sdm_survey_unit;
+
 /* Does a parameter in rad reach beyond 30, almost five turns? It is likely to be in degrees. */
 bool sdm_survey_is_odd_angle(const sdm_param *p);
 
@@ -172,7 +196,8 @@ typedef struct sdm_shape_survey {
      * the first shape; of a few samples, too, if it is slow there. 0: it moves no vertex by 1e-9 of
      * the size over the range. */
     double *speed;
-    size_t slow; /* parameters that are odd by themselves: sdm_survey_is_slow() */
+    size_t slow;           /* parameters that are odd by themselves: sdm_survey_is_slow() */
+    sdm_survey_unit *unit; /* [n_params] of the parameters with the unit mm; zero of the others */
     /* groups of parts that meet each other, but no part of another group; amount: their number */
     sdm_survey_count apart;
     /* parts that enclose nothing, also in a piece of them (sdm_part.doubled), or are thinner than
@@ -310,6 +335,24 @@ sdm_status sdm_shape_survey_verdict(const sdm_shape_survey *s);
 /* Is parameter k of the survey odd by itself: it moves no vertex, or its unit is mm and it is slow,
  * or sdm_survey_is_faint()? false if its speed is not known. */
 bool sdm_survey_is_slow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k);
+
+/* Appends the finding about parameter k, which is slow and in mm, with its likely cause: "1 mm of
+ * the parameter 'reach' moves no vertex ... by more than 0.001 mm: does mesh() multiply 'reach' by
+ * 0.001?" */
+void sdm_survey_add_slow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k,
+                         sdm_text *out);
+
+/* Appends the question about the cause alone: ": are the vertices in m? Multiply them by 1000" or
+ * ": does mesh() multiply 'reach' by 0.001?"; nothing if no unit explains the speed. */
+void sdm_survey_ask_unit(const sdm_shape_survey *s, const sdm_instance *shape, size_t k,
+                         sdm_text *out);
+
+/* Does mesh() seem to convert a length in mm to another unit? */
+bool sdm_survey_converts(const sdm_shape_survey *s);
+
+/* Does mesh() seem to convert the fastest length so that it makes the shapes far too large? Other
+ * lengths and other parts then seem too small. */
+bool sdm_survey_stretches(const sdm_shape_survey *s);
 
 /* Is parameter k an angle in rad that moves no vertex by SDM_SURVEY_FAINT times the size of the
  * shapes, per rad and over the range in the table of the shape? mesh() is likely to convert it from

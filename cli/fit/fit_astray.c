@@ -113,9 +113,41 @@ static sdm_status start_distances(const cli_fit *f, const cloud *c, bool at_midd
     return s;
 }
 
+/* Whether the residuals of the fit found tell no other shape: where the data are nearly round, a
+ * fit that is half a turn off, too. */
+static bool lies_on_points(const cli_fit *f)
+{
+    return f->found && !cli_fit_found(f, SDM_FIT_CHECK_MISSING, SDM_FIT_FAILED, -INFINITY) &&
+           !cli_fit_found(f, SDM_FIT_CHECK_RESIDUALS, SDM_FIT_FAILED, -INFINITY);
+}
+
+/* Whether a fit to turned points explains them better than the fit found explains the points.
+ * Points that are too far from a fit are not among those that it uses. */
+static bool explains_more(const cli_fit *f, const sdm_fit_result *turned)
+{
+    const sdm_fit_result *r = &f->result;
+    if (!f->found || turned->n_used > r->n_used) return true;
+    return turned->n_used == r->n_used &&
+           turned->log_likelihood >
+               r->log_likelihood + SDM_FIT_PREFERRED * fmax(r->noise_factor, 1);
+}
+
+/* text[size] = how well both explain the points; empty: no fit was found. */
+static void tell_both(const cli_fit *f, const sdm_fit_result *turned, char *text, size_t size)
+{
+    const sdm_fit_result *r = &f->result;
+    if (f->found && turned->point_sd < r->point_sd)
+        snprintf(text, size, " (they scatter by %.3g mm about it, not by %.3g mm)",
+                 turned->point_sd, r->point_sd);
+    else if (f->found)
+        snprintf(text, size, " (log-likelihood %.4g, not %.4g)", turned->log_likelihood,
+                 r->log_likelihood);
+}
+
 /* *passes = the fit from the same start lies on the points with half a turn of them about it, which
- * changes the signs of x and y. */
-static sdm_status fit_turned(const cli_fit *f, const double start[3], bool *passes, sdm_error *err)
+ * changes the signs of x and y, and explains them better than the fit found. text[size]: both. */
+static sdm_status fit_turned(const cli_fit *f, const double start[3], bool *passes, char *text,
+                             size_t size, sdm_error *err)
 {
     const size_t n = f->target.n_points;
     sdm_fit_target turned = f->target;
@@ -129,7 +161,8 @@ static sdm_status fit_turned(const cli_fit *f, const double start[3], bool *pass
     turned.points = x;
     if (!s) s = sdm_fit(&f->source, &turned, &opts, &r, err);
     const sdm_fit_finding *residuals = sdm_fit_finding_of(&r.verdict, SDM_FIT_CHECK_RESIDUALS);
-    *passes = !s && !(residuals && residuals->grade != SDM_FIT_PASSED);
+    *passes = !s && !(residuals && residuals->grade != SDM_FIT_PASSED) && explains_more(f, &r);
+    if (*passes) tell_both(f, &r, text, size);
     sdm_fit_dispose(&r);
     sdm_free(x);
     return s == SDM_E_NOMEM || s == SDM_E_CANCELLED ? s : SDM_OK;
@@ -162,28 +195,30 @@ static void advise_frame(const cli_fit *f, bool either, char *text, size_t size)
 }
 
 /* Points without a search over rotations: half a turn about z, from RAS to LPS or of the start, may
- * be missing. The start shape shows it where its parameters are about right; else a second fit
- * does. --ras does not change a start from --translation or --start-points. */
+ * be missing. The start shape shows it where its parameters are about right; else, or where the fit
+ * found lies on the points, a second fit does. --ras does not change a start from --translation or
+ * --start-points. */
 static sdm_status check_frame(const cli_fit *f, const cloud *c, const double start[3], bool placed,
                               char *text, size_t size, sdm_error *err)
 {
     double off[2];
     bool passes = false;
-    char advice[400];
+    char advice[400], both[100] = "";
     if (f->target.kind != SDM_FIT_POINTS || f->opts.turns != SDM_FIT_TURNS_NONE) return SDM_OK;
     sdm_status s = start_distances(f, c, !placed, off, err);
-    const bool shown = !s && off[0] > OFF * c->size && off[1] < NEARER * off[0];
+    const bool shown =
+        !s && off[0] > OFF * c->size && off[1] < NEARER * off[0] && !lies_on_points(f);
     if (!s && !shown && f->doubt.status == SDM_E_QUALITY && isnan(f->args->pose.translation[0]) &&
         !f->args->fit.start_points)
-        s = fit_turned(f, start, &passes, err);
+        s = fit_turned(f, start, &passes, both, sizeof both, err);
     if (!shown && !passes) return s;
     // a start that turns about a given place, away from the z axis, is right where it is
     const double *at = isnan(f->args->pose.translation[0]) ? start : f->opts.start_pose.translation;
     advise_frame(f, !placed || passes || hypot(at[0], at[1]) < ON_AXIS * c->size, advice,
                  sizeof advice);
     if (passes)
-        snprintf(text, size, "; with x and y of the other sign the fit lies on the points: %s",
-                 advice);
+        snprintf(text, size, "; with x and y of the other sign the fit lies on the points%s: %s",
+                 both, advice);
     else
         snprintf(text, size,
                  "; with x and y of the other sign most points lie within %.2g mm of the shape at "

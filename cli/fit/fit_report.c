@@ -188,9 +188,10 @@ void cli_fit_print(const cli_fit *f)
     printf("%s after %zu iterations (%s)\n", r->converged ? "converged" : "NOT CONVERGED",
            r->n_iterations, r->reason);
     if (r->n_restarts)
-        printf("  restarts     %zu: a refused fit went on from a better pose or value of a "
-               "parameter\n",
-               r->n_restarts);
+        printf(
+            "  restarts     %zu: a fit that was refused or in doubt went on from a better pose or "
+            "value of a parameter\n",
+            r->n_restarts);
     print_maps(f);
     printf(
         "  time         %.2f s: search of the start %.2f s; iterations %.2f s; verdict and rivals "

@@ -629,8 +629,48 @@ static sdm_status attempt_again(fit_problem *p, bool exact, sdm_fit_result *out,
     return s ? s : attempt(p, out, fitted, err);
 }
 
+// *out = a copy of the values of `from`, which keeps its memory; the objective of *p is copied
+static sdm_status result_branch(fit_problem *p, const sdm_fit_result *from, sdm_fit_result *out,
+                                sdm_error *err)
+{
+    double *objective = NULL;
+    const sdm_status s = SDM_ALLOC(&objective, p->objective_capacity, "result of the fit", err);
+    if (s) return s;
+    memcpy(objective, from->objective, p->n_iterations * sizeof *objective);
+    *out = *from;
+    out->params = out->covariance = out->sd = out->correlation = out->prior_sd = NULL;
+    out->at_bound = out->by_prior = NULL;
+    out->objective = objective;
+    return SDM_OK;
+}
+
+/* A fit to points that passes, or leaves doubt, although the shape explains them better in another
+ * pose: fits from this pose, too, and keeps the better one of both, whatever its verdict is. */
+static sdm_status attempt_better(fit_problem *p, bool exact, sdm_fit_result *out, fit_state *fitted,
+                                 bool *again, sdm_error *err)
+{
+    sdm_fit_result first = *out, second;
+    const double gain_least = SDM_FIT_PREFERRED * p->noise_factor;
+    sdm_status s = result_branch(p, &first, &second, err);
+    if (s) return s;
+    s = attempt_again(p, exact, &second, fitted, again, err);
+    const bool failed = s && s != SDM_E_QUALITY;
+    *again = !failed && second.n_used >= first.n_used &&
+             second.log_likelihood > first.log_likelihood + gain_least;
+    if (failed || *again) {
+        sdm_fit_dispose(&first);
+        *out = second;
+        return s;
+    }
+    first.seconds_search = second.seconds_search;
+    first.seconds_verdict = second.seconds_verdict;
+    sdm_fit_dispose(&second);
+    *out = first;
+    return SDM_OK;
+}
+
 /* Fits and judges, and begins again from another pose or value of a parameter as long as the fit is
- * refused and this explains the data better. */
+ * refused, or points leave doubt, and this explains the data better. */
 static sdm_status attempts(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
@@ -638,10 +678,16 @@ static sdm_status attempts(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     bool again = !p->is_rival && !o->keep_params && !o->keep_pose;
     fit_state fitted;
     sdm_status s = attempt(p, out, &fitted, err);
-    for (size_t i = 0; i < o->max_restarts && again && s == SDM_E_QUALITY; i++) {
+    for (size_t i = 0; i < o->max_restarts && again; i++) {
         sdm_error trouble = {0};
-        const sdm_status tried = attempt_again(p, exact, out, &fitted, &again, &trouble);
-        // without a better start the refusal stands
+        sdm_status tried;
+        if (s == SDM_E_QUALITY)
+            tried = attempt_again(p, exact, out, &fitted, &again, &trouble);
+        else if (!s && p->has_better)
+            tried = attempt_better(p, exact, out, &fitted, &again, &trouble);
+        else
+            break;
+        // without a better start the verdict stands
         if (!again && tried != SDM_E_NOMEM && tried != SDM_E_CANCELLED) break;
         s = tried;
         if (err) *err = trouble;

@@ -13,6 +13,7 @@
 #include "fit/solver/open_motions.h"
 #include "fit/solver/prior.h"
 #include "fit/start/principal_axes.h"
+#include "fit/start/shape_turns.h"
 #include "fit/start/start_list.h"
 #include "fit/start/start_search.h"
 #include "fit/start/turn_set.h"
@@ -40,6 +41,12 @@
 // turns to a surface between the two, from which the fit may end at a better maximum: an
 // upside-down bone
 #define ALIKE_TRIED 2
+// points: starts of sdm_fit_turned_starts() that are looked at, for each choice of the parameters,
+// and of these as many as climb: those with the parameters of the fit, with others
+#define TURNED_MOST 8
+#define TURNED_TRIED 2
+#define TURNED_TRIED_OTHERWISE 1
+#define CLIMBS_MAX (TURNED_TRIED + 2 * TURNED_TRIED_OTHERWISE)
 // voxels of the shape by which surfaces are compared
 #define VOXELS_ALIKE 1000
 // samples on which fit and rivals are compared, and on which all rotations are
@@ -50,12 +57,6 @@
 #define STEPS_OF_FIT 2
 // rotations from which the fit may return to its own pose before the search is given up
 #define TRIES_MAX 3
-// turns that are tried: the rotations of a cube, by a third and a fifth of a turn about each of its
-// axes (fins, petals), and those evenly over all rotations
-#define N_CUBE 24
-#define N_FOLD 6
-#define N_EVEN 72
-#define N_TURNS (N_CUBE + N_FOLD + N_EVEN)
 // values of a parameter that are tried: the middles of this many equal parts of its range, without
 // those nearer to the value of the fit than half of a part
 #define N_PARTS 3
@@ -162,47 +163,10 @@ static likeness compare_map(const own_fit *own, const fit_maps *m, const fit_sta
     return compare(own, m->distance, volume_of(m, m->distance), other);
 }
 
-// rotation i of the cube's: a permutation of the axes with signs, and no reflection; 0: identity
-static void cube_rotation(size_t i, double r[9])
-{
-    static const int order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1},
-                                    {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
-    const size_t which = i / 4;
-    const double a = i & 1 ? -1 : 1, b = i & 2 ? -1 : 1, c = (which < 3 ? 1 : -1) * a * b,
-                 sign[3] = {a, b, c};
-    memset(r, 0, 9 * sizeof *r);
-    for (int row = 0; row < 3; row++) r[3 * row + order[which][row]] = sign[row];
-}
-
-// *to = the fit turned about its centre: by turn i of the cube of its axes, about one of these
-// axes, or by one of the others
-static void turned(const own_fit *own, size_t i, fit_state *to)
-{
-    const double *v = own->axes, back[9] = {v[0], v[3], v[6], v[1], v[4], v[7], v[2], v[5], v[8]};
-    double cube[9], half[9], q[9], at[3], moved[3];
-    if (i < N_CUBE) {
-        cube_rotation(i, cube);
-        m3_product(back, cube, half);
-        m3_product(half, v, q);
-    } else if (i < N_CUBE + N_FOLD) {
-        const size_t k = i - N_CUBE, axis = k / 2;
-        const double angle = (k % 2 ? 0.4 : 2.0 / 3) * acos(-1), *by = v + 3 * axis;
-        const sdm_pose about = {.rotation = {angle * by[0], angle * by[1], angle * by[2]}};
-        sdm_pose_matrix(&about, q);
-    } else {
-        sdm_fit_turn(SDM_FIT_TURNS_SPHERE, i - N_CUBE - N_FOLD, N_EVEN, q);
-    }
-    *to = own->state;
-    m3_product(own->state.rotation, q, to->rotation);
-    sdm_fit_to_world(&own->state, own->centre, at);
-    sdm_fit_to_world(to, own->centre, moved);
-    for (int k = 0; k < 3; k++) to->translation[k] += at[k] - moved[k];
-}
-
 /* The turns from which rivals start, the best first. */
 typedef struct turns {
-    fit_start other[N_TURNS];     // to other surfaces, with the parameters of the fit
-    fit_start alike[ALIKE_TRIED]; // to surfaces that are nearly that of the fit, all free
+    fit_start other[FIT_SHAPE_TURNS]; // to other surfaces, with the parameters of the fit
+    fit_start alike[ALIKE_TRIED];     // to surfaces that are nearly that of the fit, all free
     size_t n_other, n_alike;
     // the turn by at least SYMMETRIC_MIN to the most similar surface, if it is the same; same.dice
     // 0: there is none
@@ -228,9 +192,9 @@ static void turns_rank(const own_fit *own, turns *t)
 {
     t->n_other = t->n_alike = 0;
     t->same.dice = 0;
-    for (size_t i = 0; i < N_TURNS; i++) {
+    for (size_t i = 0; i < FIT_SHAPE_TURNS; i++) {
         fit_start one = {0};
-        turned(own, i, &one.state);
+        sdm_fit_shape_turned(&own->state, own->centre, own->axes, i, &one.state);
         const likeness like = compare(own, own->distance, own->volume, &one.state);
         if (like.dice > SYMMETRIC && like.apart < APART) {
             same_take(own, &one.state, like.dice, t);
@@ -239,7 +203,7 @@ static void turns_rank(const own_fit *own, turns *t)
         one.log_likelihood = sdm_fit_likelihood_at(own->p, &one.state, SAMPLES_RANKED);
         one.keep_params = like.dice <= ALIKE;
         if (one.keep_params)
-            sdm_fit_start_insert(t->other, &t->n_other, N_TURNS, &one);
+            sdm_fit_start_insert(t->other, &t->n_other, FIT_SHAPE_TURNS, &one);
         else
             sdm_fit_start_insert(t->alike, &t->n_alike, ALIKE_TRIED, &one);
     }
@@ -340,24 +304,82 @@ static void nearest_take(nearest *least, const fit_problem *p, const own_fit *ow
     least->state = p->state;
 }
 
-// Lowers *least where the fit, turned to a surface that is nearly its own, climbs to a better
-// maximum: then the fit is not the best one. A maximum as good is the same or a symmetric one. The
-// fit climbs as far on these samples.
-static sdm_status compare_alike(fit_problem *p, own_fit *own, const turns *t, nearest *least,
-                                sdm_error *err)
+// how far a surface may be from that of the fit and still be the same
+static const likeness SAME_SURFACE = {.dice = SAME, .apart = APART};
+
+static bool is_other(likeness l) { return l.dice <= SAME || l.apart > APART; }
+
+// whether the rival, which explains the samples with this gain of the fit over it, is clearly
+// better
+static bool is_better(const fit_standing *fit, const fit_standing *rival)
 {
-    const likeness same = {.dice = SAME, .apart = APART};
+    return (!sdm_fit_has_units(fit, rival) ||
+            sdm_fit_chi_square(fit, rival) >= BETTER * sdm_fit_chi_square(rival, fit)) &&
+           sdm_fit_gain(fit, rival) < -SDM_FIT_PREFERRED;
+}
+
+// whether the fitted shape has another surface in this pose, a large turn away: the parameters of a
+// rival may differ because the data do not determine them
+static bool is_other_pose(const own_fit *own, const fit_state *state)
+{
+    return sdm_fit_angle_between(own->state.rotation, state->rotation) >= SYMMETRIC_MIN &&
+           is_other(compare(own, own->distance, own->volume, state));
+}
+
+// Points: adds to list[*n] the best turns of the fit to other surfaces, as many as `most`, with the
+// parameters that sdm_fit_turned_starts() makes of its own
+static sdm_status turned_add(fit_problem *p, const own_fit *own, int params, size_t most,
+                             fit_start *list, size_t *n, sdm_error *err)
+{
+    fit_start found[TURNED_MOST];
+    size_t n_found = 0, taken = 0;
+    p->state = own->state;
+    const sdm_status s =
+        sdm_fit_turned_starts(p, own->centre, own->axes, params, TURNED_MOST, found, &n_found, err);
+    for (size_t i = 0; i < n_found && taken < most && !s; i++)
+        if (is_other_pose(own, &found[i].state)) list[(*n)++] = found[i], taken++;
+    return s;
+}
+
+// the turns from which all unknowns climb: of points those that their poses alone improve, with the
+// parameters of the fit and others; else those to nearly the same surface
+static sdm_status climbs_list(fit_problem *p, const own_fit *own, const turns *t, fit_start *list,
+                              size_t *n, sdm_error *err)
+{
+    *n = 0;
+    if (p->target->kind != SDM_FIT_POINTS) {
+        for (; *n < t->n_alike; ++*n) list[*n] = t->alike[*n];
+        return SDM_OK;
+    }
+    sdm_status s = SDM_OK;
+    for (int params = 0; params < 3 && !s; params++)
+        s = turned_add(p, own, params, params ? TURNED_TRIED_OTHERWISE : TURNED_TRIED, list, n,
+                       err);
+    p->state = own->state;
+    return s ? s : sdm_fit_samples_near(p, SAMPLES, err);
+}
+
+// Lowers *least where the fit, turned, climbs to a better maximum: then the fit is not the best
+// one. A maximum as good is the same or a symmetric one, unless points do not show where it
+// differs. The fit climbs as far on these samples.
+static sdm_status compare_climbs(fit_problem *p, own_fit *own, const turns *t, nearest *least,
+                                 sdm_error *err)
+{
+    const bool points = p->target->kind == SDM_FIT_POINTS;
+    fit_start list[CLIMBS_MAX];
     fit_standing fit, rival;
+    size_t n = 0;
     bool other;
-    if (!t->n_alike || p->opts->keep_params) return SDM_OK;
+    if (p->opts->keep_params) return SDM_OK;
+    sdm_status s = climbs_list(p, own, t, list, &n, err);
+    if (s || !n) return s;
     const fit_start here = {.state = own->state};
-    sdm_status s = challenge(p, own, &here, same, &other, &fit, err);
-    for (size_t i = 0; i < t->n_alike && !s; i++) {
-        s = challenge(p, own, &t->alike[i], same, &other, &rival, err);
-        if (!s && other &&
-            (!sdm_fit_has_units(&fit, &rival) ||
-             sdm_fit_chi_square(&fit, &rival) >= BETTER * sdm_fit_chi_square(&rival, &fit)) &&
-            sdm_fit_gain(&fit, &rival) < -SDM_FIT_PREFERRED)
+    s = challenge(p, own, &here, SAME_SURFACE, &other, &fit, err);
+    for (size_t i = 0; i < n && !s; i++) {
+        s = challenge(p, own, &list[i], SAME_SURFACE, &other, &rival, err);
+        if (s || !other) continue;
+        const bool worse = points && sdm_fit_gain(&fit, &rival) > -SDM_FIT_PREFERRED;
+        if (worse ? is_other_pose(own, &p->state) : is_better(&fit, &rival))
             nearest_take(least, p, own, &fit, &rival, false);
     }
     return s;
@@ -411,7 +433,7 @@ static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_e
         s = challenge(p, own, &value[i], alike, &other, &rival, err);
         if (!s && other) nearest_take(least, p, own, fit, &rival, true);
     }
-    if (!s) s = compare_alike(p, own, t, least, err);
+    if (!s) s = compare_climbs(p, own, t, least, err);
     sdm_free(t);
     sdm_free(value);
     return s;
@@ -479,7 +501,7 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     // errors of coarse maps at sharp edges weigh more in fits to points than a small gain
     const bool doubt = points && least.gain > -CLEARLY_BETTER;
     // a fit to an image takes long, and such an image mostly shows another shape
-    p->has_better = points && !doubt && !equal;
+    p->has_better = points && !equal;
     p->better = least.state;
     sdm_fit_judge_add(v, SDM_FIT_CHECK_NEXT_POSE, false, doubt ? SDM_FIT_DOUBTFUL : SDM_FIT_FAILED,
                       least.gain, SDM_FIT_PREFERRED, "%s", text);

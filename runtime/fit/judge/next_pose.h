@@ -1,9 +1,10 @@
 /* Compares the fit with the shape in its next best pose: the runner-up of the search for the start,
-   and the best of 96 rotations of the fitted shape, 24 that exchange its principal axes and 72
-   spread evenly. If the shape explains the data as well in another pose, they do not
-   determine its pose. The same with another value of one parameter, such as a joint of an arm: the
-   best of three values, spread evenly over the range, of the two parameters for which it explains
-   the data best. */
+   and the best of 101 rotations of the fitted shape, 29 about its principal axes and 72 spread
+   evenly. If the shape explains the data as well in another pose, they do not determine its pose.
+   The same with another value of one parameter, such as a joint of an arm: the best of three
+   values, spread evenly over the range, of the two parameters for which it explains the data best.
+   Points of a part of the surface: further turns, with other parameters, see
+   sdm_fit_turned_starts(). */
 #pragma once
 
 #include "fit/solver/problem.h"
@@ -13,7 +14,7 @@
    both, with the tissues of each. A rival whose surface is nearly that of the fit is none. No
    finding where the pose is kept or where no rival remains, as for a ball of given size. factor:
    how many correlated voxels of an image count as one independent one. *p is left at a rival, with
-   samples from that ball; points: p->better is the rival, where the finding failed because it
-   explains them better. SDM_E_QUALITY: the finding failed; SDM_E_NOMEM, SDM_E_CANCELLED. */
+   samples from that ball; points: p->better is the rival, where it explains them better.
+   SDM_E_QUALITY: the finding failed; SDM_E_NOMEM, SDM_E_CANCELLED. */
 sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdict *v,
                                    sdm_error *err);

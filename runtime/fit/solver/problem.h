@@ -113,8 +113,8 @@ typedef struct fit_problem {
     bool has_runner_up;
     double runner_up_objective;
     fit_state runner_up;
-    /* points: the judgement has refused the fit because the shape in this pose explains them better
-     */
+    /* points: the judgement has refused or doubted the fit because the shape in this pose explains
+     * them better */
     bool has_better;
     fit_state better;
     /* where the search for the start is, for progress(); see sdm_fit_progress */

@@ -262,9 +262,10 @@ typedef struct sdm_fit_opts {
     double beside;
 
     /* how often a fit that its checks refuse may go on from another value of one parameter (points:
-       also from another pose) that explains the data better. A long shape, for example, may have
-       stopped with one end on the data and the other one beyond them. 0: never; never either where
-       parameters or pose are kept */
+       also from another pose, and where SDM_FIT_CHECK_NEXT_POSE is doubtful because of it) that
+       explains the data better. A long shape, for example, may have stopped with one end on the
+       data and the other one beyond them. 0: never; never either where parameters or pose are kept
+     */
     size_t max_restarts;
     /* [n_params] true: this parameter is not estimated and keeps its start value; NULL: all or none
        are estimated, see keep_params */
@@ -503,7 +504,7 @@ typedef struct sdm_fit_result {
     /* [n_params] standard deviation of each parameter before the fit: that of its prior or, without
        a prior, of a uniform distribution over its range */
     double *prior_sd;
-    /* how often a refused fit went on from another pose or value of a parameter, see
+    /* how often a fit went on from another pose or value of a parameter, see
        sdm_fit_opts.max_restarts; the result is that of the last of these fits */
     size_t n_restarts;
     /* true: the fit began with a network and ended with exact maps, see

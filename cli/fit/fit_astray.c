@@ -113,12 +113,24 @@ static sdm_status start_distances(const cli_fit *f, const cloud *c, bool at_midd
     return s;
 }
 
-/* Whether the residuals of the fit found tell no other shape: where the data are nearly round, a
- * fit that is half a turn off, too. */
-static bool lies_on_points(const cli_fit *f)
+/* 1 + 2 cos(angle) of the turn from one rotation to the other. */
+static double likeness_of_turns(const sdm_pose *a, const sdm_pose *b)
 {
-    return f->found && !cli_fit_found(f, SDM_FIT_CHECK_MISSING, SDM_FIT_FAILED, -INFINITY) &&
-           !cli_fit_found(f, SDM_FIT_CHECK_RESIDUALS, SDM_FIT_FAILED, -INFINITY);
+    double x[9], y[9], trace = 0;
+    sdm_pose_matrix(a, x);
+    sdm_pose_matrix(b, y);
+    for (int i = 0; i < 9; i++) trace += x[i] * y[i];
+    return trace;
+}
+
+/* Whether the fit found has made half a turn about z by itself, so that its place is the other one.
+ */
+static bool has_turned(const cli_fit *f)
+{
+    const sdm_pose half = {{0, 0, acos(-1)}, {0, 0, 0}},
+                   other = sdm_pose_compose(&half, &f->opts.start_pose);
+    return f->found && likeness_of_turns(&f->result.pose, &other) >
+                           likeness_of_turns(&f->result.pose, &f->opts.start_pose);
 }
 
 /* Whether a fit to turned points explains them better than the fit found explains the points.
@@ -196,7 +208,8 @@ static void advise_frame(const cli_fit *f, bool either, char *text, size_t size)
 
 /* Points without a search over rotations: half a turn about z, from RAS to LPS or of the start, may
  * be missing. The start shape shows it where its parameters are about right; else, or where the fit
- * found lies on the points, a second fit does. --ras does not change a start from --translation or
+ * found has turned by itself, a second fit does. --ras does not change a start from --translation
+ * or
  * --start-points. */
 static sdm_status check_frame(const cli_fit *f, const cloud *c, const double start[3], bool placed,
                               char *text, size_t size, sdm_error *err)
@@ -206,8 +219,7 @@ static sdm_status check_frame(const cli_fit *f, const cloud *c, const double sta
     char advice[400], both[100] = "";
     if (f->target.kind != SDM_FIT_POINTS || f->opts.turns != SDM_FIT_TURNS_NONE) return SDM_OK;
     sdm_status s = start_distances(f, c, !placed, off, err);
-    const bool shown =
-        !s && off[0] > OFF * c->size && off[1] < NEARER * off[0] && !lies_on_points(f);
+    const bool shown = !s && off[0] > OFF * c->size && off[1] < NEARER * off[0] && !has_turned(f);
     if (!s && !shown && f->doubt.status == SDM_E_QUALITY && isnan(f->args->pose.translation[0]) &&
         !f->args->fit.start_points)
         s = fit_turned(f, start, &passes, both, sizeof both, err);

@@ -27,7 +27,7 @@ has "^  residuals    .*, most at \([-0-9., ]*\) mm, in the shape's frame \([-0-9
 # Where the parameters at the start are far off, a second fit tells it.
 expect 0 - sdmgen phantom --shape cochlea -O edge=1 -p a=3 -p b=0.1 --spacing 1 -o small.nii --surface small.csv --surface-points 400 --quiet
 negate small.csv >small-ras.csv
-expect 4 '; with x and y of the other sign the fit lies on the points \((they scatter by 0\.0[0-9]* mm about it, not by 0\.[0-9]* mm|log-likelihood [-0-9.e+]*, not [-0-9.e+]*)\): either the start is turned by half a turn about z \(leave --rotation out, or --rotation 0,0,3\.142 turns it back\), or the points are RAS \(--ras converts them\)$' \
+expect 4 '; with x and y of the other sign the fit lies on the points \((they scatter by (0\.0[0-9]*|[0-9.]*e-[0-9]*) mm about it, not by 0\.[0-9]* mm|log-likelihood [-0-9.e+]*, not [-0-9.e+]*)\): either the start is turned by half a turn about z \(leave --rotation out, or --rotation 0,0,3\.142 turns it back\), or the points are RAS \(--ras converts them\)$' \
     sdmgen fit --shape cochlea -O edge=1 small-ras.csv --rotation 0,0,0 --mirror no --quiet
 expect 0 - sdmgen fit --shape cochlea -O edge=1 small-ras.csv --rotation 0,0,0 --mirror no --quiet --ras
 # A start that is turned by half a turn about z looks the same: the advised rotation turns it back. Away from the z axis only RAS explains it.

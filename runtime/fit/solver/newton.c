@@ -47,7 +47,7 @@
 // most
 #define DROP_MAX 1.0
 #define HALVINGS_MAX 8
-// Averaged steps swing where an unknown goes to and fro by more than SWING_MAX of its standard
+// Averaged steps of points swing where an unknown goes to and fro by more than SWING_MAX of its standard
 // deviation, and by no less than SWING_SAME times as much as FIT_RECENT steps before. They are then
 // scaled down until they swing by no more than SWING_RELAXED, to RELAXATION_MIN of their size at
 // least.
@@ -341,7 +341,7 @@ static sdm_status averaged_move(fit_problem *p, double *step, bool *whole, sdm_e
     }
 }
 
-/* Relaxation of averaged steps. Where the gradient falls steeply across a kink, full steps lead
+/* Relaxation of averaged steps of points. Where the gradient falls steeply across a kink, full steps lead
  * from one side to the other and back, or round several kinks. Steps that are scaled down come to
  * rest between them. */
 typedef struct fit_relaxation {
@@ -506,8 +506,8 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
         out->flat = !out->converged && !out->small && opts->max_flat > 0 &&
                     (damping.flat >= opts->max_flat || idle >= IDLE_MAX);
         out->converged = out->converged || out->small || out->flat;
-        out->at_rest =
-            opts->averaged && !out->converged && relaxation_adapt(p, opts, &relaxation, work);
+        out->at_rest = opts->averaged && fit_maps_direct(&p->maps) && !out->converged &&
+                       relaxation_adapt(p, opts, &relaxation, work);
         s = iteration_record(p, opts, out->step, err);
     }
     sdm_free(work);

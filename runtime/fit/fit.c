@@ -352,9 +352,9 @@ static sdm_status maximise_with_maps(fit_problem *p, fit_newton_opts *newton, fi
     if (!s && fit_maps_direct(&p->maps) && sdm_fit_objective(p) < objective - GAIN_EVEN) {
         p->state = plain, *end = first, p->recent = recent;
         p->maps_params[0] = NAN;
-        return sdm_fit_evaluate(p, err);
+    } else if (!s) {
+        s = maximise_between(p, newton, end, max_iterations, eps, err);
     }
-    if (!s) s = maximise_between(p, newton, end, max_iterations, eps, err);
     sdm_fit_averaging_end(p);
     return s ? s : sdm_fit_evaluate(p, err);
 }

@@ -47,10 +47,10 @@
 // most
 #define DROP_MAX 1.0
 #define HALVINGS_MAX 8
-// Averaged steps of points swing where an unknown goes to and fro by more than SWING_MAX of its standard
-// deviation, and by no less than SWING_SAME times as much as FIT_RECENT steps before. They are then
-// scaled down until they swing by no more than SWING_RELAXED, to RELAXATION_MIN of their size at
-// least.
+// Averaged steps of points swing where an unknown goes to and fro by more than SWING_MAX of its
+// standard deviation, and by no less than SWING_SAME times as much as FIT_RECENT steps before. They
+// are then scaled down until they swing by no more than SWING_RELAXED, to RELAXATION_MIN of their
+// size at least.
 #define SWING_MAX 0.1
 #define SWING_SAME 0.9
 #define SWING_RELAXED 0.05
@@ -341,9 +341,9 @@ static sdm_status averaged_move(fit_problem *p, double *step, bool *whole, sdm_e
     }
 }
 
-/* Relaxation of averaged steps of points. Where the gradient falls steeply across a kink, full steps lead
- * from one side to the other and back, or round several kinks. Steps that are scaled down come to
- * rest between them. */
+/* Relaxation of averaged steps of points. Where the gradient falls steeply across a kink, full
+ * steps lead from one side to the other and back, or round several kinks. Steps that are scaled
+ * down come to rest between them. */
 typedef struct fit_relaxation {
     /* the steps are scaled by this; 1: they are full and accelerated */
     double factor;

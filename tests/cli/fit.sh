@@ -205,6 +205,8 @@ present label.png mesh.png mesh.off mesh.nrrd
 expect 0 - sdmgen fit $fit points.csv --rotation 0,0,0 -p rx=3.2 -p ry=3.2 --spacing 0.35 --json
 near "$(param rx)" 3 0.05
 near "$(param ry)" 3.5 0.05
+# points without errors determine all parameters
+grep -q '"not_determined": \[\]' out || bad "not determined: $(grep -o '"not_determined": [^]]*' out)"
 cp out xyz.json
 # a reference and a truth that lie elsewhere
 sdmgen fit $fit points.csv --rotation 0,0,0 -p rx=3.2 -p ry=3.2 --reference label.nrrd --truth truth.json -q >out 2>err

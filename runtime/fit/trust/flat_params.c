@@ -20,6 +20,9 @@
 #define NEAR 6.0
 // the first value of a range that is tried, in standard deviations; each next one is twice as far
 #define FIRST 2.0
+// smallest change that is tried, as a share of the range: of points without errors rounding hides
+// the likelihood of smaller ones
+#define LEAST 1e-4
 // the likelihood is flatter than the parabola if it asks for a deviation this many times as large
 #define FLATTER 1.5
 
@@ -132,7 +135,8 @@ static sdm_status find_flatter(const scan *c, size_t k, const double *row, bool 
     sdm_status s = SDM_OK;
     *flatter = false;
     for (int side = -1; side <= 1 && !s; side += 2) {
-        double off = side * NEAR * c->r->sd[k], loss;
+        const double range = c->p->high[k] - c->p->low[k];
+        double off = side * fmax(NEAR * c->r->sd[k], LEAST * range), loss;
         s = measure_loss(c, k, row, &off, &loss, err);
         if (fabs(off) > 0.5 * NEAR * c->r->sd[k])
             *flatter = *flatter || FLATTER * FLATTER * 2 * variance * loss < off * off;
@@ -150,7 +154,8 @@ static sdm_status scan_range(const scan *c, size_t k, const double *row, double 
     *sd = 0;
     for (int side = -1; side <= 1; side += 2) {
         const double end = side < 0 ? at - c->p->low[k] : c->p->high[k] - at;
-        for (double far = FIRST * c->r->sd[k]; far < 2 * end && !s; far *= 2) {
+        const double first = fmax(FIRST * c->r->sd[k], LEAST * (c->p->high[k] - c->p->low[k]));
+        for (double far = first; far < 2 * end && !s; far *= 2) {
             double off = side * far, loss;
             s = measure_loss(c, k, row, &off, &loss, err);
             // at a bound next to the estimate, or without a shape, the loss says nothing

@@ -24,7 +24,7 @@
    than the other. */
 #define MUCH_WORSE 1.5
 // bytes of the part of a note about a command that leaves the kind open
-#define OPEN_NOTE 240
+#define OPEN_NOTE 320
 
 /* Appends an option and its value to a command. */
 static void add_option(sdm_text *command, const char *option, const char *value)
@@ -333,8 +333,9 @@ static const char *open_note(const sdm_train_report *r, double minutes, double f
     if (is_open(r))
         snprintf(text, OPEN_NOTE,
                  "network.kind stays auto: this run had no time to try %s; at its pace the "
-                 "train.minutes of this command are enough for both kinds%s; ",
-                 pod ? "template" : "pod", alone);
+                 "train.minutes of this command are enough for both kinds%s%s; ",
+                 pod ? "template" : "pod", alone,
+                 pod ? "; network.kind=template alone mostly takes less: try it first" : "");
     return text;
 }
 

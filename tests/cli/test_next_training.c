@@ -163,7 +163,8 @@ static void kind_stays_open(void **state)
         assert_string_equal(text, expected);
         snprintf(expected, sizeof expected,
                  "              (network.kind stays auto: this run had no time to try template; at "
-                 "its pace the train.minutes of this command are enough for both kinds%s%s%s)\n",
+                 "its pace the train.minutes of this command are enough for both kinds%s%s%s; "
+                 "network.kind=template alone mostly takes less: try it first)\n",
                  cases[i].alone[0] ? "; with network.kind=pod " : "", cases[i].alone,
                  cases[i].alone[0] ? " are enough" : "");
         assert_string_equal(second, expected);
@@ -198,7 +199,8 @@ static void finer_grid_leaves_kind_open(void **state)
     assert_string_equal(second,
                         "              (network.kind stays auto: this run had no time to "
                         "try template; at its pace the train.minutes of this command are "
-                        "enough for both kinds; with network.kind=pod 16 are enough; the finer "
+                        "enough for both kinds; with network.kind=pod 16 are enough; "
+                        "network.kind=template alone mostly takes less: try it first; the finer "
                         "grid is "
                         "for derivatives of the volume, see `not for`; it has 8 times the voxels; "
                         "nothing else needs to change, because the error at the surface is only "

@@ -423,43 +423,19 @@ static sdm_status start_find(fit_problem *p, sdm_fit_result *out, sdm_error *err
     return s;
 }
 
-/* Largest number of iterations of a polish after the main phase. A fit to points that does not
- * converge with a network goes on with exact distances, which need no maps. */
-static size_t polish_iterations(const fit_problem *p, const fit_newton_end *end)
-{
-    const bool points = p->target->kind == SDM_FIT_POINTS;
-    if (!p->source->model || !p->source->shape || (!end->converged && !points)) return 0;
-    if (p->opts->max_polish_iterations) return p->opts->max_polish_iterations;
-    return end->converged || p->is_rival ? 0 : p->opts->max_iterations;
-}
-
-/* Runs the main phase and, if the options or points ask for it, a polish: more iterations with
- * exact maps after a fit with a network. */
-static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+/* Maximises in a phase, and reports how it ended. what: the name of the phase. */
+static sdm_status maximise_in(fit_problem *p, sdm_fit_phase phase, size_t max_iterations,
+                              const char *what, sdm_fit_result *out, sdm_error *err)
 {
     const sdm_fit_opts *o = p->opts;
-    fit_newton_opts newton = {.phase = SDM_FIT_MAIN,
+    fit_newton_opts newton = {.phase = phase,
                               .keep_params = o->keep_params,
                               .keep_pose = o->keep_pose,
                               .keep_blur = o->keep_blur,
                               .keep_appearance = o->keep_appearance,
-                              .max_iterations = o->max_iterations};
+                              .max_iterations = max_iterations};
     fit_newton_end end = {0};
-    // main phase
-    sdm_status s = maximise_twice(p, &newton, &end, err);
-    const char *what = p->source->model ? "fit" : "fit with exact maps";
-    // polish: the appearance restarts, because it may have modelled the network's errors as a
-    // tissue
-    const size_t polish = s ? 0 : polish_iterations(p, &end);
-    if (polish) {
-        p->maps.exact = true;
-        p->state.appearance = o->appearance;
-        p->maps_params[0] = NAN;
-        newton.phase = SDM_FIT_POLISH;
-        newton.max_iterations = polish;
-        what = "polish with exact maps";
-        s = maximise_twice(p, &newton, &end, err);
-    }
+    const sdm_status s = maximise_twice(p, &newton, &end, err);
     out->converged = !s && end.converged;
     if (out->converged && end.small)
         snprintf(out->reason, sizeof out->reason,
@@ -475,6 +451,31 @@ static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
                  "the fit settled",
                  what, end.step);
     return s;
+}
+
+/* Goes on with exact maps after a fit with a network. */
+static sdm_status polish(fit_problem *p, size_t max_iterations, sdm_fit_result *out, sdm_error *err)
+{
+    p->maps.exact = true;
+    // the appearance restarts, because it may have modelled the network's errors as a tissue
+    p->state.appearance = p->opts->appearance;
+    p->maps_params[0] = NAN;
+    return maximise_in(p, SDM_FIT_POLISH, max_iterations, "polish with exact maps", out, err);
+}
+
+// whether the shape of the network is known, so that exact maps can follow
+static bool may_polish(const fit_problem *p) { return p->source->model && p->source->shape; }
+
+/* Runs the main phase and the polish that the options ask for. Exact distances of points also end
+ * what has not converged. */
+static sdm_status maximise(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+{
+    const sdm_fit_opts *o = p->opts;
+    const bool points = p->target->kind == SDM_FIT_POINTS;
+    const sdm_status s = maximise_in(p, SDM_FIT_MAIN, o->max_iterations,
+                                     p->source->model ? "fit" : "fit with exact maps", out, err);
+    if (s || !may_polish(p) || !o->max_polish_iterations || (!out->converged && !points)) return s;
+    return polish(p, o->max_polish_iterations, out, err);
 }
 
 // standard deviation of the distances of the points on the surface, each by its probability to be
@@ -579,6 +580,14 @@ static sdm_status attempt(fit_problem *p, sdm_fit_result *out, fit_state *fitted
     if (!s) sdm_fit_tell_progress(p, SDM_FIT_JUDGE, 0);
     if (!s) s = assess(p, out, err);
     if (!s) sdm_fit_accept_small_steps(p, out);
+    // points that do not come to rest with a network go on with exact distances
+    if (!s && !out->converged && may_polish(p) && !p->maps.exact && !p->is_rival &&
+        p->target->kind == SDM_FIT_POINTS) {
+        s = polish(p, p->opts->max_iterations, out, err);
+        out->network_error_sd = NAN;
+        if (!s) s = assess(p, out, err);
+        if (!s) sdm_fit_accept_small_steps(p, out);
+    }
     // 7. report the result, also of a fit that failed with SDM_E_QUALITY; 8. judge it
     if (!s || s == SDM_E_QUALITY) report(p, out);
     *fitted = p->state;

@@ -118,7 +118,7 @@ class FitResult:
     iterations: int
     #: how often a refused fit went on from another pose or value of a parameter
     restarts: int
-    #: True: the fit began with a network and ended with exact maps (polish=True)
+    #: True: the fit began with a network and ended with exact maps (polish=True, or points that did not converge with the network)
     polished: bool
     #: edge of the voxels of exact maps (mm) that would be fine enough, where the check `map voxels` has
     #: not passed, or `network bias` and a polish may end too coarse: fit with `spacing=` of it; else NaN

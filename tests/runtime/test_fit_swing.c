@@ -209,24 +209,24 @@ static void test_text_names_what_is_open(void **state)
 
 // The inverse of {{4, 0, 1}, {0, 9, 0}, {1, 0, 1}} has the diagonal 1/3, 1/9, 4/3; without the last
 // unknown it is 1/4, 1/9.
-static void test_deviations(void **state)
+static void test_inverse(void **state)
 {
     (void)state;
     const double a[9] = {4, 0, 1, 0, 9, 0, 1, 0, 1};
     const bool held[2][3] = {{false, false, false}, {false, false, true}};
     const double variance[2][3] = {{1.0 / 3, 1.0 / 9, 4.0 / 3}, {1.0 / 4, 1.0 / 9, 0}};
-    double sd[3], work[18];
+    double inverse[9], work[18];
     for (int i = 0; i < 2; i++) {
-        assert_true(sdm_fit_deviations(3, a, held[i], sd, work));
-        for (int k = 0; k < 3; k++) assert_true(fabs(sd[k] * sd[k] - variance[i][k]) < 1e-12);
+        assert_true(sdm_fit_inverse(3, a, held[i], inverse, work));
+        for (int k = 0; k < 3; k++) assert_true(fabs(inverse[4 * k] - variance[i][k]) < 1e-12);
     }
-    assert_false(sdm_fit_deviations(2, (const double[4]){1, 2, 2, 1}, held[0], sd, work));
+    assert_false(sdm_fit_inverse(2, (const double[4]){1, 2, 2, 1}, held[0], inverse, work));
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_steps_come_to_rest),
                                        cmocka_unit_test(test_text_names_what_is_open),
-                                       cmocka_unit_test(test_deviations)};
+                                       cmocka_unit_test(test_inverse)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

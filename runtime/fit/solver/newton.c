@@ -355,20 +355,23 @@ typedef struct fit_relaxation {
 } fit_relaxation;
 
 // the largest movement moves() of an unknown in the last steps, in standard deviations by the
-// quadratic model; 0 where these are unknown
+// quadratic model; 0 where these are unknown. work: 4 n n numbers
 static double largest_movement(const fit_problem *p, const fit_newton_opts *opts,
                                double (*moves)(const fit_problem *p, size_t i), double *work)
 {
     const size_t n = p->information.n_unknowns;
-    double gradient[FIT_UNKNOWNS_MAX], sd[FIT_UNKNOWNS_MAX], most = 0;
+    double gradient[FIT_UNKNOWNS_MAX], most = 0, *inverse = work + n * n;
     fit_limits limits;
+    bool known = false;
     limits_set(p, opts, &limits);
-    equations_set(p, true, gradient, work);
-    bool known = sdm_fit_deviations(n, work, limits.kept, sd, work + n * n);
-    if (!known) equations_set(p, false, gradient, work);
-    if (!known) known = sdm_fit_deviations(n, work, limits.kept, sd, work + n * n);
-    for (size_t i = 0; i < p->n_params + 6 && known; i++)
-        if (sd[i] > 0) most = fmax(most, moves(p, i) / (sd[i] * sqrt(p->noise_factor)));
+    for (int complete = 0; complete < 2 && !known; complete++) {
+        equations_set(p, !complete, gradient, work);
+        known = sdm_fit_inverse(n, work, limits.kept, inverse, inverse + n * n);
+    }
+    for (size_t i = 0; i < p->n_params + 6 && known; i++) {
+        const double sd = sqrt(inverse[i * (n + 1)] * p->noise_factor);
+        if (sd > 0) most = fmax(most, moves(p, i) / sd);
+    }
     return most;
 }
 
@@ -457,7 +460,7 @@ sdm_status sdm_fit_newton(fit_problem *p, const fit_newton_opts *opts, fit_newto
     double taken_before = INFINITY, best = -INFINITY;
     int idle = 0; // small steps since the objective last rose by more than a negligible gain
     *out = (fit_newton_end){.step = INFINITY};
-    sdm_status s = SDM_ALLOC(&work, 3 * n * n, "matrices of the fit", err);
+    sdm_status s = SDM_ALLOC(&work, 4 * n * n, "matrices of the fit", err);
     if (!s) s = sdm_fit_evaluate(p, err);
     for (size_t i = 0; i < opts->max_iterations && !s && !out->converged && !out->at_rest; i++) {
         // tissues

@@ -49,19 +49,20 @@ static size_t free_ones(size_t n, const bool *held, size_t *rest)
     return m;
 }
 
-bool sdm_fit_deviations(size_t n, const double *a, const bool *held, double *sd, double *work)
+bool sdm_fit_inverse(size_t n, const double *a, const bool *held, double *inverse, double *work)
 {
     size_t rest[FIT_UNKNOWNS_MAX];
-    double x[FIT_UNKNOWNS_MAX], scale[FIT_UNKNOWNS_MAX], *matrix = work, *factor = work + n * n;
+    double scale[FIT_UNKNOWNS_MAX], *matrix = work, *factor = work + n * n;
     const size_t m = free_ones(n, held, rest);
+    memset(inverse, 0, n * n * sizeof *inverse);
     for (size_t i = 0; i < m; i++)
         for (size_t j = 0; j < m; j++) matrix[i * m + j] = a[rest[i] * n + rest[j]];
     if (!sdm_fit_cholesky(m, matrix, factor, scale)) return false;
-    memset(sd, 0, n * sizeof *sd);
-    for (size_t i = 0; i < m; i++) {
-        for (size_t j = 0; j < m; j++) x[j] = i == j;
-        sdm_fit_solve(m, factor, scale, x);
-        sd[rest[i]] = sqrt(x[i]);
+    for (size_t j = 0; j < m; j++) {
+        double column[FIT_UNKNOWNS_MAX] = {0};
+        column[j] = 1;
+        sdm_fit_solve(m, factor, scale, column);
+        for (size_t i = 0; i < m; i++) inverse[rest[i] * n + rest[j]] = column[i];
     }
     return true;
 }

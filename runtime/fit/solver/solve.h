@@ -11,9 +11,9 @@ bool sdm_fit_cholesky(size_t n, const double *a, double *factor, double *scale);
 /* x[n] := a^-1 x, with factor and scale from sdm_fit_cholesky(). */
 void sdm_fit_solve(size_t n, const double *factor, const double *scale, double *x);
 
-/* sd[n] = square roots of the diagonal of the inverse of a without the unknowns that are held; 0
-   for these. work: 2 n n numbers. False: a without them is not positive definite. */
-bool sdm_fit_deviations(size_t n, const double *a, const bool *held, double *sd, double *work);
+/* inverse[n][n] of a without the unknowns that are held, whose rows and columns are 0. work: 2 n n
+   numbers. False: a without them is not positive definite; inverse is 0. */
+bool sdm_fit_inverse(size_t n, const double *a, const bool *held, double *inverse, double *work);
 
 /* Limits of a step. kept: the unknown does not move; else min <= step <= max, with min <= 0 <= max.
  */

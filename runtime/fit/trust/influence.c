@@ -22,36 +22,21 @@ size_t sdm_fit_free_unknowns(const fit_problem *p, size_t *list)
     return count;
 }
 
-// out[m][m]: the rows and columns of a[n][n] in the list
-static void submatrix(size_t n, const double *a, size_t m, const size_t *list, double *out)
-{
-    for (size_t i = 0; i < m; i++)
-        for (size_t j = 0; j < m; j++) out[i * m + j] = a[list[i] * n + list[j]];
-}
-
 bool sdm_fit_influence(const fit_problem *p, bool with_priors, double *influence, double *work)
 {
     const size_t n = p->information.n_unknowns;
     size_t list[FIT_UNKNOWNS_MAX];
+    bool held[FIT_UNKNOWNS_MAX];
     const size_t m = sdm_fit_free_unknowns(p, list);
-    double *information = work, *small = work + n * n, *factor = work + 2 * n * n,
-           scale[FIT_UNKNOWNS_MAX];
-    memset(influence, 0, n * n * sizeof *influence);
+    for (size_t i = 0; i < n; i++) held[i] = true;
+    for (size_t i = 0; i < m; i++) held[list[i]] = false;
     for (int complete = 0; complete < 2; complete++) {
-        memcpy(information, complete ? p->information.complete : p->information.observed,
-               n * n * sizeof *information);
-        if (with_priors) (void)sdm_fit_prior(p, &p->state, NULL, information, NULL);
-        sdm_fit_add_weak_prior(p, information);
-        sdm_fit_open_motions_stop(p, information);
-        submatrix(n, information, m, list, small);
-        if (!sdm_fit_cholesky(m, small, factor, scale)) continue;
-        for (size_t j = 0; j < m; j++) {
-            double column[FIT_UNKNOWNS_MAX] = {0};
-            column[j] = 1;
-            sdm_fit_solve(m, factor, scale, column);
-            for (size_t i = 0; i < m; i++) influence[list[i] * n + list[j]] = column[i];
-        }
-        return true;
+        memcpy(work, complete ? p->information.complete : p->information.observed,
+               n * n * sizeof *work);
+        if (with_priors) (void)sdm_fit_prior(p, &p->state, NULL, work, NULL);
+        sdm_fit_add_weak_prior(p, work);
+        sdm_fit_open_motions_stop(p, work);
+        if (sdm_fit_inverse(n, work, held, influence, work + n * n)) return true;
     }
     return false;
 }

@@ -77,22 +77,24 @@ static const char *unknown_name(const fit_problem *p, size_t i)
     return name;
 }
 
-// text[size] = what may end the iterations, besides more of them and another start. worst: the
-// unknown that moves most; hidden: the damping hides it; swings: it goes to and fro; unknown: the
-// parameters that the data hardly determine
-static void name_remedy(const fit_problem *p, const sdm_fit_result *r, size_t worst, bool hidden,
+// text[size] = what may end the iterations, besides more of them and another start. Returns whether
+// more of them may help. worst: the unknown that moves most; hidden: the damping hides it; swings:
+// it goes to and fro; unknown: the parameters that the data hardly determine
+static bool name_remedy(const fit_problem *p, const sdm_fit_result *r, size_t worst, bool hidden,
                         bool swings, const char *unknown, char *text, size_t size)
 {
     const bool own = worst < p->n_params, many = strchr(unknown, ',');
     // what the data do not determine moves on with more iterations, too; where damping hides what
     // moves, it is the likeliest; and the others go to and fro with it
-    if (*unknown && (hidden || swings || (own && sdm_fit_hardly_known(r, worst))))
+    if (*unknown && (hidden || swings || (own && sdm_fit_hardly_known(r, worst)))) {
         snprintf(text, size,
                  "the data hardly determine %s: keep %s (sdm_fit_opts.kept), or give data that "
                  "determine %s",
                  unknown, many ? "them at known values" : "it at a known value",
                  many ? "them" : "it");
-    else if (*unknown)
+        return false;
+    }
+    if (*unknown)
         snprintf(text, size,
                  "a nearer start, or known values (sdm_fit_opts.kept) of %s, which the "
                  "data hardly determine",
@@ -104,6 +106,7 @@ static void name_remedy(const fit_problem *p, const sdm_fit_result *r, size_t wo
                  unknown_name(p, worst));
     else
         snprintf(text, size, "a nearer start, or data that determine what still moves");
+    return !swings;
 }
 
 static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_error *err)
@@ -123,11 +126,9 @@ static void not_converged(const fit_problem *p, const sdm_fit_result *r, sdm_err
                         : "; %.100s still moves by %.2g of its standard deviation, need %.2g",
                  name, most, UNREST_MAX);
     name_hardly_known(p, r, unknown, sizeof unknown);
-    name_remedy(p, r, worst, !*moves, swings, unknown, remedy, sizeof remedy);
-    // whoever has allowed more iterations already is not told to allow more; nor where they did not
-    // lessen what moves
-    const bool more = p->opts->max_iterations <= FIT_ITERATIONS_USUAL && !swings &&
-                      strncmp(remedy, "the data", 8) != 0;
+    // whoever has allowed more iterations already is not told to allow more
+    const bool more = name_remedy(p, r, worst, !*moves, swings, unknown, remedy, sizeof remedy) &&
+                      p->opts->max_iterations <= FIT_ITERATIONS_USUAL;
     sdm_fail(err, SDM_E_QUALITY, "not converged after %zu iterations (%s%s): %s%s", r->n_iterations,
              r->reason, moves, more ? "more of them (sdm_fit_opts.max_iterations), " : "", remedy);
 }

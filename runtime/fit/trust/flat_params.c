@@ -96,17 +96,6 @@ static bool leave_out(const scan *c, const size_t few[POINTS_FEW])
     return !isnan(c->few[0]);
 }
 
-/* How the other unknowns follow parameter k: the row of the inverse of the information. Few points
-   on which it hangs are left out: they hold it only as far as the surface that it moves lies on
-   them. */
-static const double *row_of(const scan *c, size_t k)
-{
-    const size_t n = c->p->information.n_unknowns;
-    size_t few[POINTS_FEW];
-    const bool hangs = find_few(c, k, few) > SHARE_OF_FEW && leave_out(c, few);
-    return (hangs ? c->few : c->influence) + k * n;
-}
-
 /* Loss of log-posterior density where parameter k changes by *off; *off becomes the change within
    the bounds. row: the other unknowns follow in these proportions; NULL: they keep their values.
    NAN: there is no shape. */
@@ -207,8 +196,11 @@ static void widen_along(sdm_fit_result *out, size_t k, const double *row, double
 static sdm_status spread(const scan *c, size_t k, sdm_fit_result *out, sdm_error *err)
 {
     const double before = sdm_fit_prior_sd(c->p, k);
-    const double *row = row_of(c, k);
-    const bool hangs = row != c->influence + k * c->p->information.n_unknowns;
+    // few points on which the parameter hangs hold it only as far as the surface that it moves lies
+    // on them: without them, the others tell how the other unknowns follow it
+    size_t few[POINTS_FEW];
+    const bool hangs = find_few(c, k, few) > SHARE_OF_FEW && leave_out(c, few);
+    const double *row = (hangs ? c->few : c->influence) + k * c->p->information.n_unknowns;
     bool flatter = out->sd[k] > KNOWN * before;
     double alone = 0, followed = 0;
     sdm_status s = flatter ? SDM_OK : find_flatter(c, k, row, &flatter, err);

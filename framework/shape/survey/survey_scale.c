@@ -19,7 +19,7 @@ static const double STEP = 0.01;
 /* Samples at which the speed of slow parameters is measured again. */
 enum { SLOW_SAMPLES = 3 };
 
-static bool is_length(const sdm_instance *shape, size_t k)
+bool sdm_survey_is_length(const sdm_instance *shape, size_t k)
 {
     return !strcmp(shape->params[k].unit, "mm");
 }
@@ -33,7 +33,8 @@ bool sdm_survey_is_faint(const sdm_shape_survey *s, const sdm_instance *shape, s
 
 bool sdm_survey_is_slow(const sdm_shape_survey *s, const sdm_instance *shape, size_t k)
 {
-    return s->speed[k] == 0 || (is_length(shape, k) && s->speed[k] < SDM_SURVEY_SPEED_SLOW) ||
+    return s->speed[k] == 0 ||
+           (sdm_survey_is_length(shape, k) && s->speed[k] < SDM_SURVEY_SPEED_SLOW) ||
            sdm_survey_is_faint(s, shape, k);
 }
 
@@ -41,7 +42,7 @@ bool sdm_survey_is_narrow(const sdm_shape_survey *s, const sdm_instance *shape, 
 {
     const sdm_param *p = &shape->params[k];
     const double size = s->scale.size, value = fmax(fabs(p->min), fabs(p->max));
-    return is_length(shape, k) && s->speed[k] > 0 && value < SDM_SURVEY_VALUE * size &&
+    return sdm_survey_is_length(shape, k) && s->speed[k] > 0 && value < SDM_SURVEY_VALUE * size &&
            s->speed[k] * (p->max - p->min) < SDM_SURVEY_NARROW * size;
 }
 
@@ -127,7 +128,8 @@ static sdm_status find_speed(const shape_family *f, sdm_shape_survey *s, sdm_err
     for (size_t k = 0; k < s->n_params && !status; k++)
         if (s->speed[k] == 0) status = measure_threshold(f, s, k, err);
     for (size_t k = 0; k < s->n_params; k++)
-        if (is_length(f->shape, k) && isfinite(s->speed[k]) && !(s->speed[k] <= s->scale.speed))
+        if (sdm_survey_is_length(f->shape, k) && isfinite(s->speed[k]) &&
+            !(s->speed[k] <= s->scale.speed))
             s->scale.speed = s->speed[k], s->scale.param = k;
     for (size_t k = 0; k < s->n_params; k++) {
         s->slow += sdm_survey_is_slow(s, f->shape, k);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "sdm/internal/mesh_box.h"
+#include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
 /* FOLLOWED: vertices, spread over the mesh. */
@@ -94,8 +95,8 @@ sdm_status sdm_survey_swings(const shape_family *f, const double *p, size_t k, s
 /* SPIN_STEPS: in a period; SPIN_ALL: in the one and a half that are looked at. */
 enum { SPIN_STEPS = 16, SPIN_ALL = 24 };
 
-/* A vertex comes back if it misses its place by less than this share of its way: the factors 57.2
- * and 57.4 miss by more. */
+/* A vertex has returned if it is no farther from its first place than this share of the length of
+ * its way. With a factor of 57.2 or 57.4 in place of 57.296 it is farther. */
 static const double BACK = 0.005;
 /* Vertices count that move by this share of the size of the shape. */
 static const double FAR = 0.01;
@@ -107,12 +108,7 @@ typedef struct spin {
     double x[SPIN_ALL + 1][FOLLOWED][3];
 } spin;
 
-static double distance(const double a[3], const double b[3])
-{
-    double square = 0;
-    for (int d = 0; d < 3; d++) square += (a[d] - b[d]) * (a[d] - b[d]);
-    return sqrt(square);
-}
+static double distance(const double a[3], const double b[3]) { return sqrt(v3_dist2(a, b)); }
 
 /* Makes the mesh where parameter k is `periods` above its lowest value. *same: it has n_vert
  * vertices. SDM_E_NOMEM. */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sdm/internal/units.h"
+#include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 #include "survey_scale.h"
 
@@ -39,12 +40,8 @@ static void motion_dispose(motion *m)
     sdm_mesh_dispose(&m->here);
 }
 
-static bool is_length(const motion *m, size_t k)
-{
-    return !strcmp(m->f->shape->params[k].unit, "mm");
-}
-
-/* Only want of memory is an error; from a mesh that cannot be made nothing follows. */
+/* SDM_E_NOMEM stays. Another error says that a mesh cannot be made: what would be measured on it
+ * stays unknown, without an error. */
 static sdm_status only_memory(sdm_status s) { return s == SDM_E_NOMEM ? s : SDM_OK; }
 
 /* speed[parts] = how far a vertex of each part moves, at most, from the mesh `here`, which is that
@@ -67,7 +64,7 @@ static sdm_status measure(motion *m, const double *p, size_t k, double value, do
         for (size_t c = 3 * t; c < 3 * t + 3 && part != SDM_NO_PART; c++) {
             const double *a = m->here.vert + 3 * (size_t)m->here.tri[c],
                          *b = m->there.vert + 3 * (size_t)m->here.tri[c];
-            const double far = hypot(hypot(b[0] - a[0], b[1] - a[1]), b[2] - a[2]) / change;
+            const double far = sqrt(v3_dist2(a, b)) / change;
             speed[part] = fmax(speed[part], far);
         }
     }
@@ -112,7 +109,7 @@ static bool is_whole(const motion *m, const sdm_shape_survey *s, size_t k, const
         else
             measure_edges(&m->parts.part[i], &none, &other);
     for (size_t j = 0; j < s->n_params; j++)
-        for (size_t i = 0; i < m->parts.n && is_length(m, j); i++) {
+        for (size_t i = 0; i < m->parts.n && sdm_survey_is_length(m->f->shape, j); i++) {
             const double speed = m->speed[j * m->parts.n + i];
             if (!moved[i] || !(speed > 0)) continue;
             // a part that another length moves as one in mm does is in mm
@@ -127,7 +124,7 @@ static bool is_whole(const motion *m, const sdm_shape_survey *s, size_t k, const
 static bool is_odd(const motion *m, const sdm_shape_survey *s, size_t k)
 {
     const sdm_instance *shape = m->f->shape;
-    return is_length(m, k) && s->speed[k] > 0 &&
+    return sdm_survey_is_length(shape, k) && s->speed[k] > 0 &&
            (sdm_survey_is_slow(s, shape, k) || (s->scale.odd_speed && s->scale.param == k));
 }
 
@@ -208,8 +205,8 @@ static sdm_status find_mixed(motion *m, sdm_shape_survey *s, size_t k, bool *mix
     return SDM_OK;
 }
 
-/* Does a length move some vertices as one in m does, and others as one in mm does? Takes less time
- * than the parts. */
+/* Is there a length of which 1 mm moves some vertices by about 0.001 mm and others by about 1 mm?
+ * Looks at all vertices together, which takes less time than an audit of the parts. */
 static sdm_status may_be_mixed(const shape_family *f, const sdm_shape_survey *s, bool *out,
                                sdm_error *err)
 {
@@ -220,13 +217,13 @@ static sdm_status may_be_mixed(const shape_family *f, const sdm_shape_survey *s,
         double q[SHAPE_PARAMS_MAX];
         bool small = false, fair = false;
         const double step = STEP * (f->max[k] - f->min[k]);
-        if (!is_length(&m, k) || !(step > 0)) continue;
+        if (!sdm_survey_is_length(f->shape, k) || !(step > 0)) continue;
         memcpy(q, s->p, s->n_params * sizeof *q);
         q[k] += q[k] + step <= f->max[k] ? step : -step;
         status = sdm_instance_mesh(f->shape, q, &m.there, err);
         for (size_t v = 0; v < m.here.n_vert && !status && m.there.n_vert == m.here.n_vert; v++) {
             const double *a = m.here.vert + 3 * v, *b = m.there.vert + 3 * v;
-            const double far = hypot(hypot(b[0] - a[0], b[1] - a[1]), b[2] - a[2]) / step;
+            const double far = sqrt(v3_dist2(a, b)) / step;
             small = small || (far >= MIXED_MIN && far <= MIXED_MAX);
             fair = fair || far >= FAIR_MIN;
         }
@@ -248,7 +245,7 @@ sdm_status sdm_survey_find_mixed(const shape_family *f, sdm_shape_survey *s, sdm
     if (!status) status = SDM_ALLOC(&mixed, m.parts.n + 1, "parts", err);
     if (!status) status = SDM_ALLOC(&speed, m.parts.n + 1, "speeds of parts", err);
     for (size_t k = 0; k < s->n_params && !status && m.parts.n > 1; k++)
-        if (is_length(&m, k)) status = find_mixed(&m, s, k, mixed, speed, err);
+        if (sdm_survey_is_length(f->shape, k)) status = find_mixed(&m, s, k, mixed, speed, err);
     sdm_free(speed);
     sdm_free(mixed);
     motion_dispose(&m);

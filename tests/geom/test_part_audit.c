@@ -16,17 +16,25 @@
 
 static sdm_error err;
 
-/* Adds the box low .. high^3 of (low, high) along x and a square of +-half across. */
+/* A box low .. high. */
+typedef struct box {
+    double low[3], high[3];
+} box;
+
+/* Adds the box; inside_out: its triangles are reversed. */
+static void add(sdm_mesh *m, const box *b, bool inside_out)
+{
+    sdm_mesh one = {0};
+    mesh_box(&one, b->low, b->high);
+    if (inside_out) mesh_flip(&one);
+    mesh_append(m, &one);
+    sdm_mesh_dispose(&one);
+}
+
+/* Adds the box low .. high along x with a square of +-half across. */
 static void add_box(sdm_mesh *m, double low, double high, double half, bool inside_out)
 {
-    sdm_mesh box = {0};
-    mesh_box(&box, (const double[3]){low, -half, -half}, (const double[3]){high, half, half});
-    if (inside_out) mesh_flip(&box);
-    const size_t v = m->n_vert, t = m->n_tri;
-    if (sdm_mesh_reserve(m, v + box.n_vert, t + box.n_tri, &err)) fail_msg("%s", err.text);
-    memcpy(m->vert + 3 * v, box.vert, 3 * box.n_vert * sizeof *box.vert);
-    for (size_t i = 0; i < 3 * box.n_tri; i++) m->tri[3 * t + i] = box.tri[i] + (uint32_t)v;
-    sdm_mesh_dispose(&box);
+    add(m, &(box){{low, -half, -half}, {high, half, half}}, inside_out);
 }
 
 static sdm_part_audit audit_of(const sdm_mesh *m)
@@ -433,24 +441,6 @@ static void test_loop_in_another_part(void **state)
         sdm_part_audit_dispose(&a);
         sdm_mesh_dispose(&m);
     }
-}
-
-/* A box low .. high. */
-typedef struct box {
-    double low[3], high[3];
-} box;
-
-/* Adds the box; inside_out: its triangles are reversed. */
-static void add(sdm_mesh *m, const box *b, bool inside_out)
-{
-    sdm_mesh one = {0};
-    mesh_box(&one, b->low, b->high);
-    if (inside_out) mesh_flip(&one);
-    const size_t v = m->n_vert, t = m->n_tri;
-    if (sdm_mesh_reserve(m, v + one.n_vert, t + one.n_tri, &err)) fail_msg("%s", err.text);
-    memcpy(m->vert + 3 * v, one.vert, 3 * one.n_vert * sizeof *one.vert);
-    for (size_t i = 0; i < 3 * one.n_tri; i++) m->tri[3 * t + i] = one.tri[i] + (uint32_t)v;
-    sdm_mesh_dispose(&one);
 }
 
 static sdm_part_audit meetings_of(const sdm_mesh *m)

@@ -66,8 +66,8 @@ typedef struct entrant {
     trainer *race;       /* the run, with the whole budget */
     bool finished;       /* false: the shape does not allow this kind */
     bool ready;          /* it needs no training */
-    bool only_ready;     /* dropped before the maps of its trial if it needs training, or if its
-                            design takes too long */
+    bool only_ready;     /* the kind is wanted only if it needs no training: it leaves the race
+                            before its trial if it needs some, or if its design takes too long */
     const char *dropped; /* why; NULL: it was not */
     bool cut;            /* the budget of time ended before all maps of the trial were made */
     turn_figures errors; /* of its trial */

@@ -208,9 +208,8 @@ static void advise_frame(const cli_fit *f, bool either, char *text, size_t size)
 
 /* Points without a search over rotations: half a turn about z, from RAS to LPS or of the start, may
  * be missing. The start shape shows it where its parameters are about right; else, or where the fit
- * found has turned by itself, a second fit does. --ras does not change a start from --translation
- * or
- * --start-points. */
+ * found has turned by itself, a second fit does. --ras does not change a start that --translation
+ * or --start-points gives. */
 static sdm_status check_frame(const cli_fit *f, const cloud *c, const double start[3], bool placed,
                               char *text, size_t size, sdm_error *err)
 {

@@ -57,7 +57,7 @@ static void tell_flat(teller *t)
     const sdm_survey_count *c = &t->s->found.flat;
     sdm_text text = {0};
     size_t i = 0;
-    // tell_tiny(), tell_unit(), tell_params() and tell_motion() explain lengths in m
+    // lengths in m are reported by tell_tiny(), tell_unit(), tell_params() and tell_motion()
     if (!c->shapes || t->s->found.tiny.shapes >= c->shapes || t->s->found.narrow ||
         t->s->found.scale.odd_size || sdm_survey_converts(&t->s->found))
         return;

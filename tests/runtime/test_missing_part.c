@@ -390,9 +390,10 @@ static const sdm_shape nail = {.abi = SDM_SHAPE_ABI,
 
 static bool lies_near_the_end(const double x[3]) { return x[2] < 1.5; }
 
-// The points end 1.5 mm above the end of the rod, but for one, which lies in the rod by 2.6
-// standard deviations: as well it may lie on the end of a shorter rod. Length and position hang on
-// it, so neither is known as well as this point is.
+// No point lies within 1.5 mm of the end of the rod, except one. It lies inside the rod, 2.6
+// standard deviations from its side, so that it may as well lie on the end of a shorter rod. This
+// point alone holds the length of the rod and the position of the nail: their deviations must be
+// far above its own.
 static void test_end_held_by_one_point(void **state)
 {
     (void)state;

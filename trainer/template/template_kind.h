@@ -7,8 +7,9 @@
    t->data has the ranges of the parameters. SDM_E_UNSUPPORTED: the shape allows no template. */
 sdm_status trainer_template_look(const trainer *t, bool *bends, sdm_error *err);
 
-/* *divides = whether the template of a shape that bends can be several parts, which need no
-   correction, as far as two dozen meshes tell. Else as above. */
+/* *divides = whether the template of a shape that bends can consist of several parts; such a
+   template needs no correction. Two dozen meshes are made to decide it. t and errors as for
+   trainer_template_look(). */
 sdm_status trainer_template_look_parts(const trainer *t, bool *divides, sdm_error *err);
 
 extern const train_kind trainer_kind_template;

@@ -41,8 +41,9 @@
 // turns to a surface between the two, from which the fit may end at a better maximum: an
 // upside-down bone
 #define ALIKE_TRIED 2
-// points: starts of sdm_fit_turned_starts() that are looked at, for each choice of the parameters,
-// and of these as many as climb: those with the parameters of the fit, with others
+// Fits to points: TURNED_MOST starts of sdm_fit_turned_starts() are listed for each of its three
+// choices of parameters. The best of them are improved with all unknowns: TURNED_TRIED with the
+// parameters of the fit, TURNED_TRIED_OTHERWISE with each of the two others.
 #define TURNED_MOST 8
 #define TURNED_TRIED 2
 #define TURNED_TRIED_OTHERWISE 1

@@ -32,6 +32,7 @@ static int pot_mesh(const void *self, const sdm_host *host, const sdm_option_val
         x[0] = 0.55 * p[POT_RADIUS] + along * c - up * s, x[2] = along * s + up * c - 1.1;
     }
     mesh_append(&m, &spout);
+    sdm_mesh_dispose(&spout);
     return give_mesh(host, out, &m);
 }
 

@@ -157,6 +157,7 @@ static int block_mesh(const void *self, const sdm_host *host, const sdm_option_v
     mesh_box(&m, low, high);
     mesh_box(&collar, COLLAR_LOW, COLLAR_HIGH);
     mesh_append(&m, &collar);
+    sdm_mesh_dispose(&collar);
     return give_mesh(host, out, &m);
 }
 

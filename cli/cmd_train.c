@@ -93,11 +93,11 @@ static void print_other(const sdm_train_report *r)
     printf("\n");
 }
 
-/* before: the error of the model that the run has replaced, mm; NaN: there is none to compare.
+/* before: the comparison with the model that the run has replaced, or the one of --compare.
  * minutes: train.minutes of the run. */
 static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
-                                const cli_timing *times, const cli_ranks_use *use, double before,
-                                double minutes, sdm_error *err)
+                                const cli_timing *times, const cli_ranks_use *use,
+                                const cli_before *before, double minutes, sdm_error *err)
 {
     const sdm_accuracy *a = &r->accuracy;
     // print as JSON
@@ -130,7 +130,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
             sdm_json_text(&j, "model", r->other_path);
             sdm_json_close(&j, '}');
         }
-        if (isfinite(before)) sdm_json_real(&j, "before_rmse_mm", before);
+        cli_before_json(before, &j);
         sdm_json_open(&j, "verdict", '{');
         sdm_verdict_json(&j, &r->verdict);
         sdm_json_real(&j, "saved_seconds", r->verdict.saved_seconds);
@@ -161,7 +161,7 @@ static sdm_status print_summary(const cli_args *args, const sdm_train_report *r,
         (long long)a->samples, a->rmse_mm, a->rmse_mm / v->voxel_mm, a->mse_mm2, v->rmse_voxel_mm,
         v->rmse_voxel_mm / v->voxel_mm, v->dice, v->dice_min);
     cli_print_verdict(v);
-    if (isfinite(before)) cli_print_before(before, a->rmse_mm);
+    cli_before_print(before);
     cli_print_pod(args, r, times, minutes);
     cli_print_next(args, r, r->chosen ? kind_name(r->kind) : NULL, times->ms_network, minutes);
     if (cli_warnings() > 0)
@@ -181,9 +181,22 @@ static bool has_checkpoint(const char *folder)
     return !access(path, F_OK);
 }
 
+/* Compares the model with the one of before. The model is good even if this fails, which is told.
+ */
+static cli_before compare(const sdm_model *before, const char *path, const sdm_instance *shape)
+{
+    sdm_error why = {0};
+    cli_before comparison;
+    if (cli_before_measure(before, path, shape, &comparison, &why))
+        cli_warn("the model was not compared with the one of before: %s", why.text);
+    return comparison;
+}
+
+/* before: a model to compare the new one with; NULL: none. */
 static sdm_status train_network(const cli_args *args, const sdm_config *config,
                                 const sdm_registry *registry, const sdm_instance *shape,
-                                const sdm_map_store *store, sdm_comm *comm, sdm_error *err)
+                                const sdm_map_store *store, const sdm_model *before, sdm_comm *comm,
+                                sdm_error *err)
 {
     const char *folder = config->output.folder;
     const bool first = sdm_comm_rank(comm) == 0;
@@ -193,7 +206,6 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     hooks.store = store;
     sdm_train_report report = {0};
     hooks.comm = comm;
-    sdm_model *before = first && args->force ? cli_model_before(folder) : NULL;
     // a run that goes on has told it at its beginning
     if (first && !(args->resume && has_checkpoint(folder)))
         (void)cli_notice_survey(config, shape, cli_other_process(args, registry, shape),
@@ -206,10 +218,11 @@ static sdm_status train_network(const cli_args *args, const sdm_config *config,
     s = cli_ranks_end(comm, s, err);
     cli_timing times;
     if (!s) s = look_at_model(report.model_path, shape, folder, &times, err);
-    const double old_mm = s ? NAN : cli_before_rmse(before, report.model_path);
-    sdm_model_free(before);
-    if (!s) cli_show_part_first(&report, thin_spacing, config->train.minutes);
-    if (!s) s = print_summary(args, &report, &times, &use, old_mm, config->train.minutes, err);
+    if (!s) {
+        const cli_before comparison = compare(before, report.model_path, shape);
+        cli_show_part_first(&report, thin_spacing, config->train.minutes);
+        s = print_summary(args, &report, &times, &use, &comparison, config->train.minutes, err);
+    }
     sdm_free(use.memory);
     return s || !args->report
                ? s
@@ -224,7 +237,8 @@ static void share_threads(const cli_args *args, sdm_config *config)
     if (args->ranks > 1 && !config->threads) config->threads = n > 1 ? n : 1;
 }
 
-/* Refuses options that do nothing in a plan, but --out, which every advised command has. */
+/* Refuses options that do nothing in a plan, but --out and --compare, which every advised command
+ * has. */
 static sdm_status check_plan(const cli_args *args, sdm_error *err)
 {
     const struct {
@@ -248,6 +262,7 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     sdm_instance *shape = NULL;
     sdm_comm *comm = NULL;
     sdm_map_store *store = NULL;
+    sdm_model *before = NULL;
     sdm_status s = cli_page_check_option(args, err);
     if (!s && (args->nodes || args->cores) && !args->plan)
         s = sdm_fail(err, SDM_E_ARG, "--nodes and --cores belong to --plan");
@@ -263,6 +278,8 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     if (!s && !trains) s = cli_plan_training(args, config, shape, err);
     if (!s && trains && !sdm_comm_rank(comm))
         s = sdm_train_check_folder(config->output.folder, args->resume, args->force, err);
+    if (!s && trains && !sdm_comm_rank(comm) && (args->force || args->compare))
+        s = cli_before_open(args->compare, config->output.folder, shape, &before, err);
     // a page in the folder of the run, which the training makes, needs no check
     const size_t n = strlen(config ? config->output.folder : "");
     if (!s && trains && args->report && (strncmp(args->report, config->output.folder, n) || !n))
@@ -273,10 +290,11 @@ sdm_status cmd_train(const cli_args *args, sdm_error *err)
     s = sdm_comm_agree(comm, s, err);
     if (!s && trains) {
         share_threads(args, config);
-        s = train_network(args, config, registry, shape, store, comm, err);
+        s = train_network(args, config, registry, shape, store, before, comm, err);
     } else if (trains) {
         s = cli_ranks_end(comm, s, err);
     }
+    sdm_model_free(before);
     sdm_map_store_free(store);
     sdm_instance_free(shape);
     sdm_registry_free(registry);

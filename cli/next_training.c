@@ -25,6 +25,11 @@
 #define MUCH_WORSE 1.5
 // bytes of the part of a note about a command that leaves the kind open
 #define OPEN_NOTE 320
+// the reason for a command that trains a template; its time, s
+#define SKIPPED                                                                                    \
+    "auto had no time to try template, which takes about %.3g s and is mostly the better kind "    \
+    "for a "                                                                                       \
+    "shape of several parts"
 
 /* Appends an option and its value to a command. */
 static void add_option(sdm_text *command, const char *option, const char *value)
@@ -77,13 +82,15 @@ static void add_changes(sdm_text *command, const cli_args *args, const sdm_verdi
     cli_add_next_word(command, change);
 }
 
-/* Appends the options of the command line, and a folder beside that of the run. */
-static void add_options(sdm_text *command, const cli_args *args, const sdm_train_report *r)
+/* Appends the options of the command line, a folder beside that of the run, whose name is longer by
+ * `end`, and the model of the run for a comparison. */
+static void add_options(sdm_text *command, const cli_args *args, const sdm_train_report *r,
+                        const char *end)
 {
     const char *slash = strrchr(r->model_path, '/');
     const int length = slash ? (int)(slash - r->model_path) : 0;
     char folder[sizeof r->model_path + 8];
-    snprintf(folder, sizeof folder, "%.*s-2", length, r->model_path);
+    snprintf(folder, sizeof folder, "%.*s%s", length, r->model_path, end);
     for (size_t i = 0; i < args->plugins.n; i++)
         add_option(command, "--plugin", args->plugins.items[i]);
     if (args->isolate) cli_add_next_word(command, "--isolate");
@@ -92,6 +99,7 @@ static void add_options(sdm_text *command, const cli_args *args, const sdm_train
     add_number(command, "--ranks", (double)args->ranks);
     if (args->dataset) add_option(command, "--dataset", args->dataset);
     add_option(command, "--out", folder);
+    add_option(command, "--compare", r->model_path);
 }
 
 /* "0.012 mm, 22 times worse": an error, compared with that of this run's model. */
@@ -107,18 +115,25 @@ static void add_error(sdm_text *text, double error, double own)
         sdm_text_add(text, ", the same");
 }
 
-/* Prints the command that trains again with the changes of a verdict, after `begin`. Returns
- * whether it did. */
-static bool print_command(const char *begin, const cli_args *args, const sdm_train_report *r,
-                          const sdm_verdict *changes, const char *kind)
+/* Prints the command that trains again with the changes of a verdict, after `begin`. end: what the
+ * folder's name is longer by. Returns whether it did. */
+static bool print_command_into(const char *begin, const cli_args *args, const sdm_train_report *r,
+                               const sdm_verdict *changes, const char *kind, const char *end)
 {
     sdm_text command = {0};
     add_changes(&command, args, changes, kind);
-    add_options(&command, args, r);
+    add_options(&command, args, r, end);
     const bool whole = !command.failed;
     if (whole) printf("%ssdmgen train%s\n", begin, command.data);
     sdm_text_dispose(&command);
     return whole;
+}
+
+/* The same for the lines `next` and `better`. */
+static bool print_command(const char *begin, const cli_args *args, const sdm_train_report *r,
+                          const sdm_verdict *changes, const char *kind)
+{
+    return print_command_into(begin, args, r, changes, kind, "-2");
 }
 
 /* Does the template err far from the surface alone, so that another kind is a choice? */
@@ -196,7 +211,7 @@ void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_ti
     }
     // the line `next` has the command
     if (!args->files.n || r->unfinished || sdm_verdict_needs_pod(&r->verdict) ||
-        !print_command("              ", args, r, &pod, "pod"))
+        !print_command_into("              ", args, r, &pod, "pod", "-pod"))
         return;
     // the pace of maps was not measured
     if (!r->chosen)
@@ -242,30 +257,6 @@ static void print_next_pod(const cli_args *args, const sdm_train_report *r, doub
     if (args->files.n) print_command("  next        ", args, r, &pod, "pod");
 }
 
-/* The line `next` or `better`, after `begin`, of a run of auto whose budget did not reach for the
- * other kind: trains this one, on the grid that the verdict asks for. */
-static void print_finish(const char *begin, const cli_args *args, const sdm_train_report *r,
-                         double minutes)
-{
-    const sdm_verdict *v = &r->verdict;
-    const char *other = r->kind == SDM_NETWORK_POD ? "template" : "pod";
-    const double asked = r->kind == SDM_NETWORK_POD ? 0 : r->pod_minutes,
-                 least = fmax(minutes, asked);
-    sdm_verdict changes = {.minutes = fmax(least, v->minutes), .cut = v->cut, .to = v->to};
-    if (!strncmp(v->key, "grid.", 5)) memcpy(changes.key, v->key, sizeof changes.key);
-    if (!args->files.n || !print_command(begin, args, r, &changes, other)) return;
-    printf("              (auto had no time left for %s", other);
-    if (r->tried)
-        printf(": its trial left %.2g mm within a voxel of the surface, %.2g mm everywhere, which "
-               "training improves",
-               r->other_voxel_mm, r->other.rmse_mm);
-    // trials and first training used one half
-    if (minutes > 0)
-        printf("; train.minutes=%.6g with auto compares both",
-               fmax(r->trial_minutes, ceil(10 * (least + fmax(minutes, r->seconds / 60))) / 10));
-    printf(")\n");
-}
-
 /* *use = the first use in `not for` that a finer grid gives back, NULL: none. Returns the spacing
  * of this grid. */
 static double finer_use(const sdm_verdict *v, const char **use)
@@ -273,10 +264,8 @@ static double finer_use(const sdm_verdict *v, const char **use)
     const double volumes = sdm_verdict_spacing(v), fits = sdm_verdict_fit_spacing(v);
     *use = isfinite(volumes) ? "volumes of surfaces"
            : isfinite(fits)  ? "fits by the network alone"
-           : v->volume_derivatives_bad[0] && v->volume_derivative_voxels > SDM_DERIVATIVE_BAD
-               ? "derivatives of the volume"
-               : NULL;
-    return isfinite(volumes) ? volumes : isfinite(fits) ? fits : 0.5 * v->coarse_mm;
+                             : NULL;
+    return isfinite(volumes) ? volumes : fits;
 }
 
 /* The key that the sentence of the verdict names, without a number too; "": none. */
@@ -290,6 +279,20 @@ static const char *named_key(const sdm_verdict *v)
 static bool is_open(const sdm_train_report *r)
 {
     return r->trial_minutes > 0 && !r->tried && !r->compared && !sdm_verdict_broken(&r->verdict);
+}
+
+/* Does a command that changes this key leave the kind to auto? With voxels of another size a
+ * template that needs no training takes far less time than the trials. */
+static bool leaves_open(const sdm_train_report *r, const char *key)
+{
+    const bool cheap = r->kind == SDM_NETWORK_TEMPLATE && !r->steps;
+    return is_open(r) && !(cheap && !strncmp(key, "grid.", 5));
+}
+
+/* Did auto take pod because it had no time for a template that most likely needs no training? */
+static bool skipped_template(const sdm_train_report *r)
+{
+    return is_open(r) && r->kind == SDM_NETWORK_POD && r->template_seconds > 0;
 }
 
 /* train.minutes that hold the trials of both kinds. factor: by which a map takes longer on the grid
@@ -318,6 +321,58 @@ static double finer_factor(const sdm_verdict *v)
     return strcmp(v->key, "grid.spacing") ? 1 : fmax(1, pow(v->from / v->to, 3));
 }
 
+/* The changes of a verdict for the grid alone, and train.minutes. */
+static sdm_verdict grid_changes(const sdm_verdict *v, double minutes)
+{
+    sdm_verdict changes = {.minutes = minutes, .cut = v->cut, .from = v->from, .to = v->to};
+    if (!strncmp(v->key, "grid.", 5)) memcpy(changes.key, v->key, sizeof changes.key);
+    return changes;
+}
+
+/* The line `next` or `better`, after `begin`, of a run of auto that has kept a template because its
+ * budget did not reach for pod: trains pod, on the grid that the verdict asks for; if pod had no
+ * trial, with minutes for the trials of both, which cost less than a training in vain. */
+static void print_pod_too(const char *begin, const cli_args *args, const sdm_train_report *r,
+                          double minutes)
+{
+    const sdm_verdict *v = &r->verdict;
+    const double alone = fmax(fmax(minutes, r->pod_minutes), v->minutes);
+    const bool open = is_open(r);
+    sdm_verdict changes = grid_changes(v, open ? minutes : alone);
+    if (open) changes = with_trials(r, &changes, finer_factor(&changes));
+    if (!args->files.n || !print_command(begin, args, r, &changes, open ? NULL : "pod")) return;
+    if (open) {
+        printf("              (auto had no time for pod: this train.minutes is enough to try both "
+               "kinds");
+        if (alone > changes.minutes) printf("; a training of pod alone asks for %.6g", alone);
+        printf(")\n");
+        return;
+    }
+    printf("              (auto had no time left for pod");
+    if (r->tried)
+        printf(": its trial left %.2g mm within a voxel of the surface, %.2g mm everywhere, which "
+               "training improves",
+               r->other_voxel_mm, r->other.rmse_mm);
+    // trials and first training used one half
+    if (minutes > 0)
+        printf("; train.minutes=%.6g with auto compares both",
+               ceil(10 * (alone + fmax(minutes, r->seconds / 60))) / 10);
+    printf(")\n");
+}
+
+/* The line `next` or `better`, after `begin`, of a run of auto that took pod because it had no time
+ * for a trial of the template: trains the template, which takes little. Returns whether it is
+ * printed. */
+static bool print_template_first(const char *begin, const cli_args *args, const sdm_train_report *r)
+{
+    const sdm_verdict changes = grid_changes(&r->verdict, 0);
+    if (!print_command(begin, args, r, &changes, "template")) return false;
+    printf("              (" SKIPPED "; if its line `before` says worse, change the key that "
+           "`verdict` names here)\n",
+           r->template_seconds * finer_factor(&changes));
+    return true;
+}
+
 /* The part of a note about a command that leaves the kind open; "": the command names a kind.
  * minutes: train.minutes that are enough for the kind of this run alone; 0: not known. factor: by
  * which a map takes longer on the grid of the command. */
@@ -333,46 +388,63 @@ static const char *open_note(const sdm_train_report *r, double minutes, double f
     if (is_open(r))
         snprintf(text, OPEN_NOTE,
                  "network.kind stays auto: this run had no time to try %s; at its pace the "
-                 "train.minutes of this command are enough for both kinds%s%s; ",
-                 pod ? "template" : "pod", alone,
-                 pod ? "; network.kind=template alone mostly takes less: try it first" : "");
+                 "train.minutes of this command are enough for both kinds%s; ",
+                 pod ? "template" : "pod", alone);
     return text;
 }
 
-/* The line `better` of a good model whose error at the surface is small: a grid for the first use
- * that it leaves out for its voxels, or that nothing needs to change. Returns whether it is
- * printed.
- */
-static bool print_enough(const cli_args *args, const sdm_train_report *r, const char *kind,
-                         double minutes)
+/* Is the model good, with a small error at the surface and no key of the grid to change? */
+static bool errs_little(const sdm_verdict *v)
+{
+    return v->grade == SDM_GRADE_GOOD && v->rmse_voxel_mm / v->voxel_mm < SMALL &&
+           strncmp(v->key, "grid.", 5) != 0;
+}
+
+/* The line `better` of a model that errs little and has no line `not for`: that nothing needs to
+ * change. Returns whether it is printed. */
+static bool print_enough(const sdm_verdict *v)
+{
+    const char *named = named_key(v);
+    char unfit[SDM_MODEL_UNFIT], wait[80];
+    sdm_verdict_unfit(v, unfit);
+    if (!errs_little(v) || unfit[0]) return false;
+    snprintf(wait, sizeof wait, "%s can wait", named);
+    printf("  better      %s: the error at the surface is %.2g voxels, and there is no line "
+           "`not for`\n",
+           *named ? wait : "nothing needs to change", v->rmse_voxel_mm / v->voxel_mm);
+    return true;
+}
+
+/* The line `better` of a model that errs little: a grid for the first use that it leaves out for
+ * its voxels. Returns whether it is printed. */
+static bool print_finer(const cli_args *args, const sdm_train_report *r, const char *kind,
+                        double minutes)
 {
     const sdm_verdict *v = &r->verdict;
     const char *use, *named = named_key(v);
     const double voxels = v->rmse_voxel_mm / v->voxel_mm, spacing = finer_use(v, &use),
                  factor = pow(v->coarse_mm / spacing, 3);
-    char unfit[SDM_MODEL_UNFIT], wait[80] = "nothing else needs to change";
-    sdm_verdict_unfit(v, unfit);
-    if (v->grade != SDM_GRADE_GOOD || !(voxels < SMALL) || !strncmp(v->key, "grid.", 5))
-        return false;
+    char wait[80] = "nothing else needs to change";
+    if (!errs_little(v)) return false;
     if (*named) snprintf(wait, sizeof wait, "%s can wait", named);
-    if (!unfit[0]) {
-        printf("  better      %s: the error at the surface is %.2g voxels, and there is no line "
-               "`not for`\n",
-               *named ? wait : "nothing needs to change", voxels);
-        return true;
-    }
     if (!use || !(factor > 1 && factor <= FINER) || !args->files.n || args->dataset) return false;
-    char open[OPEN_NOTE];
+    char open[OPEN_NOTE] = "";
     sdm_verdict finer = {.to = spacing,
                          .minutes = r->steps > 0 ? ceil(2 * factor * minutes) / 2 : 0};
     strcpy(finer.key, "grid.spacing");
-    const double alone = finer.minutes;
-    if (is_open(r)) finer = with_trials(r, &finer, factor);
-    if (!print_command("  better      ", args, r, &finer, is_open(r) ? NULL : kind)) return false;
+    if (skipped_template(r)) {
+        kind = "template", finer.minutes = 0;
+        snprintf(open, sizeof open, SKIPPED "; ", r->template_seconds * factor);
+    } else if (leaves_open(r, finer.key)) {
+        kind = NULL;
+        open_note(r, finer.minutes, factor, open);
+        finer = with_trials(r, &finer, factor);
+    }
+    if (!print_command("  better      ", args, r, &finer, kind)) return false;
     printf(
         "              (%sthe finer grid is for %s, see `not for`; it has %.2g times the voxels; "
         "%s, because the error at the surface is only %.2g voxels)\n",
-        open_note(r, alone, factor, open), use, factor, wait, voxels);
+        open, use, factor, wait, voxels);
     return true;
 }
 
@@ -386,7 +458,7 @@ static void print_note(const sdm_train_report *r, const char *kind, double ms_ma
     // the maps of another grid take another time
     if (strncmp(v->key, "grid.", 5))
         snprintf(time, sizeof time, ", whose maps take %.3g ms", ms_map);
-    if (is_open(r))
+    if (leaves_open(r, v->key))
         sdm_text_add(&note, "%s",
                      open_note(r, strcmp(v->key, "train.minutes") ? v->minutes : v->to,
                                finer_factor(v), open));
@@ -410,17 +482,22 @@ void cli_print_next(const cli_args *args, const sdm_train_report *r, const char 
     const char *begin = v->grade == SDM_GRADE_GOOD ? "  better      " : "  next        ";
     // the maps of another grid are not in --dataset
     const bool other_maps = args->dataset && (v->cut > 0 || !strncmp(v->key, "grid.", 5));
-    if (r->unfinished && !sdm_verdict_broken(v) && !other_maps) {
-        print_finish(begin, args, r, minutes);
+    const bool open = is_open(r);
+    if (r->kind == SDM_NETWORK_TEMPLATE && !sdm_verdict_broken(v) && !other_maps &&
+        (r->unfinished || (open && sdm_verdict_needs_pod(v)))) {
+        print_pod_too(begin, args, r, minutes);
         return;
     }
     if (sdm_verdict_needs_pod(v)) {
         print_next_pod(args, r, minutes);
         return;
     }
-    if (print_enough(args, r, kind, minutes)) return;
-    const bool open = is_open(r);
+    if (print_enough(v)) return;
+    if (print_finer(args, r, kind, minutes)) return;
+    if (skipped_template(r) && !other_maps && args->files.n && print_template_first(begin, args, r))
+        return;
     if ((!v->key[0] && !(v->cut > 0) && !open) || !args->files.n || other_maps) return;
-    const sdm_verdict changes = open ? with_trials(r, v, finer_factor(v)) : *v;
-    if (print_command(begin, args, r, &changes, open ? NULL : kind)) print_note(r, kind, ms_map);
+    const bool leaves = leaves_open(r, v->key);
+    const sdm_verdict changes = leaves ? with_trials(r, v, finer_factor(v)) : *v;
+    if (print_command(begin, args, r, &changes, leaves ? NULL : kind)) print_note(r, kind, ms_map);
 }

@@ -69,6 +69,7 @@ typedef struct entrant {
     bool only_ready;     /* the kind is wanted only if it needs no training: it leaves the race
                             before its trial if it needs some, or if its design takes too long */
     const char *dropped; /* why; NULL: it was not */
+    bool late;           /* because its design takes too long */
     bool cut;            /* the budget of time ended before all maps of the trial were made */
     turn_figures errors; /* of its trial */
     double seconds;
@@ -169,6 +170,7 @@ static sdm_status set_up(trainer *t, entrant *e, bool *allowed, sdm_error *err)
         return s;
     }
     e->dropped = dropped;
+    e->late = e->only_ready && s == SDM_E_CANCELLED;
     if (!dropped) snprintf(e->left_out, sizeof e->left_out, "%s", reason.text);
     trainer_message(t, "auto: %s is left out: %s", trainer_turn_name(e->kind),
                     dropped ? dropped : reason.text);
@@ -256,6 +258,15 @@ typedef enum haste {
 static double template_seconds(const trainer *t, const trial_look *l)
 {
     return l->per_map * (DESIGN_PARTS + (double)t->config->data.holdout + MEASUREMENT);
+}
+
+/* About the seconds of a training of the template alone; 0: it was tried, it needs training, or the
+ * shape may not allow it. */
+static double untried_template_seconds(const trainer *t, const trial_look *l, const entrant *e)
+{
+    if (!l->divides || (e->run.kind && !e->late)) return 0;
+    // more than half of the design was not done
+    return fmax(template_seconds(t, l), e->late ? 2 * e->seconds : 0);
 }
 
 static haste haste_of(const trainer *t, const trial_look *l)
@@ -426,6 +437,7 @@ sdm_status trainer_race(trainer *t, sdm_config *scratch, training_turns *out, tr
         // a kind that the shape does not allow, or that is not needed, has no trial later either
         const bool open = h != HASTE_NONE && !done && !e[0].left_out[0] && !out->tried_other;
         out->trial_minutes = open ? trial_minutes(&l) : 0;
+        out->template_seconds = open ? untried_template_seconds(t, &l, &e[0]) : 0;
         if (out->tried_other) out->other = other->errors;
         trainer_message(t, "auto: network.kind is %s: %s", trainer_turn_name(out->kind[0]), reason);
         for (size_t i = 0; i < 2; i++)

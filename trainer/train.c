@@ -89,6 +89,7 @@ static void report_trial(const training_turns *r, sdm_train_report *report)
 {
     report->pod_minutes = fmax(report->pod_minutes, r->pod_minutes);
     report->trial_minutes = r->trial_minutes;
+    report->template_seconds = r->template_seconds;
     if (r->untried) {
         report->unfinished = true;
         trainer_verdict_unfinished(trainer_turn_name(SDM_NETWORK_TEMPLATE),

@@ -415,6 +415,8 @@ const cli_option cli_options[] = {
      "it among machines"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_TRAIN) | ON(CLI_EXPERIMENT), AT(force),
      "start again in a folder that holds a model"},
+    {"compare", 0, CLI_TEXT, "MODEL", NULL, 0, 0, ON(CLI_TRAIN), AT(compare),
+     "at the end, measure this model of the same shape and the new one at the same exact surfaces"},
     {"force", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(force),
      "write the files of a fit that is not to be trusted, too (the exit code stays 4); fit also to "
      "targets whose size the shape cannot have, and to images whose tissues look exchanged at the "

@@ -153,6 +153,7 @@ struct cli_args {
     bool resume;                  /* train */
     const char *dataset;          /* train: folder of maps */
     bool plan;                    /* train */
+    const char *compare;          /* train: model file */
     int64_t nodes, cores;         /* train; 0: option missing */
     const char *part;             /* fit, dataset; NULL: option missing */
     int64_t maps;                 /* dataset; -1: option missing */

@@ -19,7 +19,7 @@ expect 0 - train two --ranks 2 --threads 2
 same two
 expect 0 - train three --ranks 3
 same three
-grep -Eq '^  (next|better) +sdmgen train .* --ranks 3 --out three-2$' out || bad "the next command does not repeat the ranks: $(cat out)"
+grep -Eq '^  (next|better) +sdmgen train .* --ranks 3 --out three-2 --compare three/model.sdm$' out || bad "the next command does not repeat the ranks: $(cat out)"
 grep -qx '{"phase": "ranks", "ranks": 3, "by": "fork"}' three/metrics.jsonl || bad 'the metrics do not tell the ranks'
 grep -q ranks one/metrics.jsonl && bad 'one process tells of ranks'
 [ "$(ls three)" = "$(ls one)" ] || bad "other files: $(ls three)"

@@ -13,6 +13,8 @@
 #include "next_training.h"
 #include "oracle/captured.h"
 
+#define COMPARE "--compare run/model.sdm\n"
+
 typedef struct printer {
     const sdm_train_report *r;
     double minutes;
@@ -50,11 +52,14 @@ static void template_that_errs_near_the_surface(void **state)
         const char *line;
     } cases[] = {
         {true, 0.43, 2,
-         "  next        sdmgen train can.yaml train.minutes=4 network.kind=pod --out run-2\n"},
+         "  next        sdmgen train can.yaml train.minutes=4 network.kind=pod --out "
+         "run-2 " COMPARE},
         {false, 0, 2,
-         "  next        sdmgen train can.yaml train.minutes=2 network.kind=pod --out run-2\n"},
+         "  next        sdmgen train can.yaml train.minutes=2 network.kind=pod --out "
+         "run-2 " COMPARE},
         {false, 0, 0,
-         "  next        sdmgen train can.yaml train.minutes=1 network.kind=pod --out run-2\n"},
+         "  next        sdmgen train can.yaml train.minutes=1 network.kind=pod --out "
+         "run-2 " COMPARE},
         {true, 1.2, 2,
          "  next        no training is known to help near the surface: pod, which auto has "
          "trained, too, is 3 times worse there; exact maps (sdmgen exact, fit --exact) have no "
@@ -104,7 +109,7 @@ static void grid_or_key(void **state)
                                       .to = 18}};
     next_lines(&r, 1, text, second);
     assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.2 "
-                              "train.minutes=16 network.kind=template --out run-2\n");
+                              "train.minutes=16 network.kind=template --out run-2 " COMPARE);
     assert_string_equal(second, "              (the finer grid is for fits by the network alone, "
                                 "see `not for`; it has 16 times the voxels; network.rank can wait, "
                                 "because the error at the surface is only 0.008 voxels)\n");
@@ -158,20 +163,20 @@ static void kind_stays_open(void **state)
                                           .minutes = cases[i].minutes}};
         strcpy(r.verdict.key, cases[i].key);
         next_lines(&r, 2, text, second);
-        snprintf(expected, sizeof expected, "  next        sdmgen train can.yaml %s --out run-2\n",
-                 cases[i].changes);
+        snprintf(expected, sizeof expected,
+                 "  next        sdmgen train can.yaml %s --out run-2 " COMPARE, cases[i].changes);
         assert_string_equal(text, expected);
         snprintf(expected, sizeof expected,
                  "              (network.kind stays auto: this run had no time to try template; at "
-                 "its pace the train.minutes of this command are enough for both kinds%s%s%s; "
-                 "network.kind=template alone mostly takes less: try it first)\n",
+                 "its pace the train.minutes of this command are enough for both kinds%s%s%s)\n",
                  cases[i].alone[0] ? "; with network.kind=pod " : "", cases[i].alone,
                  cases[i].alone[0] ? " are enough" : "");
         assert_string_equal(second, expected);
         // a kind that was tried needs no other trial
         r.tried = true;
         next_lines(&r, 2, text, second);
-        assert_true(!cases[i].key[0] || strstr(text, " network.kind=template --out run-2\n"));
+        assert_true(!cases[i].key[0] ||
+                    strstr(text, " network.kind=template --out run-2 " COMPARE));
     }
 }
 
@@ -190,21 +195,111 @@ static void finer_grid_leaves_kind_open(void **state)
                                             .coarse_mm = 3,
                                             .rmse_voxel_mm = 0.03,
                                             .dice = 0.99,
-                                            .thickness_mm = 30,
-                                            .volume_derivatives_bad = "height: off by 28 %",
-                                            .volume_derivative_voxels = 0.25}};
+                                            .thickness_mm = 7.9}};
     next_lines(&r, 2, text, second);
     assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.5 "
-                              "train.minutes=84 --out run-2\n");
+                              "train.minutes=84 --out run-2 " COMPARE);
     assert_string_equal(second,
                         "              (network.kind stays auto: this run had no time to "
                         "try template; at its pace the train.minutes of this command are "
-                        "enough for both kinds; with network.kind=pod 16 are enough; "
-                        "network.kind=template alone mostly takes less: try it first; the finer "
-                        "grid is "
-                        "for derivatives of the volume, see `not for`; it has 8 times the voxels; "
-                        "nothing else needs to change, because the error at the surface is only "
-                        "0.01 voxels)\n");
+                        "enough for both kinds; with network.kind=pod 16 are enough; the finer "
+                        "grid is for fits by the network alone, see `not for`; it has 8 times the "
+                        "voxels; nothing else needs to change, because the error at the surface is "
+                        "only 0.01 voxels)\n");
+}
+
+// auto took pod because it had no time for a template that needs no training: that one comes first,
+// without a longer training, on the grid that the verdict or a use asks for.
+static void skipped_template_comes_first(void **state)
+{
+    (void)state;
+    static const struct {
+        sdm_grade grade;
+        double rmse_voxel_mm, thickness_mm;
+        const char *key, *first, *second;
+    } cases[] = {
+        {SDM_GRADE_USABLE, 0.4, 30, "network.rank",
+         "  next        sdmgen train can.yaml "
+         "train.minutes=1 network.kind=template --out run-2 " COMPARE,
+         "about 24 s and is mostly the better kind for a shape of several parts; if its "
+         "line `before` says worse, change the key that `verdict` names here)\n"},
+        {SDM_GRADE_USABLE, 0.4, 30, "grid.spacing",
+         "  next        sdmgen train can.yaml "
+         "train.minutes=1 grid=auto grid.spacing=1.5 network.kind=template --out run-2 " COMPARE,
+         "about 192 s and is"},
+        {SDM_GRADE_GOOD, 0.03, 7.9, "network.rank",
+         "  better      sdmgen train can.yaml "
+         "train.minutes=1 grid=auto grid.spacing=1.5 network.kind=template --out run-2 " COMPARE,
+         "about 192 s and is mostly the better kind for a shape of several parts; the finer "
+         "grid is for fits by the network alone"},
+        {SDM_GRADE_GOOD, 0.03, 30, "network.rank",
+         "  better      network.rank can wait: the error "
+         "at the surface is 0.01 voxels, and there is no line `not for`\n",
+         ""}};
+    char text[512], second[512];
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const double from = cases[i].key[0] == 'g' ? 3 : 9;
+        sdm_train_report r = {.model_path = "run/model.sdm",
+                              .steps = 1000,
+                              .kind = SDM_NETWORK_POD,
+                              .chosen = true,
+                              .trial_minutes = 10.5,
+                              .template_seconds = 24,
+                              .verdict = {.limited = true,
+                                          .limit = SDM_CAUSE_BASES,
+                                          .grade = cases[i].grade,
+                                          .voxel_mm = 3,
+                                          .coarse_mm = 3,
+                                          .rmse_voxel_mm = cases[i].rmse_voxel_mm,
+                                          .dice = 0.99,
+                                          .thickness_mm = cases[i].thickness_mm,
+                                          .from = from,
+                                          .to = from == 3 ? 1.5 : 18,
+                                          .minutes = 7}};
+        strcpy(r.verdict.key, cases[i].key);
+        next_lines(&r, 2, text, second);
+        assert_string_equal(text, cases[i].first);
+        if (!strstr(second, cases[i].second)) fail_msg("%s", second);
+    }
+}
+
+// auto kept a template and had no time for a trial of pod: near the surface the trials of both come
+// before a long training of pod; a finer grid keeps the template, which needs no training.
+static void trials_come_before_a_long_training(void **state)
+{
+    (void)state;
+    char text[512], second[512];
+    sdm_train_report r = {.model_path = "run/model.sdm",
+                          .kind = SDM_NETWORK_TEMPLATE,
+                          .chosen = true,
+                          .trial_minutes = 3,
+                          .pod_minutes = 20,
+                          .verdict = {.limited = true,
+                                      .limit = SDM_CAUSE_FAR,
+                                      .grade = SDM_GRADE_USABLE,
+                                      .voxel_mm = 3,
+                                      .coarse_mm = 3,
+                                      .rmse_voxel_mm = 0.4,
+                                      .dice = 0.97,
+                                      .thickness_mm = 30}};
+    next_lines(&r, 1, text, second);
+    assert_string_equal(text,
+                        "  next        sdmgen train can.yaml train.minutes=3 --out run-2 " COMPARE);
+    assert_string_equal(second,
+                        "              (auto had no time for pod: this train.minutes is enough to "
+                        "try both kinds; a training of pod alone asks for 20)\n");
+    // its trial is known: nothing is left but the training
+    r.unfinished = true, r.tried = true;
+    next_lines(&r, 1, text, second);
+    assert_string_equal(text, "  next        sdmgen train can.yaml train.minutes=20 "
+                              "network.kind=pod --out run-2 " COMPARE);
+    r.unfinished = r.tried = false;
+    r.verdict.grade = SDM_GRADE_GOOD, r.verdict.rmse_voxel_mm = 0.03, r.verdict.dice = 0.99;
+    r.verdict.thickness_mm = 7.9;
+    next_lines(&r, 1, text, second);
+    assert_string_equal(text, "  better      sdmgen train can.yaml train.minutes=1 grid=auto "
+                              "grid.spacing=1.5 network.kind=template --out run-2 " COMPARE);
+    assert_null(strstr(second, "both kinds"));
 }
 
 // A warning about a part that is too thin for the grid comes before what the verdict advises.
@@ -232,7 +327,7 @@ static void thin_part_comes_first(void **state)
     cli_show_part_first(&r, 1.5, 2);
     next_lines(&r, 2, text, second);
     assert_string_equal(text, "  next        sdmgen train can.yaml grid=auto grid.spacing=1.5 "
-                              "train.minutes=16 network.kind=template --out run-2\n");
+                              "train.minutes=16 network.kind=template --out run-2 " COMPARE);
     if (strstr(r.verdict.sentence, "network.rank") ||
         !strstr(r.verdict.sentence, "lower grid.spacing from 3 to 1.5") ||
         !strstr(r.verdict.sentence, "train.minutes from 2 to 16"))
@@ -291,19 +386,10 @@ static void finer_grid_alone(void **state)
     next_lines(&r, 1, text, second);
     assert_string_equal(text, "  better      network.weights can wait: the error at the surface is "
                               "0.01 voxels, and there is no line `not for`\n");
-    // derivatives of the volume, to which voxels leave no other way
+    // no grid mends derivatives of the volume where faces lie along planes of voxels
     r.verdict.limited = false;
     strcpy(r.verdict.volume_derivatives_bad, "height: off by 28 %");
     r.verdict.volume_derivative_voxels = 0.25;
-    next_lines(&r, 1, text, second);
-    assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.5 "
-                              "train.minutes=8 network.kind=template --out run-2\n");
-    assert_string_equal(second,
-                        "              (the finer grid is for derivatives of the volume, see "
-                        "`not for`; it has 8 times the voxels; nothing else needs to "
-                        "change, because the error at the surface is only 0.01 voxels)\n");
-    // a network that errs needs no finer grid
-    r.verdict.volume_derivative_voxels = 0.04;
     next_lines(&r, 1, text, second);
     assert_string_equal(text, "");
 }
@@ -344,6 +430,8 @@ int main(void)
                                        cmocka_unit_test(grid_or_key),
                                        cmocka_unit_test(kind_stays_open),
                                        cmocka_unit_test(finer_grid_leaves_kind_open),
+                                       cmocka_unit_test(skipped_template_comes_first),
+                                       cmocka_unit_test(trials_come_before_a_long_training),
                                        cmocka_unit_test(uses_are_not_promised),
                                        cmocka_unit_test(thin_part_comes_first),
                                        cmocka_unit_test(finer_grid_alone),

@@ -426,6 +426,7 @@ static void template_of_seconds_is_made(void **state)
     assert_kind("template");
     assert_true(r.verdict.grade == SDM_GRADE_GOOD && r.steps == 0 && r.chosen);
     assert_true(!r.compared && !r.tried && !r.unfinished && r.trial_minutes > 0);
+    assert_true(r.template_seconds == 0);
     // the grid cuts the shapes: no model is good
     second = train_in_haste(cuts, 2, &r);
     mistaken = NONE;
@@ -447,6 +448,36 @@ static void long_design_is_given_up(void **state)
     if (!strstr(said, "auto: template is left out: its design takes over half of train.minutes"))
         fail_msg("%s", said);
     assert_true(!r.compared && !r.tried && !r.unfinished && r.trial_minutes > 0);
+    assert_true(r.template_seconds > 0);
+}
+
+// pod is taken without trials: the report has the time of a template only if it needs no training.
+// That of a shape of several parts takes less than the trials of both kinds.
+static void time_of_a_skipped_template(void **state)
+{
+    (void)state;
+    static const char *const short_time[] = {"train.steps=0", "train.minutes=0.0001"};
+    const sdm_train_hooks hooks = {.message = listen};
+    const char *texts[] = {mechanism_text, ring_text};
+    mistaken = BEND;
+    for (int several = 0; several < 2; several++) {
+        const sdm_config c = parse_config(texts[!several], short_time, 2);
+        sdm_instance *shape = several ? instance_of(&mechanism) : shape_of(&c);
+        sdm_train_report r = {0};
+        sdm_error e = {0};
+        run_files_remove();
+        said[0] = '\0';
+        if (sdm_train(&c, shape, folder, false, &hooks, &r, &e)) fail_msg("%s", e.text);
+        const char *at = strstr(said, "trials of both kinds would take about ");
+        if (!at || !strstr(said, "pod is taken without trials")) fail_msg("%s", said);
+        assert_kind("pod");
+        const double trials = strtod(strpbrk(at, "0123456789"), NULL);
+        if (several ? !(r.template_seconds > 0 && r.template_seconds < trials)
+                    : r.template_seconds != 0)
+            fail_msg("%g s; %s", r.template_seconds, said);
+        sdm_instance_free(shape);
+    }
+    mistaken = NONE;
 }
 
 /* Puts a folder in the place of the model before it is written: the run ends with a checkpoint. */
@@ -585,6 +616,7 @@ int main(void)
                                        cmocka_unit_test(budget_is_shared),
                                        cmocka_unit_test(resume_is_bit_exact),
                                        cmocka_unit_test(refused_resume_loses_nothing),
+                                       cmocka_unit_test(time_of_a_skipped_template),
                                        cmocka_unit_test(resume_keeps_advice),
                                        cmocka_unit_test(second_model_cannot_be_written),
                                        cmocka_unit_test(template_remains),

@@ -300,10 +300,10 @@ static void causes_of_derivatives(void **state)
     char text[SDM_VERDICT_LIST];
     trainer_list_causes(p, (double[]){0.3, 0.1, 0.4, 0.5}, (double[]){0.25, 0.9, 0.015, 0.21}, 4,
                         text);
-    assert_string_equal(text, "21 % for d, 25 % for a: take a finer grid.spacing; by 1.5 % for c: "
-                              "the network errs, train it as `verdict` says");
+    assert_string_equal(text, "21 % for d, 25 % for a: the voxels cause it; by 1.5 % for c: the "
+                              "network errs, train it as `verdict` says");
     trainer_list_causes(p, (double[]){0.3, NAN, 0.1}, (double[]){0.15, NAN, NAN}, 3, text);
-    assert_string_equal(text, "15 %: train longer on a finer grid.spacing");
+    assert_string_equal(text, "15 %: the voxels cause a part");
     trainer_list_causes(p, (double[]){0.3}, (double[]){NAN}, 1, text);
     assert_string_equal(text, "");
     // what has no room is left out
@@ -313,7 +313,7 @@ static void causes_of_derivatives(void **state)
     memset(name, 'x', sizeof name), name[79] = '\0';
     for (int i = 0; i < 32; i++) many[i] = (sdm_param){.name = name}, error[i] = 1, voxels[i] = 1;
     trainer_list_causes(many, error, voxels, 32, text);
-    assert_non_null(strstr(text, "xxx: take a finer grid.spacing"));
+    assert_non_null(strstr(text, "xxx: the voxels cause it"));
 }
 
 // A parameter that moves vertices inside of another part alone has no error of its derivative, and

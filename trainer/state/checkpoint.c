@@ -354,7 +354,8 @@ static sdm_status turns_read(const trainer *t, const sdm_section *stored, traini
                  out->at < out->n && out->share > 0 && out->share <= 1 && out->tried >= 0 &&
                  isfinite(out->tried) && is_bool(&out->chosen) && is_bool(&out->untried) &&
                  is_bool(&out->if_good) && is_bool(&out->tried_other) && out->pod_minutes >= 0 &&
-                 out->trial_minutes >= 0 && report_is_sound(&out->first);
+                 out->trial_minutes >= 0 && out->template_seconds >= 0 &&
+                 report_is_sound(&out->first);
     for (int i = 0; i < out->n && sound; i++)
         sound = out->kind[i] == SDM_NETWORK_POD || out->kind[i] == SDM_NETWORK_TEMPLATE;
     return sound ? SDM_OK

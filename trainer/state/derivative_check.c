@@ -365,9 +365,9 @@ void trainer_list_derivatives(const sdm_param *p, const double *error, size_t n,
     list(p, error, n, "", n, SDM_VERDICT_LIST, text);
 }
 
-/* What mends an error of derivatives of the volume, of which exact maps on the same voxels have
+/* The cause of an error of derivatives of the volume, of which exact maps on the same voxels have
  * this part. */
-static int remedy_of(double voxels)
+static int cause_of(double voxels)
 {
     return voxels > SDM_DERIVATIVE_BAD ? 0 : voxels > 0.5 * SDM_DERIVATIVE_BAD ? 1 : 2;
 }
@@ -375,9 +375,9 @@ static int remedy_of(double voxels)
 void trainer_list_causes(const sdm_param *p, const double *error, const double *voxels, size_t n,
                          char text[SDM_VERDICT_LIST])
 {
-    static const char *const remedies[] = {": take a finer grid.spacing",
-                                           ": train longer on a finer grid.spacing",
-                                           ": the network errs, train it as `verdict` says"};
+    // flat faces along planes of voxels err on each grid: a finer one is no safe advice
+    static const char *const causes[] = {": the voxels cause it", ": the voxels cause a part",
+                                         ": the network errs, train it as `verdict` says"};
     enum { ROOM = SDM_VERDICT_LIST - 60 };
     const size_t first = next_worst(error, n, n);
     const bool single = first == n || next_worst(error, n, first) == n;
@@ -387,7 +387,7 @@ void trainer_list_causes(const sdm_param *p, const double *error, const double *
         bool some = false;
         for (size_t k = first; k < n; k = next_worst(error, n, k)) {
             char one[120], name[72] = "";
-            if (!(voxels[k] >= 0) || remedy_of(voxels[k]) != r) continue;
+            if (!(voxels[k] >= 0) || cause_of(voxels[k]) != r) continue;
             if (!single) snprintf(name, sizeof name, " for %.60s", p[k].name);
             const int length =
                 snprintf(one, sizeof one, voxels[k] >= 0.1 ? "%s%.0f %%%s" : "%s%.2g %%%s",
@@ -399,7 +399,7 @@ void trainer_list_causes(const sdm_param *p, const double *error, const double *
             used += (size_t)snprintf(text + used, SDM_VERDICT_LIST - used, "%s", one);
             some = true;
         }
-        if (some) used += (size_t)snprintf(text + used, SDM_VERDICT_LIST - used, "%s", remedies[r]);
+        if (some) used += (size_t)snprintf(text + used, SDM_VERDICT_LIST - used, "%s", causes[r]);
         if (used >= ROOM) return;
     }
 }

@@ -24,10 +24,12 @@ typedef struct training_turns {
                              the budget holds its maps */
     double trial_minutes; /* train.minutes whose part for trials holds those of both kinds, if the
                              budget left out the trial of the kind that is not trained; else 0 */
-    bool untried;         /* pod may be better, but the budget was too short for its trial */
-    bool if_good;         /* the first of two is kept without the second if its grade is good */
-    bool tried_other;     /* the kind that is not trained, or trained later, had a trial: */
-    turn_figures other;   /* its errors in the trial */
+    double template_seconds; /* about the time of a template, s, where the budget left out its
+                                trial and it most likely needs no training; else 0 */
+    bool untried;            /* pod may be better, but the budget was too short for its trial */
+    bool if_good;            /* the first of two is kept without the second if its grade is good */
+    bool tried_other;        /* the kind that is not trained, or trained later, had a trial: */
+    turn_figures other;      /* its errors in the trial */
 } training_turns;
 
 /* *out = `asked` with the kind of the present turn, its defaults for all keys that have those of

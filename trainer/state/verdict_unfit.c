@@ -83,7 +83,7 @@ static void add_derivatives(const sdm_verdict *v, unfit_lines *l)
     char cause[SDM_VERDICT_LIST + 80] = "";
     if (v->volume_causes[0])
         snprintf(cause, sizeof cause,
-                 "; exact maps on voxels of %.3g mm err by %s; or take differences of meshes",
+                 "; exact maps on voxels of %.3g mm err by %s; take differences of meshes",
                  v->coarse_mm, v->volume_causes);
     if (v->derivatives_bad[0])
         add(l, "derivatives of maps by %s; the network causes it: sdmgen exact --jacobian is exact",

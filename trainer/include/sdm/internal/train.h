@@ -100,6 +100,9 @@ typedef struct sdm_train_report {
        the other kind without a trial and a training, because train.minutes was too short; 0: else.
      */
     double trial_minutes;
+    /* About the time of a training with network.kind: template on the same grid, s, where
+       network.kind: auto left out its trial and it most likely needs no training; 0: else. */
+    double template_seconds;
 } sdm_train_report;
 
 /* Trains a network as `config` says and writes into `folder`: config.yaml (with all defaults filled

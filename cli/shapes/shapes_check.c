@@ -8,6 +8,7 @@
 
 #include "inputs/config_shape.h"
 #include "inputs/setup.h"
+#include "part_moves.h"
 #include "report/files.h"
 #include "report/json_values.h"
 #include "report/progress_bar.h"
@@ -135,7 +136,7 @@ static void print_stage(void *user, sdm_survey_stage stage)
     (void)fflush(stdout);
 }
 
-static sdm_status print_rest(const check *c, sdm_error *err)
+static sdm_status print_rest(const check *c, const cli_part_moves *moves, sdm_error *err)
 {
     const sdm_shape_survey *f = &c->survey.found;
     if (c->printed) {
@@ -151,6 +152,7 @@ static sdm_status print_rest(const check *c, sdm_error *err)
     else
         printf("box      %.4g %.4g %.4g .. %.4g %.4g %.4g mm\n", f->low[0], f->low[1], f->low[2],
                f->high[0], f->high[1], f->high[2]);
+    cli_part_moves_print(moves, sdm_instance_params(c->survey.shape, NULL));
     if (f->has_velocity)
         printf("velocity differs from differences of meshes by %.2g at most (relative)\n",
                f->velocity_error);
@@ -195,7 +197,7 @@ static void add_jumps(sdm_json *j, const check *c)
     sdm_json_close(j, ']');
 }
 
-static sdm_status print_json(const check *c, sdm_error *err)
+static sdm_status print_json(const check *c, const cli_part_moves *moves, sdm_error *err)
 {
     const sdm_shape_survey *f = &c->survey.found;
     const sdm_status verdict = sdm_shape_survey_verdict(f);
@@ -241,6 +243,7 @@ static sdm_status print_json(const check *c, sdm_error *err)
         sdm_json_reals(&j, "beyond_mm", &f->beyond[0][0], 6);
     }
     add_jumps(&j, c);
+    cli_part_moves_json(moves, sdm_instance_params(c->survey.shape, NULL), &j);
     if (f->has_velocity) sdm_json_real(&j, "velocity_error", f->velocity_error);
     sdm_json_int(&j, "unlike", (int64_t)f->repeat.unlike);
     sdm_json_open(&j, "findings", '[');
@@ -387,13 +390,15 @@ sdm_status cli_shapes_check(const cli_args *args, sdm_error *err)
     cli_progress_start(&c.bar);
     if (!s) s = sdm_shape_survey_make(c.shape, &c.opts, &c.survey.found, err);
     cli_progress_end(&c.bar, !s);
+    cli_part_moves moves;
+    if (!s) s = cli_part_moves_make(c.shape, c.opts.range, &moves, err);
     if (!s) {
-        s = args->json ? print_json(&c, err) : print_rest(&c, err);
+        s = args->json ? print_json(&c, &moves, err) : print_rest(&c, &moves, err);
         for (size_t i = 0; i < args->outputs.n && !s; i++)
             s = draw(&c, args->outputs.items[i], err);
         if (!s) s = end(&c, err);
-        sdm_shape_survey_dispose(&c.survey.found);
     }
+    sdm_shape_survey_dispose(&c.survey.found);
     sdm_instance_free(c.shape);
     sdm_registry_free(c.registry);
     sdm_free(c.config);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sdmgen shapes check, and what mesh, exact, config and train say about a shape with faults (tests/shape/faulty_shape.h): one line each.
-# Tests: repeat_process.c report_survey.c teller.c warn_repeats.c tell_causes.c tell_meshes.c tell_notes.c tell_params.c tell_walls.c report_audit.c part_turns.c grid_hits.c shapes_check.c cmd_mesh.c crash_guard.c callback.c
+# Tests: repeat_process.c report_survey.c teller.c warn_repeats.c tell_causes.c tell_meshes.c tell_notes.c tell_params.c tell_walls.c report_audit.c part_turns.c grid_hits.c shapes_check.c part_moves.c cmd_mesh.c crash_guard.c callback.c
 . "$(dirname "$0")/common.sh"
 plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
 
@@ -9,10 +9,16 @@ expect 0 - sdmgen shapes check faulty --plugin "$plugin" --samples 16 -o nine.pn
 has '^fine: the shape can be trained; give a configuration'
 has '^volume +8\.25 \.\. 216\.5 mm\^3, of the union$'
 has '^note +overlaps .* in all 21 shapes'
+# Corners of the body go from (1, 1, 1) to (3, 3, 3); the handle begins at the body, along x, and ends at the reach.
+has '^moves    the longest way of a vertex of each part over the range of a parameter, mm'
+has '^         part        1       2$'
+has '^         size     3\.46       2$'
+has '^         reach       0       1$'
 present nine.png
 expect 0 - sdmgen shapes check --plugin "$plugin" --samples 16 --json
 has '"shape": "faulty", "verdict": "fine", "shapes": 21, "corners": 4, "samples": 16'
 has '"jumps": \[\]'
+has '"moves": \[\{"parameter": "size", "parts_mm": \[3\.46410[0-9]*, 2\]\}, \{"parameter": "reach", "parts_mm": \[0, 1\]\}\]'
 for shape in duct ellipsoid torus capsule linkage; do
     expect 0 - sdmgen shapes check $shape --samples 8
     has '^fine'

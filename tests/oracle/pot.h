@@ -44,9 +44,9 @@ static const sdm_shape pot = {.abi = SDM_SHAPE_ABI,
                               .n_params = POT_PARAMS,
                               .mesh = pot_mesh};
 
-/* points[POT_POINTS][3]: those of POT_POINTS on the surface of the pot `shape` with z < top mm (and,
- * where `back`, x < 0), with normal errors of 0.05 mm; returns their number. The spout begins above
- * z = -3 mm. */
+/* points[POT_POINTS][3]: those of POT_POINTS on the surface of the pot `shape` with z < top mm
+ * (and, where `back`, x < 0), with normal errors of 0.05 mm; returns their number. The spout begins
+ * above z = -3 mm. */
 static inline size_t pot_points(sdm_instance *shape, double top, bool back, double *points)
 {
     enum { ALL = POT_POINTS };

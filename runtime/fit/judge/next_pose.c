@@ -524,8 +524,8 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_result
              "the shape %s explains the data %s (log-likelihood of the fit less that of the other: "
              "%.2g): %s",
              where, equal ? "as well" : "better", least.gain,
-             equal  ? "the data do not tell the two apart; keep what is known "
-                      "(sdm_fit_opts.kept), or take data that show more of the shape"
+             equal ? "the data do not tell the two apart; keep what is known "
+                     "(sdm_fit_opts.kept), or take data that show more of the shape"
              : sdm_fit_began_at(p, &own.state, &least.state, name ? least.param : 0, own.centre)
                  ? TRIED
              : name ? FROM_VALUE

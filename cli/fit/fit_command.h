@@ -100,7 +100,8 @@ typedef struct cli_fit {
     double *truth; /* [n_params] */
     bool has_truth_pose;
     sdm_pose truth_pose;
-    bool truth_same; /* the true rotation is another one with the same surface */
+    bool truth_same;   /* the true rotation is another one with the same surface */
+    double truth_turn; /* degrees; > 0: a symmetry of the shape, by which truth_pose was turned */
 
     /* fit_result.c */
     sdm_fit_result result;
@@ -220,8 +221,9 @@ sdm_status cli_fit_read_reference(cli_fit *f, sdm_error *err);
  * --truth, if it is given. SDM_E_ARG: the truth of another shape; SDM_E_FORMAT, SDM_E_IO. */
 sdm_status cli_fit_read_truth(cli_fit *f, sdm_error *err);
 
-/* After cli_fit_make_map(): sets f->truth_same where the rotation of --truth is another one. Errors
- * of making the map. */
+/* After cli_fit_make_map(): where the pose of --truth differs from the fitted one by a turn to the
+ * same surface, sets f->truth_same and, if the turn is a symmetry about an axis of the shape's
+ * frame, turns f->truth_pose by it and sets f->truth_turn. Errors of making the map. */
 sdm_status cli_fit_compare_truth(cli_fit *f, sdm_error *err);
 
 /* After the fit: prints how far the pose is from that of --truth; adds it to a JSON object. Nothing
@@ -319,9 +321,11 @@ void cli_fit_json_verdict(const cli_fit *f, sdm_json *json);
 /* Before a fit to an image: SDM_E_QUALITY where the values of the tissues are exchanged at the
  * start pose, unless --force is given: so clearly, and without rotations that are tried; or in an
  * image that cannot be stated right: its border is like the inside, it has about as much of the
- * outside as of the shape, and encloses nothing that is like the inside. Else a notice. A notice,
- * too, where only the border speaks for exchanged values. */
-sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err);
+ * outside as of the shape, and encloses nothing that is like the inside. Else a notice; where the
+ * start or the image shows it so clearly, a refused fit does not search for another start:
+ * f->opts.max_restarts becomes 0. A notice, too, where only the border speaks for exchanged values.
+ */
+sdm_status cli_fit_check_contrast(cli_fit *f, sdm_error *err);
 
 /* After a fit to an image that is not trustworthy: where the image at the start pose looks like the
  * inside around the shape, and clearly more like the outside within it, or a fit with exchanged

@@ -245,7 +245,7 @@ static bool encloses_nothing(const cli_fit *f, double shape)
     return !s && (double)n * voxel < ENCLOSED_MAX * shape;
 }
 
-sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err)
+sdm_status cli_fit_check_contrast(cli_fit *f, sdm_error *err)
 {
     const double inside = f->opts.appearance.inside[0].mean,
                  outside = f->opts.appearance.outside[0].mean;
@@ -268,7 +268,10 @@ sdm_status cli_fit_check_contrast(const cli_fit *f, sdm_error *err)
                        encloses_nothing(f, in.volume);
     if (((clear && f->opts.turns == SDM_FIT_TURNS_NONE) || alone) && !f->args->force)
         return sdm_fail(err, SDM_E_QUALITY, "%s: %s; --force fits nevertheless", f->path, why.text);
-    cli_notice("%s, if the shape lies near the start", why.text);
+    // a refused fit is explained by the exchange: no other start mends it
+    if (clear || alone) f->opts.max_restarts = 0;
+    cli_notice("%s, if the shape lies near the start%s", why.text,
+               clear || alone ? "; if the fit is refused, no other start is searched" : "");
     return SDM_OK;
 }
 

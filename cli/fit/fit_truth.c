@@ -21,9 +21,15 @@ enum { TRUTH_BYTES_MAX = 1 << 20 };
 #define TURNED_MIN 10.0
 #define SAME_DICE 0.96
 #define SAME_APART 1.5
+/* Symmetries that are tried: up to this many equal turns about an axis. */
+#define FOLD_MAX 8
+/* An axis of symmetry goes through the origin of the frame if it is nearer to it than this part of
+ * a voxel. */
+#define AXIS_VOXEL 0.25
 
 /* Degrees in a radian; variance of an angle that may be any, rad^2: pi^2 / 3. */
-static const double DEGREES = 57.295779513082321, ANY_ANGLE = 3.2898681336964529;
+static const double DEGREES = 57.295779513082321, ANY_ANGLE = 3.2898681336964529,
+                    PI = 3.14159265358979324;
 
 /* Is the string at index i the name of a parameter of the shape? */
 static bool is_parameter(const cli_fit *f, const sdm_json_document *d, size_t i)
@@ -172,23 +178,17 @@ static double pose_in_sd(const cli_fit *f)
     return sqrt(sum / N);
 }
 
-sdm_status cli_fit_compare_truth(cli_fit *f, sdm_error *err)
+/* *same = the fitted shape has the same surface in this pose as in its own. */
+static sdm_status is_same_surface(const cli_fit *f, const sdm_pose *pose, bool *same,
+                                  sdm_error *err)
 {
     const size_t n = sdm_grid_count(&f->map_grid);
     const double edge = sdm_grid_coarsest(&f->map_grid);
-    double degrees, here[3], there[3], both = 0, all = 0, apart = 0;
+    double both = 0, all = 0, apart = 0;
     float *turned = NULL;
-    if (!f->has_truth_pose) return SDM_OK;
-    (void)compare_pose(f, &degrees);
-    if (!(degrees > TURNED_MIN)) return SDM_OK;
-    // the fitted shape, turned as the true one, about its centre
-    sdm_pose pose = f->truth_pose;
-    sdm_pose_apply(&f->result.pose, f->pivot, here);
-    sdm_pose_apply(&pose, f->pivot, there);
-    for (int a = 0; a < 3; a++) pose.translation[a] += here[a] - there[a];
     sdm_status s = SDM_ALLOC(&turned, n, "distance map", err);
     if (!s)
-        s = sdm_fit_map(&f->map_source, f->result.params, &pose, &f->map_grid, f->opts.n_threads,
+        s = sdm_fit_map(&f->map_source, f->result.params, pose, &f->map_grid, f->opts.n_threads,
                         turned, err);
     for (size_t i = 0; i < n && !s; i++) {
         both += f->map[i] < 0 && turned[i] < 0;
@@ -196,9 +196,108 @@ sdm_status cli_fit_compare_truth(cli_fit *f, sdm_error *err)
         if (fabs((double)f->map[i]) < edge)
             apart = fmax(apart, fabs((double)f->map[i] - (double)turned[i]));
     }
-    f->truth_same = !s && 2 * both > SAME_DICE * all && apart < SAME_APART * edge;
+    *same = !s && 2 * both > SAME_DICE * all && apart < SAME_APART * edge;
     sdm_free(turned);
     return s;
+}
+
+/* centre[3] = middle of the volume of the fitted shape, in its frame, mm. */
+static void middle_of_volume(const cli_fit *f, double centre[3])
+{
+    const sdm_grid *g = &f->map_grid;
+    const sdm_pose inverse = sdm_pose_inverse(&f->result.pose);
+    double sum[4] = {0}, world[3];
+    size_t v = 0;
+    for (int64_t k = 0; k < g->n[2]; k++)
+        for (int64_t j = 0; j < g->n[1]; j++)
+            for (int64_t i = 0; i < g->n[0]; i++)
+                if (f->map[v++] < 0)
+                    sum[0] += (double)i, sum[1] += (double)j, sum[2] += (double)k, sum[3]++;
+    for (int a = 0; a < 3; a++) sum[a] /= fmax(sum[3], 1);
+    sdm_grid_world(g, sum, world);
+    sdm_pose_apply(&inverse, world, centre);
+}
+
+/* Turn by `angle` about a unit axis of the shape's frame through x. */
+static sdm_pose turn_about(const double axis[3], double angle, const double x[3])
+{
+    sdm_pose p = {0};
+    double moved[3];
+    for (int a = 0; a < 3; a++) p.rotation[a] = angle * axis[a];
+    sdm_pose_apply(&p, x, moved);
+    for (int a = 0; a < 3; a++) p.translation[a] = x[a] - moved[a];
+    return p;
+}
+
+/* *centre = the place through which an axis of symmetry goes: the origin of the frame, if the
+ * middle of the volume, which voxels tell to a part of one, lies beside the axis by no more. */
+static void centre_of_axis(const cli_fit *f, const double middle[3], const double axis[3],
+                           double centre[3])
+{
+    double off[3];
+    v3_cross(axis, middle, off);
+    const bool origin = v3_norm(off) < AXIS_VOXEL * sdm_grid_coarsest(&f->map_grid);
+    for (int a = 0; a < 3; a++) centre[a] = origin ? 0 : middle[a];
+}
+
+static size_t common_divisor(size_t a, size_t b) { return b ? common_divisor(b, a % b) : a; }
+
+/* Turns the true pose by the k-th of n equal turns about an axis of the frame (the 13 directions to
+ * the sides, edges and corners of a cube) that brings it nearest to the fitted one. Returns the
+ * angle between both, degrees. */
+static double turn_truth(const cli_fit *f, const double middle[3], size_t n, sdm_pose *best)
+{
+    cli_fit other = *f;
+    double least = INFINITY;
+    for (int direction = 14; direction < 27; direction++)
+        for (size_t k = 1; k < n; k++) {
+            double axis[3] = {direction % 3 - 1, direction / 3 % 3 - 1, direction / 9 - 1},
+                   centre[3], degrees;
+            const double length = v3_norm(axis);
+            for (int a = 0; a < 3; a++) axis[a] /= length;
+            if (common_divisor(k, n) > 1) continue;
+            centre_of_axis(f, middle, axis, centre);
+            const sdm_pose turn = turn_about(axis, 2 * PI * (double)k / (double)n, centre);
+            other.truth_pose = sdm_pose_compose(&f->truth_pose, &turn);
+            (void)compare_pose(&other, &degrees);
+            if (degrees < least) least = degrees, *best = turn;
+        }
+    return least;
+}
+
+/* Where the pose differs from the true one by a symmetry of the fitted shape, f->truth_pose becomes
+ * the true pose after this symmetry. */
+static sdm_status take_symmetry(cli_fit *f, sdm_error *err)
+{
+    double middle[3];
+    sdm_status s = SDM_OK;
+    middle_of_volume(f, middle);
+    for (size_t n = 2; n <= FOLD_MAX && !f->truth_same && !s; n++) {
+        sdm_pose turn = {0};
+        if (!(turn_truth(f, middle, n, &turn) < TURNED_MIN)) continue;
+        const sdm_pose pose = sdm_pose_compose(&f->result.pose, &turn);
+        s = is_same_surface(f, &pose, &f->truth_same, err);
+        if (!f->truth_same) continue;
+        f->truth_pose = sdm_pose_compose(&f->truth_pose, &turn);
+        f->truth_turn = DEGREES * fmin(v3_norm(turn.rotation), 2 * PI - v3_norm(turn.rotation));
+    }
+    return s;
+}
+
+sdm_status cli_fit_compare_truth(cli_fit *f, sdm_error *err)
+{
+    double degrees, here[3], there[3];
+    if (!f->has_truth_pose) return SDM_OK;
+    (void)compare_pose(f, &degrees);
+    if (!(degrees > TURNED_MIN)) return SDM_OK;
+    const sdm_status s = take_symmetry(f, err);
+    if (s || f->truth_same) return s;
+    // another symmetry: the fitted shape, turned as the true one, about its centre
+    sdm_pose pose = f->truth_pose;
+    sdm_pose_apply(&f->result.pose, f->pivot, here);
+    sdm_pose_apply(&pose, f->pivot, there);
+    for (int a = 0; a < 3; a++) pose.translation[a] += here[a] - there[a];
+    return is_same_surface(f, &pose, &f->truth_same, err);
 }
 
 double cli_fit_truth_shift(const cli_fit *f)
@@ -214,12 +313,16 @@ void cli_fit_print_truth_pose(const cli_fit *f)
     const double shift = compare_pose(f, &degrees);
     printf("  pose         off the truth by %.3g mm at the centre of the shape", shift);
     const double sd = pose_in_sd(f);
-    if (f->truth_same)
+    if (f->truth_same && !(f->truth_turn > 0))
         printf("; the same surface, turned by %.3g degrees", degrees);
     else if (isfinite(degrees))
         printf(" and %.3g degrees%s", degrees,
                *f->result.open_motions ? " between the open axis and the true one" : "");
-    if (isfinite(sd) && !f->truth_same) printf(", %.2g sd", sd);
+    if (isfinite(sd) && (!f->truth_same || f->truth_turn > 0)) printf(", %.2g sd", sd);
+    if (f->truth_turn > 0)
+        printf(
+            "; the true pose was turned by %.3g degrees first, which leaves the surface as it is",
+            f->truth_turn);
     printf("\n");
 }
 
@@ -231,7 +334,8 @@ void cli_fit_json_truth_pose(const cli_fit *f, sdm_json *j)
     sdm_json_open(j, "truth_pose_error", '{');
     sdm_json_real(j, "centre_mm", shift);
     sdm_json_real(j, "rotation_deg", degrees);
-    sdm_json_real(j, "rms_sd", f->truth_same ? NAN : pose_in_sd(f));
+    sdm_json_real(j, "rms_sd", f->truth_same && !(f->truth_turn > 0) ? NAN : pose_in_sd(f));
     sdm_json_bool(j, "same_surface", f->truth_same);
+    sdm_json_real(j, "symmetry_deg", f->truth_turn);
     sdm_json_close(j, '}');
 }

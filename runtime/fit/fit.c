@@ -549,7 +549,7 @@ static sdm_status judge(fit_problem *p, sdm_fit_result *r, sdm_error *err)
     const sdm_status params = keeps_some(p) ? sdm_fit_judge_kept_params(p, r, err) : SDM_OK;
     if (params && params != SDM_E_QUALITY) return params;
     if (params) s = params;
-    if (!s && !p->is_rival) s = sdm_fit_judge_next_pose(p, factor, &r->verdict, err);
+    if (!s && !p->is_rival) s = sdm_fit_judge_next_pose(p, factor, r, err);
     const sdm_status kept = p->opts->keep_pose ? sdm_fit_judge_kept_pose(p, r, err) : SDM_OK;
     return kept ? kept : s;
 }
@@ -574,6 +574,7 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
 /* From the state of *p to a verdict. *fitted: the state that the result reports. */
 static sdm_status attempt(fit_problem *p, sdm_fit_result *out, fit_state *fitted, sdm_error *err)
 {
+    if (p->n_begun < FIT_BEGUN) p->begun[p->n_begun++] = p->state;
     // 5. maximise the posterior; 6. covariance
     sdm_status s = maximise(p, out, err);
     const double from = sdm_clock();
@@ -675,6 +676,7 @@ static sdm_status attempt_better(fit_problem *p, bool exact, sdm_fit_result *out
     first.seconds_verdict = second.seconds_verdict;
     sdm_fit_dispose(&second);
     *out = first;
+    if (!*again) sdm_fit_next_pose_tried(&out->verdict);
     return SDM_OK;
 }
 

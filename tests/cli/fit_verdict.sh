@@ -24,6 +24,13 @@ expect 0 - $torus turned.nii --truth turned.json -o fit.json
 has '^  rotation .* \+- 0\.0[0-9]* 0\.0[0-9]* open rad$'
 has '^  not determined by the data: rotation about the axis .*; the \+- of the pose leaves it out$'
 has '^  pose         off the truth by 0\.[0-9]+ mm at the centre of the shape and 0(\.[0-9]+)? degrees between the open axis and the true one$'
+# the true pose upside down, by half a turn about y of the frame: the errors stay
+upright=$(sed -n 's/^  pose  *\(off the truth by [0-9.]* mm\) .* \([0-9.]*\) degrees between .*/\1 \2/p' out)
+sed 's/"rotation_rad": *\[[^]]*\]/"rotation_rad": [-1.506160, 2.757007, 0]/' turned.json >over.json
+cmp -s turned.json over.json && bad 'the pose of the truth was not found'
+expect 0 - $torus turned.nii --truth over.json
+over=$(sed -n 's/^  pose  *\(off the truth by [0-9.]* mm\) .* \([0-9.]*\) degrees between .*; the true pose was turned by 180 degrees first, .*/\1 \2/p' out)
+[ -n "$upright" ] && [ "$over" = "$upright" ] || bad "errors of the pose upside down: '$over', not '$upright'"
 cp fit.json out
 has '"rotation_sd_determined_rad": *\[0\.0'
 
@@ -37,7 +44,7 @@ expect 4 'error: turned.nii: the values of the inside and the outside are exchan
     sdmgen fit --shape torus -O edge=0.5 turned.nii --quiet --inside 1300,270 --outside 40,170 --start-axis 0,0,1 --turns 1 --max-iterations 1
 grep -q '^verdict' out && bad 'a fit of many rotations with values that the image shows to be exchanged'
 sdmgen fit --shape torus -O edge=0.5 turned.nii --spacing 0.4 --inside 1300,270 --outside 40,170 --start-axis 0,0,1 --turns 1 --max-iterations 1 --force >out 2>err
-grep -q '^sdmgen: the values of the inside and the outside are exchanged: at the start .*: exchange --inside and --outside, if the shape lies near the start$' err ||
+grep -q '^sdmgen: the values of the inside and the outside are exchanged: at the start .*: exchange --inside and --outside, if the shape lies near the start; if the fit is refused, no other start is searched$' err ||
     bad "no notice of exchanged values: $(cat err)"
 # a start so far beside the shape that it shows nothing: the border of the image tells
 sdmgen fit --shape torus -O edge=0.5 turned.nii --spacing 0.4 --inside 1300,270 --outside 40,170 --start-centre 0,0,4 --max-iterations 1 --turns 1 >out 2>err
@@ -52,8 +59,12 @@ awk 'BEGIN { printf "NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 40 
         printf "%c", (dark ? 20 : 100) + (7 * i + 13 * j + 29 * k) % 9 } }' >layer.nrrd
 layer='sdmgen fit --shape ellipsoid -O edge=0.8 -p rx=1 -p ry=1 -p rz=1 layer.nrrd --spacing 0.4 --start-centre 0,0,2.85 --start-axis 0,0,1 --turns 1 --margin 4 --max-iterations 1'
 $layer --inside 24,3 --outside 104,3 >out 2>err
-grep -q 'exchanged: at the start .*, if the shape lies near the start$' err || bad "the start does not look exchanged: $(cat err)"
+grep -q 'exchanged: at the start .*, if the shape lies near the start' err || bad "the start does not look exchanged: $(cat err)"
 has '^verdict: '
+# so clearly exchanged at the start, a refused fit searches no other start
+${layer% --max-iterations 1} --inside 24,3 --outside 104,3 --json >out 2>err
+has '"trusted": *false'
+has '"restarts": *0,'
 expect 4 '^sdmgen: error: turned.nii: the values of the inside and the outside are exchanged: .*: exchange --inside and --outside$' \
     $torus turned.nii --inside 1300,270 --outside 40,170 --force
 has '^  given values doubtful  [0-9.]+, need at most 3 '

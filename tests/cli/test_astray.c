@@ -36,7 +36,7 @@ static void advise(bool turned, char *text, size_t size)
                  .points = points,
                  .target = {.kind = SDM_FIT_POINTS, .points = points},
                  .opts = sdm_fit_defaults()};
-    f.target.n_points = pot_points(shape, false, points);
+    f.target.n_points = pot_points(shape, 1, false, points);
     if (turned) f.opts.start_pose.rotation[2] = 3.141592653589793;
     f.opts.polish_eps = 1e-3;
     f.opts.max_restarts = 0;

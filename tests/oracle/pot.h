@@ -44,9 +44,10 @@ static const sdm_shape pot = {.abi = SDM_SHAPE_ABI,
                               .n_params = POT_PARAMS,
                               .mesh = pot_mesh};
 
-/* points[POT_POINTS][3]: those of POT_POINTS on the surface of the pot `shape` with z < 1 mm (and,
- * where `back`, x < 0), with normal errors of 0.05 mm; returns their number. */
-static inline size_t pot_points(sdm_instance *shape, bool back, double *points)
+/* points[POT_POINTS][3]: those of POT_POINTS on the surface of the pot `shape` with z < top mm
+ * (and, where `back`, x < 0), with normal errors of 0.05 mm; returns their number. The spout begins
+ * above z = -3 mm. */
+static inline size_t pot_points(sdm_instance *shape, double top, bool back, double *points)
 {
     enum { ALL = POT_POINTS };
     static double x[3 * ALL];
@@ -56,7 +57,7 @@ static inline size_t pot_points(sdm_instance *shape, bool back, double *points)
         sdm_fit_surface_points(&m, ALL, 2, x, NULL))
         abort();
     for (size_t i = 0; i < ALL; i++) {
-        if (x[3 * i + 2] > 1 || (back && x[3 * i] > 0)) continue;
+        if (x[3 * i + 2] > top || (back && x[3 * i] > 0)) continue;
         for (size_t k = 0; k < 3; k++)
             points[3 * n + k] = x[3 * i + k] + 0.05 * sdm_rng_normal(1, k, i);
         n++;

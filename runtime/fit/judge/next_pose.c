@@ -64,6 +64,12 @@
 // parameters with another value of which rivals start
 #define PARAMS_TRIED 2
 
+// what to do about a better rival: go there, or not again
+static const char FROM_VALUE[] = "start from this value (sdm_fit_opts.start_params)",
+                  FROM_POSE[] = "start from this pose, or try more turns",
+                  TRIED[] = "a fit that began there did not stay: keep what is known "
+                            "(sdm_fit_opts.kept)";
+
 /* The rival with the least gain of the fit over it; NaN: there is none. */
 typedef struct nearest {
     double gain;
@@ -71,12 +77,14 @@ typedef struct nearest {
     double value;       /* of this parameter */
     double rotation[3]; /* rotation vector of the shape, rad */
     fit_state state;
+    bool open;          /* another pose, as good, differs along open directions alone */
     char symmetry[240]; /* how the surface may be turned and stays the same; "": not at all */
 } nearest;
 
 /* The fit, with which its rivals are compared. */
 typedef struct own_fit {
     const fit_problem *p;
+    const sdm_fit_result *result;
     fit_state state;
     double *distance; /* [n_voxels] map of the shape, mm */
     double volume;    /* see volume_of() */
@@ -297,6 +305,12 @@ static void nearest_take(nearest *least, const fit_problem *p, const own_fit *ow
 {
     const double gain = sdm_fit_gain(fit, rival);
     if (least->gain <= gain || isnan(gain)) return;
+    // as good along open directions, which the fit tells
+    if (fabs(gain) < SDM_FIT_PREFERRED &&
+        sdm_fit_differs_openly(p, own->result, &own->state, &p->state, own->centre)) {
+        least->open = true;
+        return;
+    }
     const size_t param = value ? most_changed(p, own) + 1 : 0;
     least->gain = gain;
     least->param = param;
@@ -443,9 +457,21 @@ static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_e
 // to a thousandth, and without the sign of -0
 static double rounded(double radians) { return round(1000 * radians) / 1000 + 0.0; }
 
-sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdict *v,
+void sdm_fit_next_pose_tried(sdm_fit_verdict *v)
+{
+    const char *const advice[] = {FROM_VALUE, FROM_POSE};
+    for (size_t i = 0; i < v->n_findings; i++)
+        for (size_t k = 0; k < 2; k++) {
+            sdm_fit_finding *f = &v->findings[i];
+            char *at = f->kind == SDM_FIT_CHECK_NEXT_POSE ? strstr(f->text, advice[k]) : NULL;
+            if (at) snprintf(at, sizeof f->text - (size_t)(at - f->text), "%s", TRIED);
+        }
+}
+
+sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_result *result,
                                    sdm_error *err)
 {
+    sdm_fit_verdict *v = &result->verdict;
     const sdm_fit_opts *given = p->opts;
     sdm_fit_opts quiet = *given;
     own_fit own = {0};
@@ -457,6 +483,7 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
     sdm_status s = sdm_fit_samples_near(p, SAMPLES, err);
     if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
     if (!s) s = own_create(p, &own, err);
+    own.result = result;
     // of every `stride`-th voxel fewer count as one; where the shape does not explain the image,
     // the likelihood is less certain (Wedderburn 1974)
     own.factor = fmax(factor / pow((double)p->stride, 3), 1) * fmax(v->chi_square, 1);
@@ -474,6 +501,8 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
                                   .limit = alone ? NAN : SDM_FIT_PREFERRED};
         snprintf(passed.text, sizeof passed.text, "%s",
                  *least.symmetry ? least.symmetry
+                 : least.open    ? "other poses that explain the data as well differ only along "
+                                   "what the fit calls not determined"
                  : alone         ? "every other start, rotation and value of one parameter leads "
                                    "back to this surface"
                                  : "");
@@ -495,10 +524,12 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdic
              "the shape %s explains the data %s (log-likelihood of the fit less that of the other: "
              "%.2g): %s",
              where, equal ? "as well" : "better", least.gain,
-             equal  ? "the data do not tell the two apart; keep what is known "
-                      "(sdm_fit_opts.kept), or take data that show more of the shape"
-             : name ? "start from this value (sdm_fit_opts.start_params)"
-                    : "start from this pose, or try more turns");
+             equal ? "the data do not tell the two apart; keep what is known "
+                     "(sdm_fit_opts.kept), or take data that show more of the shape"
+             : sdm_fit_began_at(p, &own.state, &least.state, name ? least.param : 0, own.centre)
+                 ? TRIED
+             : name ? FROM_VALUE
+                    : FROM_POSE);
     // errors of coarse maps at sharp edges weigh more in fits to points than a small gain
     const bool doubt = points && least.gain > -CLEARLY_BETTER;
     // a fit to an image takes long, and such an image mostly shows another shape

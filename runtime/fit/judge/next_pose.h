@@ -9,12 +9,17 @@
 
 #include "fit/solver/problem.h"
 
-/* Adds the finding "next pose" to a verdict that has not failed. Some iterations lead from each
-   rival start to the nearest maximum; fit and rival are compared on voxels of the ball that holds
-   both, with the tissues of each. A rival whose surface is nearly that of the fit is none. No
-   finding where the pose is kept or where no rival remains, as for a ball of given size. factor:
-   how many correlated voxels of an image count as one independent one. *p is left at a rival, with
-   samples from that ball; points: p->better is the rival, where it explains them better.
-   SDM_E_QUALITY: the finding failed; SDM_E_NOMEM, SDM_E_CANCELLED. */
-sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_verdict *v,
+/* Adds the finding "next pose" to the verdict of *r, if it has not failed. Some iterations lead
+   from each rival start to the nearest maximum; fit and rival are compared on voxels of the ball
+   that holds both, with the tissues of each. A rival whose surface is nearly that of the fit is
+   none, nor is one that is as good and differs along open directions alone. No finding where the
+   pose is kept or where no rival remains, as for a ball of given size. factor: how many correlated
+   voxels of an image count as one independent one. *p is left at a rival, with samples from that
+   ball; points: p->better is the rival, where it explains them better. SDM_E_QUALITY: the finding
+   failed; SDM_E_NOMEM, SDM_E_CANCELLED. */
+sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_result *r,
                                    sdm_error *err);
+
+/* After a fit from the better rival that lost: the finding "next pose" no longer advises to start
+   there. */
+void sdm_fit_next_pose_tried(sdm_fit_verdict *v);

@@ -45,3 +45,16 @@ double sdm_fit_units_gain(double n, double chi_square, double rival_chi_square);
    the one of the rival, with its tissues, is in problem->samples. */
 bool sdm_fit_same_maximum(const fit_problem *p, const fit_standing *fit, const double *field,
                           const fit_standing *rival);
+
+/* True if the fit began, at first or at a restart, about where the rival is: with its value of
+   parameter param - 1 or, for param 0, in its pose. A fit that starts there would end as this one
+   has. centre: middle of the shape, in its frame, mm. */
+bool sdm_fit_began_at(const fit_problem *p, const fit_state *fitted, const fit_state *rival,
+                      size_t param, const double centre[3]);
+
+/* True if the rival differs from the fit along open directions alone: it turns about an axis, or
+   shifts along one, for which the covariance of *r has a standard deviation above half a radian or
+   half the reach of the shape, and the rest of its pose and its parameters differ by no more than
+   their standard deviations allow. centre: as above. */
+bool sdm_fit_differs_openly(const fit_problem *p, const sdm_fit_result *r, const fit_state *fitted,
+                            const fit_state *rival, const double centre[3]);

@@ -23,6 +23,8 @@
 
 /* number of the last iterations that are remembered */
 enum { FIT_RECENT = 8 };
+/* largest number of starts that are remembered */
+enum { FIT_BEGUN = 4 };
 /* independent rigid motions of a body */
 enum { FIT_MOTIONS_MAX = 6 };
 
@@ -117,6 +119,9 @@ typedef struct fit_problem {
      * them better */
     bool has_better;
     fit_state better;
+    /* where the fit began, the first time and at each restart, after the search */
+    size_t n_begun;
+    fit_state begun[FIT_BEGUN];
     /* where the search for the start is, for progress(); see sdm_fit_progress */
     size_t search_round, search_start, search_starts;
     const double *search_best;

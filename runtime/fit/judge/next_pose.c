@@ -407,9 +407,8 @@ static void tell_symmetry(const turns *t, nearest *least)
     if (!(t->same.dice > 0)) return;
     snprintf(
         least->symmetry, sizeof least->symmetry,
-        "turned by %.0f degrees about (%.2g, %.2g, %.2g) (LPS) the surface is the same, so the "
-        "rotation may be either, as by other symmetries of the shape; of the poses that were tried "
-        "none with another surface is as good",
+        "no pose with another surface is as good; the shape is symmetric: turned by %.0f degrees "
+        "about (%.2g, %.2g, %.2g) (LPS) it is the same, and either rotation is right",
         angle * 57.29577951308232, v[0] / angle + 0, v[1] / angle + 0, v[2] / angle + 0);
 }
 

@@ -323,6 +323,22 @@ static int cochlea_measure(const void *self, const sdm_host *host, const sdm_opt
     return 0;
 }
 
+/* The basal section: the cochlea opens into the vestibule there. */
+static int cochlea_open_end(const void *self, const sdm_host *host, const sdm_option_value *options,
+                            const double *p, sdm_open_end *out)
+{
+    (void)host, (void)options;
+    const cochlea *c = self;
+    double x[COCHLEA_UNKNOWNS];
+    cochlea_section s;
+    unknowns_at(c, p, x);
+    sdm_cochlea_section_at(&c->model, x, 0, &s);
+    for (int k = 0; k < 3; k++) out->centre[k] = s.centre[k].v, out->outward[k] = -s.tangent[k].v;
+    if (c->left) out->centre[1] = -out->centre[1], out->outward[1] = -out->outward[1];
+    out->radius = fmax(s.wide.v, s.high.v);
+    return 0;
+}
+
 const sdm_shape sdm_shape_cochlea = {
     .abi = SDM_SHAPE_ABI,
     .size = sizeof(sdm_shape),
@@ -344,4 +360,5 @@ const sdm_shape sdm_shape_cochlea = {
     .measures = sdm_cochlea_measures,
     .n_measures = COCHLEA_MEASURES,
     .measure = cochlea_measure,
+    .open_end = cochlea_open_end,
 };

@@ -369,6 +369,25 @@ static int duct_measure(const void *self, const sdm_host *host, const sdm_option
     return 0;
 }
 
+/* The basal section: the duct opens into the vestibule there. A slant of the end face does not turn
+ * the plane, so that a fit cannot turn it away from what the shape does not explain. The radius is
+ * a smooth bound of the half axes of the section and the length of the cap. */
+static int duct_open_end(const void *self, const sdm_host *host, const sdm_option_value *options,
+                         const double *p, sdm_open_end *out)
+{
+    (void)host, (void)options;
+    const duct *d = self;
+    double x[DUCT_ALL];
+    duct_section s;
+    unknowns_at(d, p, x);
+    sdm_duct_section_at(d->form, d->n_values, x, 0, &s);
+    for (int k = 0; k < 3; k++) out->centre[k] = s.centre[k], out->outward[k] = -s.tangent[k];
+    if (d->left) out->centre[1] = -out->centre[1], out->outward[1] = -out->outward[1];
+    const double cap = x[DUCT_CAP] * sdm_duct_mean_radius(&s);
+    out->radius = pow(pow(s.wide, 4) + pow(s.high, 4) + pow(cap, 4), 0.25);
+    return 0;
+}
+
 const sdm_shape sdm_shape_duct = {
     .abi = SDM_SHAPE_ABI,
     .size = sizeof(sdm_shape),
@@ -388,4 +407,5 @@ const sdm_shape sdm_shape_duct = {
     .measures = sdm_cochlea_measures,
     .n_measures = COCHLEA_MEASURES,
     .measure = duct_measure,
+    .open_end = duct_open_end,
 };

@@ -550,6 +550,9 @@ const cli_option cli_options[] = {
     {"cavity", 0, CLI_REAL, "MM", NULL, 1e-9, 1e9, ON(CLI_FIT), AT(fit.cavity),
      "ignore spaces with values like those inside that hold a ball of this radius: too wide to be "
      "the shape"},
+    {"open-end", 0, CLI_FLAG, NULL, NULL, 0, 0, ON(CLI_FIT), AT(fit.open_end),
+     "the shape (cochlea, duct) is open at its end: the image beyond it says nothing about the "
+     "shape"},
 
     /* fits: model and prior */
     {"image-model", 0, CLI_CHOICE, NULL, "partial|labels", 0, 0, ON(CLI_FIT), AT(fit.image_model),

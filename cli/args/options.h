@@ -109,7 +109,7 @@ typedef struct cli_phantom_args {
 
 /* Options of `fit` alone; numbers are NaN when their option is missing. */
 typedef struct cli_fit_args {
-    bool exact, polish, ras, find;
+    bool exact, polish, ras, find, open_end;
     cli_list labels, reference_labels, keep;
     const char *reference, *truth, *label_out, *start_points, *image_model, *mirror;
     double start_centre[3], start_axis[3], region[6];

@@ -46,6 +46,7 @@ sdm_status cli_fit_check_options(const cli_fit *f, sdm_error *err)
                 {"--outside", IMAGES, !isnan(a->outside[0])},
                 {"--air", IMAGES, !isnan(a->air[0])},
                 {"--cavity", IMAGES, !isnan(a->cavity)},
+                {"--open-end", VOLUMES, a->open_end},
                 {"--tissue-places", IMAGE, !isnan(a->tissue_field)},
                 {"--blur", IMAGE | LABELS, !isnan(a->blur)},
                 {"--keep blur", IMAGE | LABELS, keeps(a, "blur")},

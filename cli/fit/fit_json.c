@@ -81,6 +81,7 @@ static void add_target(sdm_json *j, const cli_fit *f)
     sdm_json_int(j, "used", (int64_t)r->n_used);
     sdm_json_int(j, "nan", (int64_t)r->n_nan);
     sdm_json_int(j, "cavity", (int64_t)r->n_cavity);
+    if (f->opts.open_end) sdm_json_int(j, "beyond_open_end", (int64_t)r->n_beyond);
     sdm_json_real(j, "inside_share", r->inside_share);
     sdm_json_real(j, "noise_factor", r->noise_factor);
     sdm_json_real(j, "model_error_mm", r->model_error_mm);

@@ -164,6 +164,7 @@ sdm_status cli_fit_read_options(cli_fit *f, sdm_error *err)
     *o = sdm_fit_defaults();
     if (!strcmp(a->image_model, "labels")) o->image_model = SDM_FIT_LABELS;
     set_real(a->cavity, &o->cavity);
+    o->open_end = a->open_end;
     set_real(a->least_inside, &o->least_inside);
     set_real(a->tolerance, &o->tolerance);
     set_real(a->beside, &o->beside);

@@ -130,6 +130,7 @@ static void print_target(const cli_fit *f)
     if (r->n_nan)
         printf(", %zu ignored because they are NaN%s", r->n_nan,
                r->n_cavity ? " or in wide spaces (--cavity)" : "");
+    if (f->opts.open_end) printf(", %zu left out beyond the open end", r->n_beyond);
     if (!isnan(r->inside_share))
         printf(", %.0f %% of the shape in the image", 100 * r->inside_share);
     printf("\n");

@@ -33,16 +33,17 @@ static sdm_status open_model(cli_fit *f, sdm_error *err)
     const sdm_model_info *info = sdm_model_get_info(f->model);
     if (!args->fit.exact) cli_warn_quality(f->model_path, info);
     f->shape_name = info->shape;
-    if (args->fit.exact || args->fit.polish || args->measure ||
+    if (args->fit.exact || args->fit.polish || args->measure || args->fit.open_end ||
         f->source.policy == SDM_RANGE_EXACT) {
         s = cli_open_registry(args, &f->registry, err);
         if (!s) s = sdm_runtime_instance(f->model, f->registry, &f->shape, err);
         if (s)
             return sdm_fail_in(err, s, "--%s needs the exact shape",
-                               args->fit.exact    ? "exact"
-                               : args->fit.polish ? "polish"
-                               : args->measure    ? "measure"
-                                                  : "policy exact");
+                               args->fit.exact      ? "exact"
+                               : args->fit.polish   ? "polish"
+                               : args->measure      ? "measure"
+                               : args->fit.open_end ? "open-end"
+                                                    : "policy exact");
     }
     if (!f->registry) find_shape(f);
     if (!args->fit.exact) {

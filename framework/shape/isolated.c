@@ -323,6 +323,24 @@ static int measure(const void *self, const sdm_host *host, const sdm_option_valu
     return ask_value(at, &q, host, value);
 }
 
+/* The numbers of an open end, one for each request. */
+static int open_end(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, sdm_open_end *out)
+{
+    (void)options;
+    pool *at = pool_of(self);
+    isolated_request q = request_at(at, ISOLATED_OPEN_END, p);
+    int failed = 0;
+    for (q.measure = 0; q.measure < 7 && !failed; q.measure++) {
+        const uint32_t k = q.measure;
+        failed = ask_value(at, &q, host,
+                           k < 3   ? &out->centre[k]
+                           : k < 6 ? &out->outward[k - 3]
+                                   : &out->radius);
+    }
+    return failed;
+}
+
 static const sdm_shape CALLBACKS = {.abi = SDM_SHAPE_ABI,
                                     .size = sizeof(sdm_shape),
                                     .create = create,
@@ -332,7 +350,8 @@ static const sdm_shape CALLBACKS = {.abi = SDM_SHAPE_ABI,
                                     .velocity = velocity,
                                     .distance = distance,
                                     .distributions = distributions,
-                                    .measure = measure};
+                                    .measure = measure,
+                                    .open_end = open_end};
 
 bool sdm_is_isolated(const sdm_instance *s) { return s->shape->mesh == mesh; }
 

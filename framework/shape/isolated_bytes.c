@@ -76,6 +76,7 @@ void sdm_bytes_put_shape(isolated_bytes *b, const sdm_shape *s)
     sdm_bytes_put_count(b, s->velocity != NULL);
     sdm_bytes_put_count(b, s->distance != NULL);
     sdm_bytes_put_count(b, s->distributions != NULL);
+    sdm_bytes_put_count(b, s->open_end != NULL);
     sdm_bytes_put_params(b, s->params, s->n_params);
     sdm_bytes_put_count(b, s->n_options);
     for (size_t i = 0; i < s->n_options; i++) {
@@ -229,6 +230,7 @@ sdm_shape sdm_bytes_get_shape(isolated_bytes *b, const sdm_shape *callbacks)
     if (!sdm_bytes_get_count(b, 1)) s.velocity = NULL;
     if (!sdm_bytes_get_count(b, 1)) s.distance = NULL;
     if (!sdm_bytes_get_count(b, 1)) s.distributions = NULL;
+    if (!sdm_bytes_get_count(b, 1)) s.open_end = NULL;
     s.params = sdm_bytes_get_params(b, &s.n_params);
     s.options = get_options(b, &s.n_options);
     s.measures = get_measures(b, &s.n_measures);

@@ -288,6 +288,20 @@ static sdm_status make_measure(worker *w, const isolated_request *q, isolated_an
     return end_call(&call, "measure", failed, err);
 }
 
+static sdm_status make_open_end(worker *w, const isolated_request *q, isolated_answer *a,
+                                sdm_error *err)
+{
+    const sdm_instance *s = w->instance;
+    host_call call;
+    sdm_open_end e = {.radius = NAN};
+    sdm_host_call_begin(&call, NULL, false);
+    const int failed = s->shape->open_end(s->self, &call.host, s->options, q->p, &e);
+    a->value = q->measure < 3   ? e.centre[q->measure]
+               : q->measure < 6 ? e.outward[q->measure - 3]
+                                : e.radius;
+    return end_call(&call, "open_end", failed, err);
+}
+
 /* ---- requests ---- */
 
 static sdm_status load(worker *w, const isolated_request *q, const char *path,
@@ -358,11 +372,13 @@ static sdm_status work(worker *w, const isolated_request *q, isolated_bytes *tex
     static const char *const names[] = {[ISOLATED_MESH] = "mesh",
                                         [ISOLATED_VELOCITY] = "velocity",
                                         [ISOLATED_DISTANCE] = "distance",
-                                        [ISOLATED_MEASURE] = "measure"};
+                                        [ISOLATED_MEASURE] = "measure",
+                                        [ISOLATED_OPEN_END] = "open_end"};
     sdm_callback_begin(w->instance, names[q->task], q->p);
     const sdm_status s = q->task == ISOLATED_MESH       ? make_mesh(w, q, a, err)
                          : q->task == ISOLATED_VELOCITY ? make_velocity(w, q, err)
                          : q->task == ISOLATED_MEASURE  ? make_measure(w, q, a, err)
+                         : q->task == ISOLATED_OPEN_END ? make_open_end(w, q, a, err)
                                                         : make_distance(w, q, a, err);
     sdm_callback_end();
     return s;

@@ -136,6 +136,8 @@ class FitResult:
     nan: int
     #: number of voxels of the whole image that `cavity=` left out
     cavity: int
+    #: number of voxels near the shape beyond its open end, which `open_end=True` left out; not in `used`
+    beyond_open_end: int
     #: sum of the correlations of a residual with all residuals (1: independent)
     noise_factor: float
     #: error of the maps near the surface, mm; the covariance includes it
@@ -497,6 +499,7 @@ def fit(
     region: Optional[tuple[Triple, Triple]] = None,
     margin: Optional[float] = None,
     cavity: Optional[float] = None,
+    open_end: bool = False,
     image_model: str = "partial",
     inside: Optional[Sequence[float]] = None,
     outside: Optional[Sequence[float]] = None,
@@ -585,6 +588,7 @@ def fit(
     ):
         if given is not None:
             setattr(opts, member, number(given, name))
+    opts.open_end = flag(open_end, "open_end")
     if eps is not None:
         opts.eps_sd = 0
     if max_iterations is not None:
@@ -715,6 +719,7 @@ def _result_of(
         used=c.n_used,
         nan=c.n_nan,
         cavity=c.n_cavity,
+        beyond_open_end=c.n_beyond,
         noise_factor=c.noise_factor,
         model_error_mm=c.model_error_mm,
         blur=c.blur,

@@ -571,6 +571,14 @@ static sdm_status assess(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     return s;
 }
 
+/* After the fit: what lies beyond the open end is no evidence about the fit either. */
+static sdm_status beyond_leave(fit_problem *p, sdm_fit_result *out, sdm_error *err)
+{
+    out->n_beyond = sdm_fit_samples_drop_beyond(&p->samples);
+    if (!p->samples.n) return left_image(p, err);
+    return out->n_beyond ? sdm_fit_evaluate(p, err) : SDM_OK;
+}
+
 /* From the state of *p to a verdict. *fitted: the state that the result reports. */
 static sdm_status attempt(fit_problem *p, sdm_fit_result *out, fit_state *fitted, sdm_error *err)
 {
@@ -579,6 +587,7 @@ static sdm_status attempt(fit_problem *p, sdm_fit_result *out, fit_state *fitted
     sdm_status s = maximise(p, out, err);
     const double from = sdm_clock();
     if (!s) sdm_fit_tell_progress(p, SDM_FIT_JUDGE, 0);
+    if (!s) s = beyond_leave(p, out, err);
     if (!s) s = assess(p, out, err);
     if (!s) sdm_fit_accept_small_steps(p, out);
     // points that do not come to rest with a network go on with exact distances
@@ -719,6 +728,7 @@ static sdm_status run(const sdm_fit_source *source, const sdm_fit_target *target
     // 1. check the arguments
     sdm_status s = sdm_fit_check_source(source, &p.n_params, err);
     if (!s) s = sdm_fit_check(target, opts, err);
+    if (!s) s = sdm_fit_check_open_end(source, target, opts, err);
 
     // 2. present a label map as an image; remove the cavities of an image
     sdm_fit_target as_image;

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "fit/data/unknowns.h"
+#include "sdm/internal/open_end.h"
 
 sdm_status sdm_fit_check_source(const sdm_fit_source *source, size_t *n_params, sdm_error *err)
 {
@@ -171,4 +172,25 @@ sdm_status sdm_fit_check(const sdm_fit_target *target, const sdm_fit_opts *o, sd
     if (!s) s = check_numbers(o, err);
     if (!s) s = check_appearance(&o->appearance, err);
     return s ? s : check_target(target, err);
+}
+
+sdm_status sdm_fit_check_open_end(const sdm_fit_source *source, const sdm_fit_target *target,
+                                  const sdm_fit_opts *o, sdm_error *err)
+{
+    if (!o->open_end) return SDM_OK;
+    if (target->kind == SDM_FIT_POINTS)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "sdm_fit_opts.open_end applies to images and labels: points do not show what "
+            "lies beyond an open end; leave it out");
+    if (!source->shape)
+        return sdm_fail(err, SDM_E_ARG,
+                        "sdm_fit_opts.open_end needs an instance of the shape beside the model "
+                        "(sdm_runtime_instance())");
+    if (!sdm_instance_has_open_end(source->shape))
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "sdm_fit_opts.open_end: the shape states no open end, as cochlea and duct do "
+            "and plug-ins may (sdm_shape.open_end); leave it out");
+    return SDM_OK;
 }

@@ -85,6 +85,11 @@ struct shape_added {
     uint32_t n_measures;
     int (*measure)(const void *, const sdm_host *, const sdm_option_value *, const double *,
                    uint32_t, double, double *);
+    int (*open_end)(const void *, const sdm_host *, const sdm_option_value *, const double *,
+                    sdm_open_end *);
+};
+struct open_end_added {
+    double centre[3], outward[3], radius;
 };
 struct measure_added {
     const char *name, *unit, *help;
@@ -145,6 +150,10 @@ SAME_OFFSET(shape_added, sdm_shape, mirror);
 SAME_OFFSET(shape_added, sdm_shape, measures);
 SAME_OFFSET(shape_added, sdm_shape, n_measures);
 SAME_OFFSET(shape_added, sdm_shape, measure);
+SAME_OFFSET(shape_added, sdm_shape, open_end);
+SAME_OFFSET(open_end_added, sdm_open_end, outward);
+SAME_OFFSET(open_end_added, sdm_open_end, radius);
+_Static_assert(sizeof(struct open_end_added) == sizeof(sdm_open_end), "sdm_open_end has changed");
 SAME_OFFSET(measure_added, sdm_measure, unit);
 SAME_OFFSET(measure_added, sdm_measure, help);
 SAME_OFFSET(measure_added, sdm_measure, of_depth);

@@ -10,7 +10,7 @@ sdmgen mesh $shape -o mesh.ply --quiet >out
 targets=('image.nii' 'image.nii --image-model labels' 'labels.nii --label 1' 'labels.nii --label 1 --image-model labels' 'points.csv' 'mesh.ply')
 declare -A value=([--region]=-9,-9,-9,9,9,9 [--margin]=1.2 [--least-inside]=0.5 [--image-model labels]= [--inside]=40,170 [--outside]=1300,270
     [--air]=-880,150 [--cavity]=3 [--tissue-places]=1 [--blur]=0.4 [--keep blur]= [--l-ref]=0.2 [--keep appearance]= [--point-sd]=0.1
-    [--beside]=0.5 [--find]=)
+    [--beside]=0.5 [--find]= [--open-end]=)
 
 # Every cell of the table. The fit ends at a missing file of start points, after its options were checked.
 rows=0

@@ -47,6 +47,12 @@ sdmgen info part.seg.nrrd >out
 grep -q 'inside the surface' out && bad "labels as distances: $(cat out)"
 near "$(sed -n 's/.*, its voxels have \(.*\) mm^3$/\1/p' out)" 37.7 1
 documented fit sdmgen fit --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 label.nii --label 1 --rotation 0,0,0 --spacing 0.8 --measure --json
+sdmgen phantom --shape cochlea --spacing 0.6 -o ear.nii -q
+documented fit sdmgen fit --shape cochlea -O ear=right ear.nii --open-end --keep parameters --rotation 0,0,0 --spacing 0.6 --json
+[ "$(json beyond_open_end)" -gt 50 ] || bad "no voxels beyond the open end: $(cat out)"
+sdmgen fit --shape cochlea -O ear=right ear.nii --open-end --keep parameters --rotation 0,0,0 --spacing 0.6 -q >out 2>err
+has '^image: [0-9]+ voxels near the shape, [0-9]+ left out beyond the open end, '
+expect 2 'ear.nii: --open-end: the shape states no open end, as cochlea and duct do and plug-ins may .*; leave it out$' sdmgen fit --shape ellipsoid ear.nii --open-end --rotation 0,0,0 --start-centre 0,0,0 --inside 40,170 --outside 1300,270
 printf 'id,image,label\na,label.nii,1\n' >cohort.csv
 documented 'fit --cases' sdmgen fit --shape ellipsoid -O edge=0.6 -p rx=3 -p ry=2 -p rz=2 --rotation 0,0,0 --spacing 0.8 --cases cohort.csv -o cohort --json
 documented collect sdmgen collect cohort --json

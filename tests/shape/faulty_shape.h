@@ -307,6 +307,15 @@ static int faulty_velocity(const void *self, const sdm_host *host, const sdm_opt
     return 0;
 }
 
+static int faulty_open_end(const void *self, const sdm_host *host, const sdm_option_value *options,
+                           const double *p, sdm_open_end *out)
+{
+    (void)self, (void)host, (void)options;
+    *out = (sdm_open_end){
+        .centre = {p[0], 0.3 * p[1], -1}, .outward = {0.1, p[1], -2}, .radius = p[0] * p[1]};
+    return 0;
+}
+
 static const sdm_shape FAULTY = {.abi = SDM_SHAPE_ABI,
                                  .size = sizeof(sdm_shape),
                                  .name = "faulty",
@@ -316,5 +325,6 @@ static const sdm_shape FAULTY = {.abi = SDM_SHAPE_ABI,
                                  .options = FAULTY_OPTIONS,
                                  .n_options = 1,
                                  .mesh = faulty_mesh,
-                                 .velocity = faulty_velocity};
+                                 .velocity = faulty_velocity,
+                                 .open_end = faulty_open_end};
 #endif

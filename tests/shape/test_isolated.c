@@ -15,6 +15,7 @@
 #include <cmocka.h>
 
 #include "sdm/internal/isolation.h"
+#include "sdm/internal/open_end.h"
 #include "sdm/internal/sanitized.h"
 #include "sdm/memory.h"
 
@@ -101,12 +102,17 @@ static void results_have_the_same_bits(void **state)
     for (int i = 0; i < 5; i++) {
         const double p[2] = {1 + 0.37 * i, 1.1 + 0.2 * i};
         double v[2][6 * 16];
+        sdm_open_end end[2];
         for (int k = 0; k < 2; k++) {
             if (sdm_instance_mesh(s[k], p, &mesh[k], &err)) fail_msg("%s", err.text);
             if (sdm_instance_velocity(s[k], p, 16, v[k], &err)) fail_msg("%s", err.text);
+            assert_true(sdm_instance_has_open_end(s[k]));
+            if (sdm_instance_open_end(s[k], p, &end[k], &err)) fail_msg("%s", err.text);
         }
         assert_same_mesh(&mesh[0], &mesh[1]);
         assert_memory_equal(v[0], v[1], sizeof v[0]);
+        assert_memory_equal(&end[0], &end[1], sizeof end[0]);
+        assert_true(end[0].centre[1] == 0.3 * p[1] && end[0].radius == p[0] * p[1]);
     }
     for (int k = 0; k < 2; k++) {
         sdm_mesh_dispose(&mesh[k]);
@@ -125,6 +131,7 @@ static void closed_forms_have_the_same_bits(void **state)
         sdm_registry *r = open_plugin("good/octahedron.so", k ? NULL : &HOW);
         sdm_instance *s = make(r, "octahedron", NULL);
         if (sdm_instance_distance(s, p, x, &d[k], &err)) fail_msg("%s", err.text);
+        assert_false(sdm_instance_has_open_end(s));
         sdm_instance_free(s);
         sdm_registry_free(r);
     }

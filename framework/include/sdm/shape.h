@@ -76,6 +76,15 @@ typedef struct sdm_measure {
     int of_depth;
 } sdm_measure;
 
+/* An open end: a face that closes the mesh where the real organ goes on, such as into a wider
+ * space.
+ */
+typedef struct sdm_open_end {
+    double centre[3];  /* of the opening, mm: the organ goes on beyond the plane through it */
+    double outward[3]; /* normal of this plane, away from the shape, of any length */
+    double radius;     /* mm: no part of the mesh beyond this plane is farther from the centre */
+} sdm_open_end;
+
 /* A mesh. After host->reserve() the callback writes vert[n_vert][3], in mm, and tri[n_tri][3]:
  * indices of vertices from 0, counter-clockwise seen from outside. */
 typedef struct sdm_mesh_out {
@@ -165,6 +174,11 @@ typedef struct sdm_shape {
     uint32_t n_measures;
     int (*measure)(const void *self, const sdm_host *host, const sdm_option_value *options,
                    const double *p, uint32_t index, double depth, double *value);
+
+    /* Optional: the open end at p, smooth in p. With sdm_fit_opts.open_end a fit takes no evidence
+     * from the image beyond it. */
+    int (*open_end)(const void *self, const sdm_host *host, const sdm_option_value *options,
+                    const double *p, sdm_open_end *out);
 } sdm_shape;
 
 /* For the table of a shape, in C or C++20: sdm_shape x = {..., SDM_PARAMS(PARAMS), ...} sets

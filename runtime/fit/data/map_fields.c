@@ -134,6 +134,7 @@ sdm_status sdm_fit_maps_make(fit_maps *m, const double *params, bool derivatives
     const sdm_status s =
         exact ? map_make_exact(m, params, derivatives, err) : map_make_network(m, params, err);
     m->made_exact = exact;
+    memcpy(m->params, params, m->n_params * sizeof *params);
     *(exact ? &m->n_exact : &m->n_network) += 1;
     *(exact ? &m->seconds_exact : &m->seconds_network) += sdm_clock() - from;
     m->n_outside += outside;

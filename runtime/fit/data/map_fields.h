@@ -27,6 +27,8 @@ typedef struct fit_maps {
     int n_threads;
     bool (*cancelled)(void *user);
     void *user;
+    /* [n_params] parameters of the latest map */
+    double params[FIT_PARAMS_MAX];
     /* latest map (mm) [n_voxels], and its derivatives by the parameters [n_params][n_voxels] */
     float *values, *jacobian;
     /* [n_voxels] the latest map in double precision, mm */

@@ -145,6 +145,8 @@ sdm_status sdm_fit_samples_choose(const sdm_fit_target *target, const sdm_fit_op
     bool differ = false;
     sdm_status s = SDM_OK;
     samples->n = samples->n_nan = 0;
+    samples->beyond.on = opts->open_end && target->kind != SDM_FIT_POINTS;
+    samples->beyond.margin = opts->margin;
     if (target->kind == SDM_FIT_POINTS) {
         for (size_t i = 0; i < target->n_points && !s; i += stride)
             s = samples_append(samples, target->points + 3 * i, 0, i, &differ, err);
@@ -165,14 +167,17 @@ void sdm_fit_samples_dispose(fit_samples *s)
     sdm_free(s->row);
     sdm_free(s->log_weight);
     sdm_free(s->jacobian);
+    sdm_free(s->beyond.weight);
+    sdm_free(s->beyond.row);
+    sdm_free(s->beyond.jacobian);
     *s = (fit_samples){0};
 }
 
 // One row of the Jacobian: derivatives of the field at x of the world, with its gradient in the
 // shape's frame and its derivatives by parameters and blur. With y = R^T (x - t), rotating the
 // shape by a small w about the world's axes moves y by -R^T (w x (x - t)).
-static void jacobian_row(const fit_maps *maps, const fit_state *state, const double x[3],
-                         const double gradient[3], const double *rest, float *columns)
+void sdm_fit_jacobian_row(const fit_maps *maps, const fit_state *state, const double x[3],
+                          const double gradient[3], const double *rest, float *columns)
 {
     double g[3]; // in the world
     for (int k = 0; k < 3; k++)
@@ -236,8 +241,8 @@ static sdm_status evaluate_direct(fit_samples *samples, const fit_maps *maps,
             if (samples->row[i] == SIZE_MAX) continue;
             sdm_shape_surface_derivatives(&maps->surface, triangle[i], at.closest + 3 * i,
                                           at.gradient + 3 * i, by);
-            jacobian_row(maps, state, samples->world + 3 * i, at.gradient + 3 * i, by,
-                         samples->jacobian + samples->row[i] * samples->n_columns);
+            sdm_fit_jacobian_row(maps, state, samples->world + 3 * i, at.gradient + 3 * i, by,
+                                 samples->jacobian + samples->row[i] * samples->n_columns);
         }
     }
     sdm_free(memory);
@@ -282,8 +287,8 @@ sdm_status sdm_fit_samples_evaluate(fit_samples *samples, const fit_maps *maps,
             sdm_fit_to_shape(state, samples->world + 3 * i, y);
             (void)sdm_fit_interpolate_all(&f, y, gradient, rest);
             if (maps->between) add_between(maps->between, y, gradient, rest);
-            jacobian_row(maps, state, samples->world + 3 * i, gradient, rest,
-                         samples->jacobian + samples->row[i] * samples->n_columns);
+            sdm_fit_jacobian_row(maps, state, samples->world + 3 * i, gradient, rest,
+                                 samples->jacobian + samples->row[i] * samples->n_columns);
         }
     return SDM_OK;
 }

@@ -84,8 +84,9 @@ bool sdm_fit_same_maximum(const fit_problem *p, const fit_standing *fit, const d
     fit_standing between = {.factor = fit->factor};
     for (size_t i = 0; i < s->n; i++) {
         fit_likelihood l;
-        sdm_fit_likelihood(&p->observation, (double)s->value[i], fit_sample_weights(s, i),
-                           0.5 * (field[i] + s->field[i]), false, &l);
+        (void)sdm_fit_likelihood_beyond(&p->observation, (double)s->value[i],
+                                        fit_sample_weights(s, i), 0.5 * (field[i] + s->field[i]),
+                                        fit_sample_beyond(s, i), false, &l);
         between.log_likelihood += l.log_likelihood;
     }
     const double below_fit = sdm_fit_gain(fit, &between),

@@ -58,6 +58,22 @@ static void add_columns(const fit_likelihood *r, const float *column, size_t n_c
     }
 }
 
+// adds the derivatives by the weight of a sample beyond the open end: `score` is that of the
+// log-likelihood, whose second derivative is -score^2, as it is the logarithm of a linear function
+static void add_weight(double score, const float *column, size_t n_columns, size_t n,
+                       double *gradient, double *complete, double *observed)
+{
+    for (size_t a = 0; a < n_columns; a++) {
+        const double d = score * (double)column[a];
+        gradient[a] += d;
+        for (size_t b = a; b < n_columns; b++) {
+            const double more = d * score * (double)column[b];
+            complete[a * n + b] += more;
+            observed[a * n + b] += more;
+        }
+    }
+}
+
 // sums over all samples of a slice; of the matrices only the upper triangles
 static void add_slice(const fit_samples *s, const fit_observation *obs, size_t from, size_t to,
                       size_t n, double *part)
@@ -68,9 +84,13 @@ static void add_slice(const fit_samples *s, const fit_observation *obs, size_t f
     for (size_t i = from; i < to; i++) {
         fit_likelihood r;
         const bool near = s->row[i] != SIZE_MAX;
-        sdm_fit_likelihood(obs, (double)s->value[i], fit_sample_weights(s, i), s->field[i],
-                           near || obs->n_channels > 1, &r);
+        const double by_weight = sdm_fit_likelihood_beyond(
+            obs, (double)s->value[i], fit_sample_weights(s, i), s->field[i],
+            fit_sample_beyond(s, i), near || obs->n_channels > 1, &r);
         part[0] += r.log_likelihood;
+        if (s->beyond.on && s->beyond.row[i] != SIZE_MAX)
+            add_weight(by_weight, s->beyond.jacobian + s->beyond.row[i] * nc, nc, n, gradient,
+                       complete, observed);
         if (near) part[1] += r.score[0] * r.score[0] * s->field[i] * s->field[i];
         if (near)
             add_columns(&r, s->jacobian + s->row[i] * nc, nc, obs->n_channels, n, gradient,
@@ -114,15 +134,18 @@ double sdm_fit_samples_log_likelihood(const fit_samples *samples, const fit_maps
 {
     const size_t n = samples->n;
     double part[FIT_SLICES] = {0}, sum = 0;
+    fit_open_end end;
+    const bool open = sdm_fit_beyond_end(samples, maps, &end);
     const int n_threads = sdm_threads(maps->n_threads);
     (void)n_threads; // unused without OpenMP
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = n * slice / FIT_SLICES; i < n * (slice + 1) / FIT_SLICES; i++) {
-            const double field = sdm_fit_maps_at(maps, state, samples->world + 3 * i);
+            const double *x = samples->world + 3 * i, field = sdm_fit_maps_at(maps, state, x);
             fit_likelihood r;
-            sdm_fit_likelihood(obs, (double)samples->value[i], fit_sample_weights(samples, i),
-                               field, false, &r);
+            (void)sdm_fit_likelihood_beyond(
+                obs, (double)samples->value[i], fit_sample_weights(samples, i), field,
+                open ? sdm_fit_beyond_at(&end, state, x) : 0, false, &r);
             part[slice] += r.log_likelihood;
         }
     for (size_t slice = 0; slice < FIT_SLICES; slice++) sum += part[slice];
@@ -139,8 +162,9 @@ void sdm_fit_samples_moments(const fit_samples *samples, const fit_observation *
 #pragma omp parallel for schedule(dynamic) num_threads(n_threads)
     for (size_t slice = 0; slice < FIT_SLICES; slice++)
         for (size_t i = n * slice / FIT_SLICES; i < n * (slice + 1) / FIT_SLICES; i++)
-            sdm_fit_moments_add(obs, (double)samples->value[i], fit_sample_weights(samples, i),
-                                samples->field[i], &part[slice]);
+            if (!fit_sample_is_beyond(samples, i))
+                sdm_fit_moments_add(obs, (double)samples->value[i], fit_sample_weights(samples, i),
+                                    samples->field[i], &part[slice]);
     *out = part[0];
     for (size_t slice = 1; slice < FIT_SLICES; slice++)
         for (size_t i = 0; i < FIT_TISSUES_MAX; i++) {

@@ -59,6 +59,7 @@ sdm_status sdm_fit_evaluate(fit_problem *p, sdm_error *err)
     // field, log-likelihood and derivatives at the samples
     sdm_fit_observation_prepare(p->opts, p->target->kind, state, &p->observation);
     s = sdm_fit_samples_evaluate(&p->samples, &p->maps, &p->observation, state, err);
+    if (!s) s = sdm_fit_beyond_evaluate(&p->samples, &p->maps, state, err);
     if (s) return s;
     sdm_fit_information_compute(&p->information, &p->samples, &p->observation, p->opts->n_threads);
     if (p->n_even > 0) add_even_density(p);
@@ -87,10 +88,14 @@ double sdm_fit_likelihood_at(const fit_problem *p, const fit_state *state, size_
     const size_t step = p->samples.n / most + 1;
     double sum = 0;
     fit_likelihood l;
+    fit_open_end end;
+    const bool open = sdm_fit_beyond_end(&p->samples, &p->maps, &end);
     for (size_t i = 0; i < p->samples.n; i += step) {
-        sdm_fit_likelihood(&p->observation, (double)p->samples.value[i],
-                           fit_sample_weights(&p->samples, i),
-                           sdm_fit_maps_at(&p->maps, state, p->samples.world + 3 * i), false, &l);
+        const double *x = p->samples.world + 3 * i;
+        (void)sdm_fit_likelihood_beyond(&p->observation, (double)p->samples.value[i],
+                                        fit_sample_weights(&p->samples, i),
+                                        sdm_fit_maps_at(&p->maps, state, x),
+                                        open ? sdm_fit_beyond_at(&end, state, x) : 0, false, &l);
         sum += l.log_likelihood;
     }
     return sum;

@@ -120,6 +120,7 @@ static void em_step(fit_problem *p, cells *c)
     memset(c->packed, 0, size * sizeof *c->packed);
     for (size_t i = 0; i < s->n; i++) {
         double *to = c->packed + c->cell[i] * n;
+        if (fit_sample_is_beyond(s, i)) continue;
         for (size_t k = 0; k < n; k++) to[k] += c->share[i * n + k];
     }
     sdm_fit_blur(&c->grid, n, c->sd * c->sd, true, n_threads, &c->packed, &c->spare);

@@ -18,7 +18,7 @@ static void voxel_index(const sdm_grid *g, size_t voxel, int64_t index[3])
 // subsamples
 bool sdm_fit_in_inner_band(const fit_problem *p, size_t sample)
 {
-    return p->samples.row[sample] != SIZE_MAX &&
+    return p->samples.row[sample] != SIZE_MAX && !fit_sample_is_beyond(&p->samples, sample) &&
            !(p->maps.share && fabs(fabs(p->samples.field[sample] - 0.5) - 0.5) <= 1e-6);
 }
 

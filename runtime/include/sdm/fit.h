@@ -270,6 +270,13 @@ typedef struct sdm_fit_opts {
     /* [n_params] true: this parameter is not estimated and keeps its start value; NULL: all or none
        are estimated, see keep_params */
     const bool *kept;
+
+    /* images and labels. true: the shape is open at the end that it states (sdm_shape.open_end).
+       Beyond the plane of this end, up to `margin` from it, a voxel may be inside or outside,
+       wherever the surface lies: a wider space there does not attract the shape. The plane moves
+       with the shape. The verdict and the sd take no voxels from beyond it. Needs
+       sdm_fit_source.shape. Without such a space the end is less well determined than with false */
+    bool open_end;
 } sdm_fit_opts;
 
 /* The checks of a fit. Each has a figure, described here; docs/fitting-reference.md#the-checks has
@@ -528,6 +535,9 @@ typedef struct sdm_fit_result {
        not, and a polish on the grid of the network may end too coarse. Else NaN; also NaN where
        such maps had more than 2^27 voxels: the text of the check then names the cause */
     double advised_voxel_mm;
+    /* number of voxels near the shape that lie beyond its open end (sdm_fit_opts.open_end); n_used
+       does not count them */
+    size_t n_beyond;
 } sdm_fit_result;
 
 /* Fits the shape of source to target. SDM_E_QUALITY: the fit is not to be trusted: it did not

@@ -55,6 +55,19 @@ def compare_measures(result, text):
     assert found == told and [m["name"] for m in told][:2] == ["volume", "area"] and all(m["sd"] > 0 for m in told)
 
 
+def test_an_open_end(run, ct, tmp_path):
+    image = tmp_path / "ear.nii"
+    run("phantom", "--shape", "cochlea", "--spacing", "0.6", "-o", image)
+    words = ["-O", "ear=right", "--open-end", "--keep", "parameters", "--rotation", "0,0,0", "--spacing", "0.6", "--mirror", "no", "--json"]
+    told = run("fit", "--shape", "cochlea", image, *words)
+    named = {"keep": "parameters", "rotation": (0, 0, 0), "spacing": 0.6, "open_end": True}
+    result = sdmgen.fit(sdmgen.Shape("cochlea"), image, **named)
+    compare(result, told)
+    assert result.beyond_open_end == json.loads(told)["beyond_open_end"] > 50
+    with pytest.raises(sdmgen.ArgumentError, match="states no open end"):
+        sdmgen.fit(sdmgen.Shape("torus"), ct["ct.nii.gz"], rotation=(0, 0, 0), open_end=True)
+
+
 def test_an_image(run, ct):
     words = ["--rotation", "0,0,0", "--spacing", "0.5", "--threads", "1", "--reference", ct["label.nii.gz"], "--measure", "--json"]
     told = run("fit", "--shape", "torus", ct["ct.nii.gz"], *words)

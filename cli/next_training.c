@@ -496,7 +496,9 @@ void cli_print_next(const cli_args *args, const sdm_train_report *r, const char 
     if (print_finer(args, r, kind, minutes)) return;
     if (skipped_template(r) && !other_maps && args->files.n && print_template_first(begin, args, r))
         return;
-    if ((!v->key[0] && !(v->cut > 0) && !open) || !args->files.n || other_maps) return;
+    // no key helps a good template that errs far away alone; the line `far away` has its command
+    const bool enough = is_far(v) && v->grade == SDM_GRADE_GOOD;
+    if ((!v->key[0] && !(v->cut > 0) && (!open || enough)) || !args->files.n || other_maps) return;
     const bool leaves = leaves_open(r, v->key);
     const sdm_verdict changes = leaves ? with_trials(r, v, finer_factor(v)) : *v;
     if (print_command(begin, args, r, &changes, leaves ? NULL : kind)) print_note(r, kind, ms_map);

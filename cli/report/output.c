@@ -198,10 +198,10 @@ static void warn_surface(const char *path, const cli_map *map, const sdm_mesh *s
     } else if (fabs(more) > VOLUME_OFF_MAX) {
         const double cuts = trained ? map->trained_mm : voxel;
         char advice[96] = "", own[32], right[32];
+        // between the voxels of a model, too, its interpolated map has sharper edges than they show
         if (trained || !map->thin)
-            snprintf(advice, sizeof advice, "; about %.0f %% for this shape with %s%.2g",
-                     100 * SDM_VOLUME_AIM, trained ? "a training with grid.spacing " : "--spacing ",
-                     sdm_spacing_for_volume(cuts, fabs(more)));
+            snprintf(advice, sizeof advice, "; about %.0f %% for this shape with --spacing %.2g",
+                     100 * SDM_VOLUME_AIM, sdm_spacing_for_volume(cuts, fabs(more)));
         cli_warn("%s: the surface encloses %s mm^3, %.2g %% %s than the shape, %s mm^3: voxels of "
                  "%.3g %s%s",
                  path, cli_number(fabs(audit.volume), 4, own), 100 * fabs(more),

@@ -32,6 +32,7 @@ typedef struct check {
     sdm_distribution distribution[SDM_MAX_PARAMS];
     sdm_survey_opts opts;
     cli_progress bar;
+    bool table;         /* the table of moves was printed */
     unsigned told;      /* sum of the stages printed */
     sdm_status printed; /* by print_stage(); its message */
     sdm_error why;
@@ -351,9 +352,11 @@ static sdm_status give_verdict(const check *c, const sdm_text *left, sdm_error *
                apart->shapes, c->survey.found.n - c->survey.found.untested,
                left->data ? left->data : "");
     else
-        printf("%s: the shape can be trained%s%s\n", left->data ? "fine as far as tested" : "fine",
-               c->survey.grid ? "" : "; give a configuration to compare it with a grid",
-               left->data ? left->data : "");
+        printf(
+            "%s: the shape can be trained%s%s%s\n", left->data ? "fine as far as tested" : "fine",
+            c->survey.grid ? "" : "; give a configuration to compare it with a grid",
+            c->table ? "; read the table 'moves': does each parameter move the right parts?" : "",
+            left->data ? left->data : "");
     return SDM_OK;
 }
 
@@ -392,6 +395,7 @@ sdm_status cli_shapes_check(const cli_args *args, sdm_error *err)
     cli_progress_end(&c.bar, !s);
     cli_part_moves moves;
     if (!s) s = cli_part_moves_make(c.shape, c.opts.range, &moves, err);
+    c.table = !s && moves.n_parts && !args->json;
     if (!s) {
         s = args->json ? print_json(&c, &moves, err) : print_rest(&c, &moves, err);
         for (size_t i = 0; i < args->outputs.n && !s; i++)

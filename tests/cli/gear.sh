@@ -30,7 +30,7 @@ spacings=$(grep -oE 'grid\.spacing (from 0\.9 to )?[0-9.]*[0-9]|grid\.spacing=[0
 [ "$(echo "$spacings" | wc -l)" -eq 1 ] || bad "several spacings, $spacings: $(cat out)"
 has '^  (next|better) +sdmgen train .*gear\.yaml .*=[0-9.]+( network\.kind=(pod|template))? --plugin .*\.so --out run-2 --compare run/model.sdm$|^  (next|better) +sdmgen train .*grid=\{spacing: [0-9.]+\}.* --plugin .*\.so --out run-2 --compare run/model.sdm$'
 expect 0 - sdmgen generate run/model.sdm -p angle=0.1 -o map.npy
-expect 0 'warning: gear\.stl: the surface encloses .* than the shape, .*: voxels of 0\.9 mm cut its edges and thin parts; about 1 % for this shape with a training with grid\.spacing 0\.[0-9]+$' sdmgen generate run/model.sdm -o gear.stl --plugin $plugin
+expect 0 'warning: gear\.stl: the surface encloses .* than the shape, .*: voxels of 0\.9 mm cut its edges and thin parts; about 1 % for this shape with --spacing 0\.[0-9]+$' sdmgen generate run/model.sdm -o gear.stl --plugin $plugin
 present map.npy
 # without the shape the error that the training has measured is told
 expect 0 'warning: alone\.stl: the training found volumes of such surfaces off by [0-9.]+ % \(root mean square\); --plugin ' sdmgen generate run/model.sdm -o alone.stl

@@ -6,7 +6,7 @@ plugin=$(cd ../../plugins/faulty && pwd)/faulty.so
 
 # A good shape passes; so do the built-in shapes. JSON, picture.
 expect 0 - sdmgen shapes check faulty --plugin "$plugin" --samples 16 -o nine.png
-has '^fine: the shape can be trained; give a configuration'
+has "^fine: the shape can be trained; give a configuration .*; read the table 'moves': does each parameter move the right parts\?\$"
 has '^volume +8\.25 \.\. 216\.5 mm\^3, of the union$'
 has '^note +overlaps .* in all 21 shapes'
 # Corners of the body go from (1, 1, 1) to (3, 3, 3); the handle begins at the body, along x, and ends at the reach.

@@ -300,6 +300,10 @@ static void trials_come_before_a_long_training(void **state)
     assert_string_equal(text, "  better      sdmgen train can.yaml train.minutes=1 grid=auto "
                               "grid.spacing=1.5 network.kind=template --out run-2 " COMPARE);
     assert_null(strstr(second, "both kinds"));
+    // it errs a little and far away: no key is known to help, and no distance is promised
+    r.verdict.rmse_voxel_mm = 0.09, r.verdict.thickness_mm = 30;
+    next_lines(&r, 1, text, second);
+    assert_string_equal(text, "");
 }
 
 // A warning about a part that is too thin for the grid comes before what the verdict advises.

@@ -496,8 +496,8 @@ static void uses_and_spacing(void **state)
     assert_true(fabs(sdm_verdict_spacing(&v) - 0.46) < 1e-9);
     sdm_verdict_unfit(&v, lines);
     assert_string_equal(lines, "volumes of surfaces (.stl): off by 2.9 %, voxels of 0.8 mm cut "
-                               "edges and thin parts; about 1 % with grid.spacing 0.46 (root mean "
-                               "square of the shapes)\n");
+                               "edges and thin parts; about 1 % (root mean square of the shapes) "
+                               "with generate --spacing 0.46\n");
     // one rule for the shapes of a training and for a single shape
     assert_true(sdm_spacing_for_volume(0.8, 0.029) == sdm_verdict_spacing(&v));
     // fits want more voxels across the thinnest part than surfaces do

@@ -301,7 +301,7 @@ static void causes_of_derivatives(void **state)
     trainer_list_causes(p, (double[]){0.3, 0.1, 0.4, 0.5}, (double[]){0.25, 0.9, 0.015, 0.21}, 4,
                         text);
     assert_string_equal(text, "21 % for d, 25 % for a: the voxels cause it; by 1.5 % for c: the "
-                              "network errs, train it as `verdict` says");
+                              "network errs");
     trainer_list_causes(p, (double[]){0.3, NAN, 0.1}, (double[]){0.15, NAN, NAN}, 3, text);
     assert_string_equal(text, "15 %: the voxels cause a part");
     trainer_list_causes(p, (double[]){0.3}, (double[]){NAN}, 1, text);

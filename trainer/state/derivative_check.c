@@ -377,7 +377,7 @@ void trainer_list_causes(const sdm_param *p, const double *error, const double *
 {
     // flat faces along planes of voxels err on each grid: a finer one is no safe advice
     static const char *const causes[] = {": the voxels cause it", ": the voxels cause a part",
-                                         ": the network errs, train it as `verdict` says"};
+                                         ": the network errs"};
     enum { ROOM = SDM_VERDICT_LIST - 60 };
     const size_t first = next_worst(error, n, n);
     const bool single = first == n || next_worst(error, n, first) == n;

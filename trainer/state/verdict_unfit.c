@@ -62,7 +62,7 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
     else if (sdm_verdict_voxels_cut(v) && spacing < v->coarse_mm)
         add(l,
             "volumes of surfaces (.stl): off by %s %%, voxels of %.3g mm cut edges and thin parts; "
-            "about %.0f %% with grid.spacing %.2g (root mean square of the shapes)",
+            "about %.0f %% (root mean square of the shapes) with generate --spacing %.2g",
             percent(v->surface_volume_error, text), v->coarse_mm, 100 * SDM_VOLUME_AIM, spacing);
     else if (sdm_verdict_surfaces_off(v))
         add(l, "volumes of surfaces (.stl): off by %s %%", percent(v->surface_volume_error, text));

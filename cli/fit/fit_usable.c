@@ -70,7 +70,8 @@ static bool is_among(const char *name, const char *list, size_t length)
     return false;
 }
 
-static bool is_usable(const cli_fit *f, size_t k)
+/* Do the data determine the parameter, by itself? */
+static bool is_known(const cli_fit *f, size_t k)
 {
     const sdm_fit_result *r = &f->result;
     size_t length = 0;
@@ -80,6 +81,19 @@ static bool is_usable(const cli_fit *f, size_t k)
     const bool vague = r->sd[k] > (f->params[k].max - f->params[k].min) / sqrt(12);
     return !r->by_prior[k] && !r->at_bound[k] && !vague &&
            !(list && is_among(f->params[k].name, list, length));
+}
+
+/* Is it known, and no part of a sum or a difference with one that is not? The standard deviation of
+ * such a sum holds only as far as the other one is right. */
+static bool is_usable(const cli_fit *f, size_t k)
+{
+    const sdm_fit_result *r = &f->result;
+    const size_t size = f->n_params + 6;
+    bool usable = is_known(f, k);
+    for (size_t j = 0; j < f->n_params && usable; j++)
+        usable = j == k || !is_fitted(r, j) || is_known(f, j) ||
+                 !(fabs(r->correlation[k * size + j]) > CORRELATED);
+    return usable;
 }
 
 bool cli_fit_knows_usable(const cli_fit *f)

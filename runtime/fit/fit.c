@@ -441,6 +441,11 @@ static sdm_status maximise_in(fit_problem *p, sdm_fit_phase phase, size_t max_it
         snprintf(out->reason, sizeof out->reason,
                  "%s: the last step moves no unknown by more than %g of its standard deviation",
                  what, newton.eps_sd);
+    else if (out->converged && end.step > newton.eps)
+        snprintf(out->reason, sizeof out->reason,
+                 end.flat ? "%s: the last iterations hardly raise the likelihood"
+                          : "%s: no step raises the likelihood any more",
+                 what);
     else if (out->converged || end.step > newton.eps)
         snprintf(out->reason, sizeof out->reason, "%s%s: last step %.2g, %sbelow %g", what,
                  out->converged ? "" : " stopped", end.step, out->converged ? "" : "not ",

@@ -98,7 +98,8 @@ SDM_API sdm_status sdm_generate_batch(const sdm_model *m, const double *params, 
      walls are thin beside the voxels it may be several times the derivative;
      sdm_exact_shape_jacobian() is exact.
    - Jumps: near the surface the map is smooth in the parameters. Far from it the map of a template
-     jumps a little where another part of the shape becomes the nearest one.
+     jumps where another part of the shape becomes the nearest one, by up to half a voxel in the
+     models measured: compare derivatives with differences near the surface only.
    - Rounding: if weights are stored as bytes, `values` differ from those of sdm_generate(): by
      about a thousandth of a voxel or less (root mean square), at most a hundredth, in the models
      measured. The derivatives of cochleas are off by 2e-4 (at most 1.5e-3) of the largest one.

@@ -47,7 +47,7 @@ static const double MEASUREMENT = 100;
 static const double BURST = 1.5;
 
 /* The next run may make maps more slowly than this one by this factor, as on a busier machine. */
-static const double PACE_MARGIN = 1.25;
+static const double PACE_MARGIN = 1.6;
 
 /* Where there is no time for trials, a template that needs no correction is made before `pod` if
    that is expected to take at most this part of the budget. */

@@ -269,15 +269,17 @@ static void refusals_quote_the_training(toy *t)
          "derivatives of the volume by tilt: off by 822 % of their own size: these parameters\n",
          "derivatives of volumes of its maps are off by 822 % of their own size for tilt, more "
          "than "
-         "20 %; take",
+         "20 %; by rose: off by 220 %; by height: off by 127 %; take",
          "planes of voxels"},
         {2.2,
          "derivatives of the volume by rose: off by 220 %; by height: off by 127 %\n"
          "derivatives of the volume by tilt: off by 82 % of their own size: these parameters\n",
-         "derivatives of volumes of its maps are off by 220 % for rose, more than 20 %; take",
+         "derivatives of volumes of its maps are off by 220 % for rose, more than 20 %; by "
+         "height: off by 127 %; take",
          "planes of voxels"},
         {43, "derivatives of the volume by tilt: off by over 1000 %; by a: off by 30 %\n",
-         "derivatives of volumes of its maps are off by over 1000 % for tilt, more than 20 %; take",
+         "derivatives of volumes of its maps are off by over 1000 % for tilt, more than 20 %; "
+         "by a: off by 30 %; take",
          "planes of voxels"},
         {0.2096,
          "derivatives of the volume by stem: off by 34 % of their own size: this\nits tips\n",
@@ -289,7 +291,7 @@ static void refusals_quote_the_training(toy *t)
          "derivatives of the volume by tilt: off by 380 % of their own size: this parameter\n",
          "derivatives of volumes of its maps are off by 380 % of their own size for tilt, more "
          "than "
-         "20 %; take",
+         "20 %; by wall: off by 30 %; take",
          "planes of voxels"},
         {0.204, "derivatives of the volume by a: off by 20 %\n",
          "derivatives of volumes of its maps are off by 20.4 % for a, more than 20 %; take",

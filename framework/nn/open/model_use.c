@@ -83,21 +83,23 @@ static sdm_status tell_small(const char *unfit, const char *begin, sdm_error *er
     return sdm_fail(err, SDM_OK, "%s", "");
 }
 
-/* text = the parameters after the first one in the line of `unfit` that begins with `begin` and
+/* text = the other parameters than `named` in the line of `unfit` that begins with `begin` and
  * tells of errors that are no share of a small derivative: "; by cup_radius: off by 24 %"; "":
  * there are none. */
-static void list_others(const char *unfit, const char *begin, char *text, size_t size)
+static void list_others(const char *unfit, const char *begin, const char *named, char *text,
+                        size_t size)
 {
     static const char next[] = "; by ", own[] = " of their own size";
+    const size_t length = strlen(named);
     *text = '\0';
     for (const char *at = unfit; *at;) {
-        const size_t length = strcspn(at, "\n");
-        const char *end = at + length, *small = strstr(at, own), *from = strstr(at, next);
+        const char *end = at + strcspn(at, "\n"), *small = strstr(at, own);
         if (!strncmp(at, begin, strlen(begin)) && !(small && small < end)) {
-            if (!from || from >= end) return;
-            const char *to = from;
-            while (to < end && !strncmp(to, next, strlen(next))) to += 1 + strcspn(to + 1, ";\n");
-            snprintf(text, size, "%.*s", (int)(to - from), from);
+            const char *from = at + strlen(begin), *to = from + strcspn(from, ";\n");
+            const bool skip = !strncmp(from, named, length) && from[length] == ':';
+            if (skip) from = to;
+            while (!strncmp(to, next, strlen(next))) to += 1 + strcspn(to + 1, ";\n");
+            if (to > from) snprintf(text, size, "%s%.*s", skip ? "" : next, (int)(to - from), from);
             return;
         }
         at = end + (*end == '\n');
@@ -171,7 +173,7 @@ sdm_status sdm_model_check_use(const sdm_model *m, sdm_model_use use, sdm_error 
     if (f->error <= f->bad) return SDM_OK;
     const worst_param worst = find_worst(q->unfit, f->lines, f->error, f->bad);
     char others[300] = "";
-    if (f->lines) list_others(q->unfit, f->lines, others, sizeof others);
+    if (f->lines) list_others(q->unfit, f->lines, worst.name, others, sizeof others);
     return sdm_fail(err, SDM_E_QUALITY, "%s are off by %s%s%s, more than %g %%%s%s", f->name,
                     worst.percent, f->lines ? " for " : "", f->lines ? worst.name : "",
                     100 * f->bad, others, f->remedy);

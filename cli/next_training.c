@@ -373,23 +373,21 @@ static bool print_template_first(const char *begin, const cli_args *args, const 
     return true;
 }
 
-/* The part of a note about a command that leaves the kind open; "": the command names a kind.
- * minutes: train.minutes that are enough for the kind of this run alone; 0: not known. factor: by
- * which a map takes longer on the grid of the command. */
+/* The part of a note about a command that leaves the kind open. minutes: train.minutes that are
+ * enough for the kind of this run alone; 0: not known. factor: by which a map takes longer on the
+ * grid of the command. */
 static const char *open_note(const sdm_train_report *r, double minutes, double factor,
                              char text[OPEN_NOTE])
 {
     const bool pod = r->kind == SDM_NETWORK_POD;
     char alone[80] = "";
-    *text = '\0';
     if (minutes > 0 && minutes < least_minutes(r, factor))
         snprintf(alone, sizeof alone, "; with network.kind=%s %.3g are enough",
                  pod ? "pod" : "template", minutes);
-    if (is_open(r))
-        snprintf(text, OPEN_NOTE,
-                 "network.kind stays auto: this run had no time to try %s; at its pace the "
-                 "train.minutes of this command are enough for both kinds%s; ",
-                 pod ? "template" : "pod", alone);
+    snprintf(text, OPEN_NOTE,
+             "network.kind stays auto: this run had no time to try %s; at its pace the "
+             "train.minutes of this command are enough for both kinds%s; ",
+             pod ? "template" : "pod", alone);
     return text;
 }
 

@@ -13,6 +13,7 @@
 #include "sdm/builtin_shapes.h"
 #include "sdm/internal/isolation.h"
 #include "sdm/internal/model_hash.h"
+#include "sdm/internal/same_triangles.h"
 #include "sdm/internal/skipped.h"
 #include "sdm/internal/text.h"
 #include "sdm/memory.h"
@@ -202,9 +203,8 @@ static sdm_status check_repeats(const cli_shape *shape, sdm_error *err)
     if (sdm_instance_check(shape->instance, shape->values, NULL)) return SDM_OK;
     sdm_status s = sdm_instance_mesh(shape->instance, shape->values, &one, err);
     if (!s) s = sdm_instance_mesh(shape->instance, shape->values, &two, err);
-    if (!s && (one.n_vert != two.n_vert || one.n_tri != two.n_tri ||
-               memcmp(one.vert, two.vert, 3 * one.n_vert * sizeof *one.vert) != 0 ||
-               memcmp(one.tri, two.tri, 3 * one.n_tri * sizeof *one.tri) != 0))
+    if (!s && (!sdm_mesh_same_triangles(&one, &two) ||
+               memcmp(one.vert, two.vert, 3 * one.n_vert * sizeof *one.vert) != 0))
         s = sdm_fail(err, SDM_E_PLUGIN,
                      "shape '%s': mesh() gives another mesh when it is called again with the same "
                      "parameters (`sdmgen shapes test` tells more)",

@@ -7,15 +7,10 @@
 
 #include "sdm/internal/json_describe.h"
 #include "sdm/internal/part_audit.h"
+#include "sdm/internal/same_triangles.h"
 
 /* Ways shorter than this part of the longest one are rounding. */
 static const double ROUNDING = 1e-9;
-
-static bool same_triangles(const sdm_mesh *a, const sdm_mesh *b)
-{
-    return a->n_vert == b->n_vert && a->n_tri == b->n_tri &&
-           !memcmp(a->tri, b->tri, 3 * a->n_tri * sizeof *a->tri);
-}
 
 /* mm[n_parts] = the longest way of a vertex of each part from mesh a to mesh b. part_of: as in the
  * audit of a mesh with the same triangles. */
@@ -58,7 +53,8 @@ sdm_status cli_part_moves_make(const sdm_instance *shape, const double (*range)[
         p[k] = range ? range[k][1] : params[k].max;
         made = made && !sdm_instance_mesh(shape, p, &high, NULL);
         p[k] = params[k].def;
-        if (made && same_triangles(&low, &middle) && same_triangles(&high, &middle))
+        if (made && sdm_mesh_same_triangles(&low, &middle) &&
+            sdm_mesh_same_triangles(&high, &middle))
             measure_ways(&low, &high, audit.part_of, out->n_parts, out->mm[k]);
         else
             for (size_t i = 0; i < out->n_parts; i++) out->mm[k][i] = NAN;

@@ -7,6 +7,7 @@
 #include "report/terminal.h"
 #include "sdm/internal/glb.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/same_triangles.h"
 #include "sdm/memory.h"
 
 /* The largest difference from a linear function, as a fraction of the size of the mesh. */
@@ -64,8 +65,7 @@ static sdm_status check_at(targets *t, bool *linear, sdm_error *err)
     const sdm_status s = sdm_instance_mesh(t->shape->instance, t->p, &t->other, err);
     const sdm_mesh *a = &t->base, *b = &t->other;
     if (s) return s;
-    *linear = a->n_vert == b->n_vert && a->n_tri == b->n_tri &&
-              !memcmp(a->tri, b->tri, 3 * a->n_tri * sizeof *a->tri);
+    *linear = sdm_mesh_same_triangles(a, b);
     for (size_t j = 0; j < 3 * a->n_vert && *linear; j++) {
         double v = a->vert[j];
         for (size_t i = 0; i < t->n; i++)

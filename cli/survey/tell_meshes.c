@@ -7,6 +7,7 @@
 #include "part_turns.h"
 #include "report/report_audit.h"
 #include "sdm/internal/config.h"
+#include "sdm/internal/same_triangles.h"
 
 static void tell_failed(teller *t)
 {
@@ -175,9 +176,8 @@ static void tell_turned(teller *t)
 static bool is_rewired(const teller *t, const double *p, const sdm_mesh *m)
 {
     sdm_mesh mesh = {0};
-    const bool other = !sdm_instance_mesh(t->s->shape, p, &mesh, NULL) &&
-                       (mesh.n_vert != m->n_vert || mesh.n_tri != m->n_tri ||
-                        memcmp(mesh.tri, m->tri, 3 * m->n_tri * sizeof *m->tri) != 0);
+    const bool other =
+        !sdm_instance_mesh(t->s->shape, p, &mesh, NULL) && !sdm_mesh_same_triangles(&mesh, m);
     sdm_mesh_dispose(&mesh);
     return other;
 }

@@ -289,17 +289,26 @@ static int velocity(const void *self, const sdm_host *host, const sdm_option_val
     return s ? give_reason(host, &err) : 0;
 }
 
-/* A request whose answer is one number. */
-static int ask_value(pool *at, const isolated_request *q, const sdm_host *host, double *out)
+/* A request that is answered without text or meshes. */
+static int ask_numbers(pool *at, const isolated_request *q, const sdm_host *host,
+                       isolated_answer *a)
 {
     isolated_worker *w = NULL;
-    isolated_answer a = {0};
     sdm_error err = {0};
+    *a = (isolated_answer){0};
     sdm_status s = take(at, &w, &err);
-    if (!s) s = ask(at, w, q, NULL, &a, NULL, &err);
+    if (!s) s = ask(at, w, q, NULL, a, NULL, &err);
     if (w) give_back(at, w);
-    *out = a.value;
     return s ? give_reason(host, &err) : 0;
+}
+
+/* The same for one number. */
+static int ask_value(pool *at, const isolated_request *q, const sdm_host *host, double *out)
+{
+    isolated_answer a;
+    const int failed = ask_numbers(at, q, host, &a);
+    *out = a.value;
+    return failed;
 }
 
 static int distance(const void *self, const sdm_host *host, const sdm_option_value *options,
@@ -323,21 +332,15 @@ static int measure(const void *self, const sdm_host *host, const sdm_option_valu
     return ask_value(at, &q, host, value);
 }
 
-/* The numbers of an open end, one for each request. */
 static int open_end(const void *self, const sdm_host *host, const sdm_option_value *options,
                     const double *p, sdm_open_end *out)
 {
     (void)options;
     pool *at = pool_of(self);
-    isolated_request q = request_at(at, ISOLATED_OPEN_END, p);
-    int failed = 0;
-    for (q.measure = 0; q.measure < 7 && !failed; q.measure++) {
-        const uint32_t k = q.measure;
-        failed = ask_value(at, &q, host,
-                           k < 3   ? &out->centre[k]
-                           : k < 6 ? &out->outward[k - 3]
-                                   : &out->radius);
-    }
+    const isolated_request q = request_at(at, ISOLATED_OPEN_END, p);
+    isolated_answer a;
+    const int failed = ask_numbers(at, &q, host, &a);
+    *out = a.open_end;
     return failed;
 }
 

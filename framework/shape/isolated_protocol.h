@@ -20,7 +20,7 @@ typedef enum isolated_task {
     ISOLATED_VELOCITY, /* at p, for n_vert vertices: n_vert * n_params * 3 numbers */
     ISOLATED_DISTANCE, /* at p and x */
     ISOLATED_MEASURE,  /* number `measure` at p and x[0], its depth */
-    ISOLATED_OPEN_END, /* number `measure` of the seven of the open end at p */
+    ISOLATED_OPEN_END, /* at p */
     ISOLATED_REPEAT,   /* text: number of threads and parameter vectors; answers with the number of
                           meshes with other bits and the first of them */
     ISOLATED_DESTROY
@@ -31,7 +31,7 @@ typedef struct isolated_request {
     uint32_t length;            /* bytes of text */
     uint64_t memory;            /* LOAD: limit, bytes */
     uint64_t n_vert;            /* VELOCITY */
-    uint32_t measure;           /* MEASURE, OPEN_END */
+    uint32_t measure;           /* MEASURE: index of the measure */
     double p[SHAPE_PARAMS_MAX]; /* MESH, VELOCITY, DISTANCE, MEASURE, OPEN_END */
     double x[3];                /* DISTANCE, MEASURE */
 } isolated_request;
@@ -41,7 +41,8 @@ typedef struct isolated_answer {
     uint32_t length;        /* bytes of text */
     uint64_t n_vert, n_tri; /* MESH */
     sdm_repeat repeat;      /* REPEAT */
-    double value;           /* DISTANCE, MEASURE, OPEN_END */
+    double value;           /* DISTANCE, MEASURE */
+    sdm_open_end open_end;  /* OPEN_END */
 } isolated_answer;
 
 /* The first page of the memory. The worker writes it at any time, the program reads it when the

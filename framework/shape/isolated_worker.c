@@ -293,12 +293,9 @@ static sdm_status make_open_end(worker *w, const isolated_request *q, isolated_a
 {
     const sdm_instance *s = w->instance;
     host_call call;
-    sdm_open_end e = {.radius = NAN};
+    a->open_end = (sdm_open_end){.radius = NAN};
     sdm_host_call_begin(&call, NULL, false);
-    const int failed = s->shape->open_end(s->self, &call.host, s->options, q->p, &e);
-    a->value = q->measure < 3   ? e.centre[q->measure]
-               : q->measure < 6 ? e.outward[q->measure - 3]
-                                : e.radius;
+    const int failed = s->shape->open_end(s->self, &call.host, s->options, q->p, &a->open_end);
     return end_call(&call, "open_end", failed, err);
 }
 

@@ -6,6 +6,7 @@
 
 #include "sdm/internal/part_audit.h"
 #include "sdm/internal/rng.h"
+#include "sdm/internal/same_triangles.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
@@ -159,12 +160,6 @@ sdm_status trainer_surface_check(const dataset *d, int n_threads, surface_check 
     return s;
 }
 
-static bool same_triangles(const sdm_mesh *a, const sdm_mesh *b)
-{
-    return a->n_vert == b->n_vert && a->n_tri == b->n_tri &&
-           !memcmp(a->tri, b->tri, 3 * a->n_tri * sizeof *a->tri);
-}
-
 sdm_status trainer_find_triangles_param(const dataset *d, size_t *param, sdm_error *err)
 {
     sdm_mesh low = {0}, high = {0};
@@ -177,7 +172,7 @@ sdm_status trainer_find_triangles_param(const dataset *d, size_t *param, sdm_err
         s = sdm_instance_mesh(d->shape, p, &low, err);
         p[k] = d->max[k];
         if (!s) s = sdm_instance_mesh(d->shape, p, &high, err);
-        if (!s && !same_triangles(&low, &high)) *param = k;
+        if (!s && !sdm_mesh_same_triangles(&low, &high)) *param = k;
     }
     sdm_mesh_dispose(&low);
     sdm_mesh_dispose(&high);

@@ -28,8 +28,8 @@ typedef struct training_turns {
                                 trial and it most likely needs no training; else 0 */
     bool untried;            /* pod may be better, but the budget was too short for its trial */
     bool if_good;            /* the first of two is kept without the second if its grade is good */
-    bool tried_other;        /* the kind that is not trained, or trained later, had a trial: */
-    turn_figures other;      /* its errors in the trial */
+    bool tried_other;        /* a kind that is not trained, or trained second, had a trial */
+    turn_figures other;      /* errors of that kind in its trial */
 } training_turns;
 
 /* *out = `asked` with the kind of the present turn, its defaults for all keys that have those of

@@ -7,6 +7,7 @@
 
 #include "data/streams.h"
 #include "sdm/internal/clock.h"
+#include "sdm/internal/same_triangles.h"
 #include "sdm/internal/sampling.h"
 #include "sdm/internal/train.h"
 #include "sdm/memory.h"
@@ -114,9 +115,7 @@ sdm_status trainer_family_mesh(const family *f, const double *p, sdm_mesh *mesh,
         return sdm_fail(err, SDM_E_CANCELLED, "the design of the template takes too long");
     const sdm_status s = sdm_instance_mesh(f->shape, p, mesh, err);
     if (s) return s;
-    if (mesh->n_vert == f->base.n_vert && mesh->n_tri == f->base.n_tri &&
-        !memcmp(mesh->tri, f->base.tri, 3 * mesh->n_tri * sizeof *mesh->tri))
-        return SDM_OK;
+    if (sdm_mesh_same_triangles(mesh, &f->base)) return SDM_OK;
     return sdm_fail(err, SDM_E_UNSUPPORTED,
                     "shape '%s': the numbers of vertices or the triangles depend on the "
                     "parameters, so vertices do not correspond",

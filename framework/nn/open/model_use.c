@@ -68,42 +68,42 @@ static worst_param find_worst(const char *unfit, const char *begin, double error
     return worst;
 }
 
+/* The first line of `unfit` that begins with `begin` and tells of errors of a derivative over its
+ * own size (own) or does not; NULL: there is none. */
+static const char *find_line(const char *unfit, const char *begin, bool own)
+{
+    static const char size[] = " % of their own size";
+    for (const char *at = unfit; *at;) {
+        const char *end = at + strcspn(at, "\n"), *found = strstr(at, size);
+        if (!strncmp(at, begin, strlen(begin)) && own == (found && found < end)) return at;
+        at = end + (*end == '\n');
+    }
+    return NULL;
+}
+
 /* SDM_OK, with the parameters that hardly change the volume in the text of *err: those of the line
  * of `unfit` about errors of their own size. "": there are none. */
 static sdm_status tell_small(const char *unfit, const char *begin, sdm_error *err)
 {
-    static const char own[] = " % of their own size";
-    for (const char *at = unfit; *at;) {
-        const size_t length = strcspn(at, "\n");
-        const char *found = strstr(at, own);
-        if (!strncmp(at, begin, strlen(begin)) && found && found < at + length)
-            return sdm_fail(err, SDM_OK, "do not use the %.*s", (int)length, at);
-        at += length + (at[length] == '\n');
-    }
-    return sdm_fail(err, SDM_OK, "%s", "");
+    const char *line = find_line(unfit, begin, true);
+    if (!line) return sdm_fail(err, SDM_OK, "%s", "");
+    return sdm_fail(err, SDM_OK, "do not use the %.*s", (int)strcspn(line, "\n"), line);
 }
 
 /* text = the other parameters than `named` in the line of `unfit` that begins with `begin` and
- * tells of errors that are no share of a small derivative: "; by cup_radius: off by 24 %"; "":
- * there are none. */
+ * does not tell of errors of their own size: "; by cup_radius: off by 24 %"; "": there are none. */
 static void list_others(const char *unfit, const char *begin, const char *named, char *text,
                         size_t size)
 {
-    static const char next[] = "; by ", own[] = " of their own size";
-    const size_t length = strlen(named);
+    static const char next[] = "; by ";
+    const char *line = find_line(unfit, begin, false);
     *text = '\0';
-    for (const char *at = unfit; *at;) {
-        const char *end = at + strcspn(at, "\n"), *small = strstr(at, own);
-        if (!strncmp(at, begin, strlen(begin)) && !(small && small < end)) {
-            const char *from = at + strlen(begin), *to = from + strcspn(from, ";\n");
-            const bool skip = !strncmp(from, named, length) && from[length] == ':';
-            if (skip) from = to;
-            while (!strncmp(to, next, strlen(next))) to += 1 + strcspn(to + 1, ";\n");
-            if (to > from) snprintf(text, size, "%s%.*s", skip ? "" : next, (int)(to - from), from);
-            return;
-        }
-        at = end + (*end == '\n');
-    }
+    if (!line) return;
+    const char *from = line + strlen(begin), *to = from + strcspn(from, ";\n");
+    const bool skip = !strncmp(from, named, strlen(named)) && from[strlen(named)] == ':';
+    if (skip) from = to;
+    while (!strncmp(to, next, strlen(next))) to += 1 + strcspn(to + 1, ";\n");
+    if (to > from) snprintf(text, size, "%s%.*s", skip ? "" : next, (int)(to - from), from);
 }
 
 static sdm_status check_grade(const sdm_model_quality *q, sdm_error *err)

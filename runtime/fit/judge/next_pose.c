@@ -64,7 +64,8 @@
 // parameters with another value of which rivals start
 #define PARAMS_TRIED 2
 
-// what to do about a better rival: go there, or not again
+// advice where a rival explains the data better: start the next fit there or, after a fit from
+// there has lost, keep known values
 static const char FROM_VALUE[] = "start from this value (sdm_fit_opts.start_params)",
                   FROM_POSE[] = "start from this pose, or try more turns",
                   TRIED[] = "a fit that began there did not stay: keep what is known "
@@ -77,7 +78,8 @@ typedef struct nearest {
     double value;       /* of this parameter */
     double rotation[3]; /* rotation vector of the shape, rad */
     fit_state state;
-    bool open;          /* another pose, as good, differs along open directions alone */
+    bool open;          /* a pose that explains the data as well was left out, because it differs
+                           from the fit along directions alone that the fit calls not determined */
     char symmetry[240]; /* how the surface may be turned and stays the same; "": not at all */
 } nearest;
 

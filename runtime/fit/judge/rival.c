@@ -95,7 +95,7 @@ bool sdm_fit_same_maximum(const fit_problem *p, const fit_standing *fit, const d
     return fmin(below_fit, below_rival) < VALLEY && below_fit > -SDM_FIT_PREFERRED;
 }
 
-// v[3] = way from the middle of the shape in one state to that in the other, mm
+// v[3] = way of the middle of the shape from one state to the other, mm
 static void centre_shift(const fit_state *from, const fit_state *to, const double centre[3],
                          double v[3])
 {

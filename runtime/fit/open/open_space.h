@@ -5,7 +5,7 @@
 
 #include "sdm/registry.h"
 
-/* Numbers on which the space depends: centre, normal and radius of the opening. */
+/* The space depends on seven numbers: centre[3], outward[3] and radius of the opening. */
 enum { FIT_OPEN_NUMBERS = 7 };
 
 typedef struct fit_open_end {

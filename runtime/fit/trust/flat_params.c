@@ -197,7 +197,8 @@ static sdm_status spread(const scan *c, size_t k, sdm_fit_result *out, sdm_error
 {
     const double before = sdm_fit_prior_sd(c->p, k);
     // few points on which the parameter hangs hold it only as far as the surface that it moves lies
-    // on them: without them, the others tell how the other unknowns follow it
+    // on them: the information of all other points tells how the other unknowns follow the
+    // parameter
     size_t few[POINTS_FEW];
     const bool hangs = find_few(c, k, few) > SHARE_OF_FEW && leave_out(c, few);
     const double *row = (hangs ? c->few : c->influence) + k * c->p->information.n_unknowns;

@@ -1,4 +1,4 @@
-/* The open end of an instance. */
+/* The open end that a shape with given options states by its callback open_end, checked. */
 #pragma once
 
 #include "sdm/registry.h"

@@ -174,7 +174,7 @@ grid: {size: [49, 33, 33], spacing: 0.25, centre: [0, 0, 0]}
 train: {minutes: 0.02}
 YAML
 expect 0 - sdmgen shapes check good.yaml --plugin "$plugin" --samples 16
-has '^fine: the shape can be trained(; read the table .moves.: does each parameter move the right parts\?)?$'
+has "^fine: the shape can be trained; read the table 'moves': does each parameter move the right parts\?\$"
 # The sides of the handle, which stay, lie on planes of voxel centres.
 planes='flat faces lie exactly on planes of voxel centres along y and z: .* may be off by [0-9.]+ % of the volume; with grid.centre: \[0, [-0-9.]+, [-0-9.]+\] \(and without grid.origin\) they lie'
 has "^note +$planes"
@@ -212,7 +212,7 @@ train: {minutes: 0.02}
 YAML
 grid='grid: [0-9]+ x [0-9]+ x [0-9]+ voxels of 0\.13 mm, from \(.*\) to \(.*\) mm; sdmgen config gives the reasons$'
 expect 0 "^sdmgen: $grid" sdmgen shapes check rod.yaml --samples 8
-has '^fine: the shape can be trained(; read the table .moves.: does each parameter move the right parts\?)?$'
+has "^fine: the shape can be trained; read the table 'moves': does each parameter move the right parts\?\$"
 expect 0 'voxels of 0\.13 mm in place of .*; no more than two voxels across it, as the longest edge has over 96; still finer with grid: \{spacing: 0\.087\} \(about 0\.2 million voxels, 3\.3 times as many, .* GB in memory\)$' sdmgen config rod.yaml
 
 # A longer one would be missing with 400,000 voxels, and gets more of them; one that a million do not show is a note, so that the test of a new shape passes.
@@ -221,7 +221,7 @@ long() { # QMAX: a rod that turns up to QMAX
 }
 long 0.2
 expect 0 '^sdmgen: grid: 565 x 120 x 10 voxels of 0\.18 mm' sdmgen shapes check long.yaml --samples 8
-has '^fine: the shape can be trained(; read the table .moves.: does each parameter move the right parts\?)?$'
+has "^fine: the shape can be trained; read the table 'moves': does each parameter move the right parts\?\$"
 if grep -q 'too thin' out; then bad "grid: auto does not show a rod that a million voxels show: $(cat out)"; fi
 long 0.7
 expect 0 '^sdmgen: grid: [0-9x ]+ voxels of 0\.4 mm' sdmgen shapes check long.yaml --samples 8

@@ -158,7 +158,7 @@ const cli_command cli_commands[CLI_N_COMMANDS] = {
      ".npy).\n"
      "Without a start pose the shape starts in the middle of the image, labels or points,\n"
      "and many rotations are tried. Points of a part of the surface: give --start-centre,\n"
-     "and keep what they do not show (docs/fitting.md has an example).\n"
+     "and keep what they do not show (docs/fitting-points.md has an example).\n"
      "The ending of FILE in -o selects the output: .vdb .ply .stl .obj .off .vtk .vtp the\n"
      "fitted shape in the estimated pose; .nii .nii.gz .nrrd .mha .npy distances on the grid\n"
      "of the image; .png .svg .pdf the contour over the image; .json the results.\n"

@@ -8,10 +8,7 @@
 #include "inputs/config_shape.h"
 #include "inputs/ranks.h"
 #include "inputs/setup.h"
-#include "model_before.h"
-#include "next_training.h"
 #include "page/page.h"
-#include "print_plan.h"
 #include "report/files.h"
 #include "report/report_verdict.h"
 #include "report/terminal.h"
@@ -22,6 +19,10 @@
 #include "sdm/picture.h"
 #include "study/evaluate.h"
 #include "survey/report_survey.h"
+#include "train/model_before.h"
+#include "train/next_training.h"
+#include "train/other_kind.h"
+#include "train/print_plan.h"
 
 /* Draws slices exact | network | error at the default parameters of the model. */
 static sdm_status write_picture(const sdm_model *model, const sdm_instance *shape,

@@ -1,4 +1,5 @@
-/* The lines `next`, `better` and `faster` below the verdict on a training. Tests: next_training.c
+/* The lines `next`, `better` and `faster` below the verdict on a training. Tests: next_command.c
+ * next_training.c other_kind.c
  */
 #include <math.h>
 #include <setjmp.h>
@@ -10,8 +11,9 @@
 
 #include <cmocka.h>
 
-#include "next_training.h"
 #include "oracle/captured.h"
+#include "train/next_training.h"
+#include "train/other_kind.h"
 
 #define COMPARE "--compare run/model.sdm\n"
 

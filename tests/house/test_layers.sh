@@ -67,7 +67,7 @@ check() {
         rooms("framework/io/", ". mesh image picture")
         rooms("runtime/", "maps field phantom fit/open fit/data fit/solver fit/start fit/trust fit/kept fit/judge fit vdb")
         rooms("trainer/", "comm numerics ssm data shards state pod fine template direct .")
-        rooms("cli/", "args slicer report survey inputs measure shapes phantom fit cohort ssm study page .")
+        rooms("cli/", "args slicer report survey inputs measure shapes phantom fit cohort ssm study page train .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", ". survey"); rooms("shapes/", ".")
         while ((getline line < files) > 0) {
             exists[line] = 1

@@ -3,7 +3,6 @@
 
 #include "args/options.h"
 #include "sdm/internal/train.h"
-#include "study/evaluate.h"
 
 /* Prints the command for a better model: the line `next`, or `better` of a good model. Prints
    nothing where the verdict advises nothing.
@@ -24,10 +23,3 @@ void cli_print_next(const cli_args *args, const sdm_train_report *r, const char 
    with more minutes in proportion to the voxels, unless its sentence tells of this part or of parts
    that are inside out. */
 void cli_show_part_first(sdm_train_report *r, double thin_spacing, double minutes);
-
-/* Prints the line `far away` where the template errs far from the surface alone, and `slow` where
-   it takes over a third of the time of an exact map: what `auto` has measured of `pod`, and where
-   its model is, or the command that trains it with so many minutes (0: the configuration gives
-   another budget). */
-void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_timing *times,
-                   double minutes);

@@ -5,14 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "args/shell_word.h"
-#include "sdm/internal/text.h"
-
-/* A template saves little time if exact maps take less than this many times as long. */
-#define SLOW 3.0
-
-/* A kind whose maps take less than this part of the time of the other kind's is named for it. */
-#define FASTER 0.2
+#include "next_command.h"
+#include "other_kind.h"
 
 /* A smaller error at the surface than this part of a voxel is worth no training. */
 #define SMALL 0.02
@@ -28,195 +22,13 @@
 // the reason for a command that trains a template; its time, s
 #define SKIPPED                                                                                    \
     "auto had no time to try template, which takes about %.3g s and is mostly the better kind "    \
-    "for a "                                                                                       \
-    "shape of several parts"
+    "for a shape of several parts"
 
-/* Appends an option and its value to a command. */
-static void add_option(sdm_text *command, const char *option, const char *value)
-{
-    cli_add_next_word(command, option);
-    cli_add_next_word(command, value);
-}
-
-/* The same with a number, which is 0 where the option was not given. */
-static void add_number(sdm_text *command, const char *option, double value)
-{
-    char number[32];
-    snprintf(number, sizeof number, "%.15g", value);
-    if (value > 0) add_option(command, option, number);
-}
-
-/* Is the argument "key=value" or "key.member=value", so that the change of this key replaces it? */
-static bool sets_key(const char *argument, const char *key)
-{
-    const size_t n = strlen(key);
-    return !strncmp(argument, key, n) && (argument[n] == '=' || argument[n] == '.');
-}
-
-/* Appends the files and keys of the command line but those that `v` and the kind replace, and the
- * changes. */
-static void add_changes(sdm_text *command, const cli_args *args, const sdm_verdict *v,
-                        const char *kind)
-{
-    // a grid.size or grid.origin of the configuration cuts the shapes, or would with other voxels
-    const bool grid = v->cut > 0 || !strncmp(v->key, "grid.", 5), budget = v->minutes > 0;
-    char change[80];
-    for (size_t i = 0; i < args->files.n; i++) {
-        const char *word = args->files.items[i];
-        if (!(grid && sets_key(word, "grid")) && !(v->key[0] && sets_key(word, v->key)) &&
-            !(budget && sets_key(word, "train.minutes")) &&
-            !(kind && sets_key(word, "network.kind")))
-            cli_add_next_word(command, word);
-    }
-    if (grid) cli_add_next_word(command, "grid=auto");
-    if (v->key[0]) {
-        snprintf(change, sizeof change, "%s=%.6g", v->key, v->to);
-        cli_add_next_word(command, change);
-    }
-    if (budget) {
-        snprintf(change, sizeof change, "train.minutes=%.6g", v->minutes);
-        cli_add_next_word(command, change);
-    }
-    if (!kind) return;
-    snprintf(change, sizeof change, "network.kind=%s", kind);
-    cli_add_next_word(command, change);
-}
-
-/* Appends the options of the command line, a folder beside that of the run, whose name is longer by
- * `end`, and the model of the run for a comparison. */
-static void add_options(sdm_text *command, const cli_args *args, const sdm_train_report *r,
-                        const char *end)
-{
-    const char *slash = strrchr(r->model_path, '/');
-    const int length = slash ? (int)(slash - r->model_path) : 0;
-    char folder[sizeof r->model_path + 8];
-    snprintf(folder, sizeof folder, "%.*s%s", length, r->model_path, end);
-    for (size_t i = 0; i < args->plugins.n; i++)
-        add_option(command, "--plugin", args->plugins.items[i]);
-    if (args->isolate) cli_add_next_word(command, "--isolate");
-    add_number(command, "--isolate-seconds", args->isolate_seconds);
-    add_number(command, "--isolate-memory", args->isolate_memory);
-    add_number(command, "--ranks", (double)args->ranks);
-    if (args->dataset) add_option(command, "--dataset", args->dataset);
-    add_option(command, "--out", folder);
-    add_option(command, "--compare", r->model_path);
-}
-
-/* "0.012 mm, 22 times worse": an error, compared with that of this run's model. */
-static void add_error(sdm_text *text, double error, double own)
-{
-    const double ratio = error / own;
-    sdm_text_add(text, "%.2g mm", error);
-    if (ratio > 1.05)
-        sdm_text_add(text, ", %.2g times worse", ratio);
-    else if (ratio < 1 / 1.05)
-        sdm_text_add(text, ", %.2g times better", 1 / ratio);
-    else
-        sdm_text_add(text, ", the same");
-}
-
-/* Prints the command that trains again with the changes of a verdict, after `begin`. end: what the
- * folder's name is longer by. Returns whether it did. */
-static bool print_command_into(const char *begin, const cli_args *args, const sdm_train_report *r,
-                               const sdm_verdict *changes, const char *kind, const char *end)
-{
-    sdm_text command = {0};
-    add_changes(&command, args, changes, kind);
-    add_options(&command, args, r, end);
-    const bool whole = !command.failed;
-    if (whole) printf("%ssdmgen train%s\n", begin, command.data);
-    sdm_text_dispose(&command);
-    return whole;
-}
-
-/* The same for the lines `next` and `better`. */
+/* The command of the lines `next` and `better`. Returns whether it was printed. */
 static bool print_command(const char *begin, const cli_args *args, const sdm_train_report *r,
                           const sdm_verdict *changes, const char *kind)
 {
-    return print_command_into(begin, args, r, changes, kind, "-2");
-}
-
-/* Does the template err far from the surface alone, so that another kind is a choice? */
-static bool is_far(const sdm_verdict *v)
-{
-    return v->limited && v->limit == SDM_CAUSE_FAR && !(v->cut > 0) && !sdm_verdict_broken(v);
-}
-
-/* The line `far away`. Returns whether pod may help. */
-static bool print_far(const sdm_train_report *r)
-{
-    const sdm_verdict *v = &r->verdict;
-    sdm_text price = {0};
-    if (r->compared && !(r->other.rmse_mm < v->rmse_mm)) {
-        sdm_text_add(&price, "pod is no better there, as auto has trained it, too: everywhere ");
-        add_error(&price, r->other.rmse_mm, v->rmse_mm);
-    } else if (r->compared || r->tried) {
-        sdm_text_add(&price, "pod; auto has %s it, too: within a voxel of the surface ",
-                     r->compared ? "trained" : "tried");
-        add_error(&price, r->other_voxel_mm, v->rmse_voxel_mm);
-        sdm_text_add(&price, "; everywhere ");
-        add_error(&price, r->other.rmse_mm, v->rmse_mm);
-        if (!r->compared) sdm_text_add(&price, " (a trial, which training improves)");
-    } else {
-        sdm_text_add(&price, "pod; this run has not measured it: near the surface it may be worse");
-    }
-    if (!price.failed)
-        printf("  far away    where distances far from the surface matter: %s\n", price.data);
-    sdm_text_dispose(&price);
-    return !r->compared || r->other.rmse_mm < v->rmse_mm;
-}
-
-/* The line `slow` or `faster`. Returns whether pod may help. */
-static bool print_slow(const sdm_train_report *r, const cli_timing *times)
-{
-    const bool known = r->compared || r->tried;
-    const double other = known ? r->other_ms : NAN;
-    const bool slow = times->ms_exact < SLOW * times->ms_network,
-               faster = r->compared && r->other_grade != SDM_GRADE_POOR &&
-                        other < FASTER * times->ms_network;
-    // a little less time is worth no other errors
-    if (r->kind != SDM_NETWORK_TEMPLATE || (!slow && !faster) || other > 0.5 * times->ms_network)
-        return false;
-    if (!slow) {
-        printf(
-            "  faster      a map of pod takes %.2g ms, %.2g times less than one of this template, "
-            "with RMSE %.2g mm, within a voxel of the surface %.2g mm\n",
-            other, times->ms_network / other, r->other.rmse_mm, r->other_voxel_mm);
-        return true;
-    }
-    printf(
-        "  slow        exact maps take only %.2g times as long as this template: the network saves "
-        "little time; pod ",
-        times->ms_exact / times->ms_network);
-    if (!known)
-        printf("may take far less; this run has not measured it\n");
-    else
-        printf("takes about %.2g ms, with RMSE %.2g mm, within a voxel of the surface %.2g mm%s\n",
-               other, r->other.rmse_mm, r->other_voxel_mm,
-               r->compared ? "" : " (a trial, which training improves)");
-    return true;
-}
-
-void cli_print_pod(const cli_args *args, const sdm_train_report *r, const cli_timing *times,
-                   double minutes)
-{
-    // the verdict, with the changes of the other kind: none but the minutes
-    const sdm_verdict pod = {.minutes = fmax(minutes, r->pod_minutes)};
-    const bool far = is_far(&r->verdict) && !r->unfinished && print_far(r),
-               slow = print_slow(r, times);
-    if (!far && !slow) return;
-    if (r->compared && r->other_path[0]) {
-        printf("              pod is %s (%s)\n", r->other_path, sdm_grade_name(r->other_grade));
-        return;
-    }
-    // the line `next` has the command
-    if (!args->files.n || r->unfinished || sdm_verdict_needs_pod(&r->verdict) ||
-        !print_command_into("              ", args, r, &pod, "pod", "-pod"))
-        return;
-    // the pace of maps was not measured
-    if (!r->chosen)
-        printf("              (pod needs more maps, and may need more train.minutes: this command "
-               "with --plan tells how many)\n");
+    return cli_print_training(begin, args, r, changes, kind, "-2");
 }
 
 void cli_show_part_first(sdm_train_report *r, double thin_spacing, double minutes)
@@ -495,7 +307,7 @@ void cli_print_next(const cli_args *args, const sdm_train_report *r, const char 
     if (skipped_template(r) && !other_maps && args->files.n && print_template_first(begin, args, r))
         return;
     // no key helps a good template that errs far away alone; the line `far away` has its command
-    const bool enough = is_far(v) && v->grade == SDM_GRADE_GOOD;
+    const bool enough = cli_errs_far_alone(v) && v->grade == SDM_GRADE_GOOD;
     if ((!v->key[0] && !(v->cut > 0) && (!open || enough)) || !args->files.n || other_maps) return;
     const bool leaves = leaves_open(r, v->key);
     const sdm_verdict changes = leaves ? with_trials(r, v, finer_factor(v)) : *v;

@@ -33,6 +33,15 @@ grep -qE '^translation( [-0-9.e]+){3} \+-( [-0-9.e]+|nan){3} mm$' fitted || bad 
 by-cmake/fit_points $model part.csv >fitted 2>err
 grep -qE '^[a-z]+ = .*, (not determined|at an end of its range: \+- does not hold)' fitted || bad "a part determines all: $(cat fitted)"
 expect 1 '^fit_points: missing\.csv: no such file' by-cmake/fit_points $model missing.csv
+# a fit to labels without a network, on a grid that the example chooses
+expect 0 - sdmgen phantom --shape torus -p major=2.1 -p minor=1.3 --spacing 0.4 -o torus.nii.gz --label label.nii.gz -q
+expect 0 - by-cmake/fit_labels torus label.nii.gz 1
+near "$(sed -n 's/^major = \([^ ]*\) +- .* mm$/\1/p' out)" 2.1 0.06
+near "$(sed -n 's/^minor = \([^ ]*\) +- .* mm$/\1/p' out)" 1.3 0.06
+has '^verdict: passed$'
+expect 4 '^fit_labels: .* of the volume of the shape is empty' by-cmake/fit_labels capsule label.nii.gz 1
+has '^verdict: FAILED$'
+expect 1 '^fit_labels: no voxel has the label 7$' by-cmake/fit_labels torus label.nii.gz 7
 
 pc=$(dirname "$(find prefix -name sdmgen.pc)")
 # shellcheck disable=SC2046 # flags are words

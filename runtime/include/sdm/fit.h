@@ -1,8 +1,11 @@
 /* Fits a shape to an image, labels or points: estimates the parameters and the rigid pose of the
    shape, with their standard deviations, and judges the result.
 
-   A fit in C (examples/consume/fit_points.c is a complete program, docs/fitting.md the guide):
-   - Fill an sdm_fit_source (what makes the maps) and an sdm_fit_target (the data).
+   A fit in C (docs/fitting.md is the guide; complete programs in examples/consume: fit_points.c
+   with a network, fit_labels.c with exact maps):
+   - Fill an sdm_fit_source (what makes the maps) and an sdm_fit_target (the data). Without a model
+     choose the grid of the maps: the box of the mesh and a margin, about 64 voxels along the
+     longest edge, at least three across the thinnest part.
    - Take the options of sdm_fit_defaults_for(). Set the start: start_params, and start_pose or
      turns; for an image also the values of its tissues, appearance.
    - Call sdm_fit(). SDM_OK: nothing refutes the fit; sdm_fit_result.verdict may still be doubtful,

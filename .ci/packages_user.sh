@@ -24,7 +24,7 @@ first_network() {
     done
     rm -r box box.stl first_network.png
 }
-first_network python3 1
+first_network python3 0.2
 apt-get purge -y -qq '*sdmgen*' >/dev/null
 [ ! -e /usr/share/sdmgen ] || { echo "the packages leave /usr/share/sdmgen behind" >&2 && exit 1; }
 python3 -m venv --system-site-packages venv

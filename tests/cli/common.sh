@@ -4,7 +4,12 @@
 set -u
 program=$1
 source_folder=$2 # absolute, like program
+# is_long: whether this is the run with the label "long", which also repeats properties on other inputs.
+is_long() { [ "${SDM_LONG:-no}" = yes ]; }
+# is_brief: whether sanitizers check the program; commands that run the same code as others are left out then.
+is_brief() { [ "${SDM_BRIEF:-no}" = yes ]; }
 work=files-of-$(basename "$0" .sh)
+if is_long; then work=$work-long; fi
 rm -rf "$work" && mkdir "$work" && cd "$work" || exit 1
 failures=0
 coarse_grids=no

@@ -25,11 +25,13 @@ grep -q ranks one/metrics.jsonl && bad 'one process tells of ranks'
 [ "$(ls three)" = "$(ls one)" ] || bad "other files: $(ls three)"
 
 # Networks that learn points: ranks share their steps and the measurement of the model. No width is a multiple of a vector's length.
-for kind in deepsdf imnet; do
+kinds='deepsdf imnet' ranks='2 3'
+if is_brief; then kinds=imnet ranks=3; fi
+for kind in $kinds; do
     points=("$source_folder/configs/$kind.yaml" grid.spacing=1.2 'grid.size=[12,10,10]' network.width=43 network.activation=silu
         train.minutes=0 train.steps=8 train.points=77 train.eikonal=0.1 data.start=48 data.static=2 data.online=8 data.holdout=5)
     expect 0 - sdmgen train "${points[@]}" --out one-$kind --threads 1 -q
-    for n in 2 3; do
+    for n in $ranks; do
         expect 0 - sdmgen train "${points[@]}" --out many-$kind --force --ranks $n -q
         cmp one-$kind/model.sdm many-$kind/model.sdm || bad "$kind: $n ranks give another model"
     done

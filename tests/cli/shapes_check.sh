@@ -499,6 +499,27 @@ cc -shared -fPIC -I"$source_folder/framework/include" lean.c -o lean.so -lm || b
 expect 4 'mend' sdmgen shapes check --plugin ./lean.so --samples 4
 has "^warning +the parameter 'radius' ranges from 1.5 to 2 mm, which moves no vertex of a shape of 90[0-9] mm by more than 0.6 mm; does mesh\(\) give 'lean' \(10 \.\. 11 deg\) to cos\(\) or sin\(\)\? These want rad"
 if grep -q 'are these m ' out; then bad "degrees, and a question about metres: $(cat out)"; fi
+# a few degrees that turn the shape by as many rad, and degrees that are converted twice; once is right
+for factor in 1 0.0003046174 0.0174532925; do
+    sed -E "s/enum \\{ RADIUS \\}/enum { RADIUS, TILT }/
+        s/^static const sdm_param PARAMS.*/&\\n    [TILT] = {.name = \"tilt\", .unit = \"deg\", .min = 0, .max = 8, .def = 2, .help = \"tilt\"},/
+        s|^ *// one triangle per octant.*|for (int i = 0; i < 6; i++) { const double a = $factor * p[TILT], x = out->vert[3 * i], y = out->vert[3 * i + 1]; out->vert[3 * i] = cos(a) * x - sin(a) * y; out->vert[3 * i + 1] = sin(a) * x + cos(a) * y; }|" \
+        "$source_folder/examples/plugin/octahedron.c" >tilt.c
+    cc -shared -fPIC -I"$source_folder/framework/include" tilt.c -o tilt.so -lm || bad 'the plug-in tilt.so was not built'
+    sdmgen shapes check --plugin ./tilt.so --samples 4 >out 2>err
+    code=$?
+    case $factor in
+    1)
+        [ $code = 4 ] || bad "degrees taken for rad: exit code $code"
+        has "^warning +over its range of 8 deg the parameter 'tilt' turns the surface at vertex 0 by 458 degrees: are degrees taken for rad in mesh\(\)\?.*multiply 'tilt' by 0.017453, or, if its range is in rad, give it the unit \"rad\"; mend this first"
+        ;;
+    0.0003*)
+        [ $code = 4 ] || bad "degrees converted twice: exit code $code"
+        has "^warning +over its range of 8 deg the parameter 'tilt' turns the surface at vertex 0 by 0.14 degrees: does mesh\(\) multiply 'tilt' by 0.017453 twice\? Once makes rad of degrees; mend this first"
+        ;;
+    *) if grep -E '^(warning|broken)' out; then bad "degrees converted once: $(cat out)"; fi ;;
+    esac
+done
 # one that goes to tan(): it comes first
 sed -E 's/enum \{ RADIUS \}/enum { RADIUS, RISE }/; s/p\[RADIUS\]/(p[RADIUS] + 0.1 * tan(p[RISE]))/g
     s/^static const sdm_param PARAMS.*/&\n    [RISE] = {.name = "rise", .unit = "", .min = 0, .max = 20, .def = 10, .help = "rise"},/' \

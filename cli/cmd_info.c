@@ -19,6 +19,17 @@
 #include "sdm/model.h"
 #include "ssm/report_ssm.h"
 
+/* A template without a correction learns from meshes, and carries maps of the parts. */
+static void print_training(const sdm_model_info *m)
+{
+    cli_print("training     %.1f s, ", m->train_seconds);
+    if (m->train_samples || strcmp(m->kind, "template") != 0)
+        cli_print("%lld exact maps", (long long)m->train_samples);
+    else
+        cli_print("from meshes and exact maps of the parts");
+    cli_print(", seed %llu, sdmgen %s\n", (unsigned long long)m->seed, m->version);
+}
+
 static void print_model(const char *path, const sdm_model *model)
 {
     char hash[SDM_SHA256_TEXT];
@@ -52,8 +63,7 @@ static void print_model(const char *path, const sdm_model *model)
         a->q50_mm, a->q90_mm, a->q99_mm);
     cli_print_quality(m);
     cli_print_unfit(m->quality.unfit, "not for", 12);
-    cli_print("training     %.1f s, %lld exact maps, seed %llu, sdmgen %s\n", m->train_seconds,
-              (long long)m->train_samples, (unsigned long long)m->seed, m->version);
+    print_training(m);
     if (m->fine_width) cli_print("fine level   %zu units a layer (docs/grids.md)\n", m->fine_width);
     cli_print("file         %zu bytes, weights %zu bytes, checksum %016llx\n", m->file_bytes,
               m->weight_bytes, (unsigned long long)m->checksum);

@@ -3,9 +3,6 @@
 
 #include "report/report_audit.h"
 
-/* Degrees of a rad. */
-static const double SPIN = 57.29577951308232;
-
 sdm_status cli_survey_cause(const cli_survey *s)
 {
     const sdm_shape_survey *f = &s->found;
@@ -43,6 +40,27 @@ static void tell_repeat(teller *t)
     teller_tell_cause(t, cli_survey_cause(t->s), &text);
 }
 
+/* An angle in degrees that turns the surface by 57.3 times as many degrees, or as few. */
+static void tell_turns(const sdm_survey_scale *c, const sdm_param *p, sdm_text *text)
+{
+    const double width = p->max - p->min;
+    sdm_text_add(text,
+                 "over its range of %g %s the parameter '%s' turns the surface at vertex %zu by "
+                 "%.3g degrees: ",
+                 width, p->unit, p->name, c->spin_vertex, c->turns * width);
+    if (c->turns > 1)
+        sdm_text_add(
+            text,
+            "are degrees taken for rad in mesh()? cos() and sin() want rad: multiply '%s' "
+            "by 0.017453, or, if its range is in rad, give it the unit \"rad\"" TELLER_MEND_FIRST,
+            p->name);
+    else
+        sdm_text_add(text,
+                     "does mesh() multiply '%s' by 0.017453 twice? Once makes rad of "
+                     "degrees" TELLER_MEND_FIRST,
+                     p->name);
+}
+
 /* An angle in degrees that goes to cos() or sin(). Other findings may follow from it. */
 static void tell_swings(teller *t)
 {
@@ -50,12 +68,15 @@ static void tell_swings(teller *t)
     const sdm_param *p = &sdm_instance_params(t->s->shape, NULL)[c->angle];
     sdm_text text = {0};
     if (!c->swings) return;
-    if (c->spins)
+    if (c->turns > 0)
+        tell_turns(c, p, &text);
+    else if (c->spins)
         sdm_text_add(&text,
                      "over its range of %g rad the parameter '%s' turns vertex %zu by %.3g rad: "
                      "are degrees taken for rad in mesh()? cos() and sin() want rad: do not "
                      "multiply '%s' by 57.3" TELLER_MEND_FIRST,
-                     p->max - p->min, p->name, c->spin_vertex, SPIN * (p->max - p->min), p->name);
+                     p->max - p->min, p->name, c->spin_vertex,
+                     SDM_SURVEY_DEGREES * (p->max - p->min), p->name);
     else if (c->poles)
         sdm_text_add(
             &text,
@@ -69,7 +90,7 @@ static void tell_swings(teller *t)
             "the vertices turn back %zu times while the parameter '%s' goes from %g to %g%s%s, as "
             "cos() and sin() of so many rad do",
             c->swings, p->name, p->min, p->max, *p->unit ? " " : "", p->unit);
-    if (!c->spins)
+    if (!c->spins && !(c->turns > 0))
         sdm_text_add(&text, "; if these are degrees, multiply them by 0.017453 in "
                             "mesh()" TELLER_MEND_FIRST);
     teller_tell_cause(t, SDM_E_QUALITY, &text);

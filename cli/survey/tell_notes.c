@@ -70,7 +70,8 @@ static void tell_meeting(teller *t)
 {
     const sdm_survey_meeting *c = &t->s->found.meeting;
     sdm_text text = {0};
-    if (!c->pairs) return;
+    // a part that is inside out may take the surface away where it meets another one
+    if (!c->pairs || t->s->found.inside_out.shapes) return;
     const sdm_part_audit *audit = teller_audit(t, c->shape[1]);
     if (audit && c->part[1] < audit->n) {
         for (int i = 0; i < 2; i++) {

@@ -37,6 +37,9 @@ has '^              sdmgen train far\.yaml train\.minutes=4 network\.kind=pod --
 expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 --out named --quiet
 has "${pod}this run has not measured it: near the surface it may be worse\$"
 has '^              sdmgen train far\.yaml train\.minutes=0\.02 network\.kind=pod --out named-pod --compare named/model\.sdm$'
+# it has learned from meshes, not from maps of whole shapes
+expect 0 - sdmgen info named/model.sdm
+has '^training     [0-9.]+ s, from meshes and exact maps of the parts, seed [0-9]+, sdmgen '
 
 # A good model with a small error: the command mends the first use that it leaves out.
 expect 0 - sdmgen train far.yaml network.kind=template train.minutes=0.02 grid.spacing=0.3 --out fine --quiet

@@ -41,7 +41,7 @@ check() {
          own("core", "block_border box checksum child clock container distribution envelope file foreign heap json_describe json_read mat3 near processor rng rotation sampling sanitized sha256 shared table team text threads units utf8 vec3")
          own("config", "config experiment mistakes")
         own("geom", "exact isosurface map mesh")
-        own("geom", "brute_force builder exact_slopes mesh_box methods part_audit same_triangles")
+        own("geom", "brute_force builder exact_slopes mesh_box mesh_turn methods part_audit same_triangles")
         own("nn", "model")
         own("nn", "fine kernels model_hash model_onnx model_threads pod point_network sdmnn template volume_cause")
         own("io", "glb image meshfile npy picture picture_child ssm volume")

@@ -1,5 +1,6 @@
 /* Surveys of shapes with one angle: in degrees where mesh() wants rad, in rad where it wants
- * degrees, and with factors that are right. Tests: survey_pole.c survey_scale.c survey_swing.c */
+ * degrees, and with factors that are right. Tests: survey_pole.c survey_scale.c survey_swing.c
+ * mesh_turn.c */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -42,12 +43,34 @@ static int swinging_mesh(const void *self, const sdm_host *host, const sdm_optio
     return 0;
 }
 
+/* A body, and a handle that the parameter times the factor turns about the z axis (rigid), or whose
+ * end alone it lifts as it opens a cone (cone). */
+static int turning_mesh(const void *self, const sdm_host *host, const sdm_option_value *options,
+                        const double *p, sdm_mesh_out *out)
+{
+    (void)self;
+    const int failed = host->reserve(host, out, 16, 24);
+    if (failed) return failed;
+    const double angle = p[0] * options[0].number, c = cos(angle), s = sin(angle);
+    faulty_box(out, 0, (const double[3]){-2, -2, -2}, (const double[3]){2, 2, 2}, 0);
+    faulty_box(out, 1, (const double[3]){1, -1, -1}, (const double[3]){4, 1, 1}, 0);
+    for (int i = 0; i < 8; i++) {
+        double *x = out->vert + 24 + 3 * i;
+        const double at[3] = {x[0], x[1], x[2]};
+        if (!strcmp(options[1].text, "rigid"))
+            x[0] = c * at[0] - s * at[1], x[1] = s * at[0] + c * at[1];
+        else if (at[0] > 2)
+            x[0] = 1 + 3 * c, x[1] = at[1] * (1 + 3 * s), x[2] = at[2] * (1 + 3 * s);
+    }
+    return 0;
+}
+
 /* A brief survey of the swinging shape with one parameter, which is multiplied by the factor. */
 static sdm_shape_survey survey_swinging(sdm_param param, const char *function, const char *factor)
 {
-    static const sdm_option options[] = {
-        {"factor", SDM_OPTION_REAL, "", 0, 500, 1, NULL, "x"},
-        {"function", SDM_OPTION_CHOICE, "", 0, 0, 0, "sin|tan|half|secant|steep|saw|twist", "x"}};
+    static const sdm_option options[] = {{"factor", SDM_OPTION_REAL, "", 0, 500, 1, NULL, "x"},
+                                         {"function", SDM_OPTION_CHOICE, "", 0, 0, 0,
+                                          "sin|tan|half|secant|steep|saw|twist|rigid|cone", "x"}};
     const sdm_shape shape = {.abi = SDM_SHAPE_ABI,
                              .size = sizeof(sdm_shape),
                              .name = "swinging",
@@ -55,7 +78,9 @@ static sdm_shape_survey survey_swinging(sdm_param param, const char *function, c
                              .params = &param,
                              .n_params = 1,
                              SDM_OPTIONS(options),
-                             .mesh = swinging_mesh};
+                             .mesh = !strcmp(function, "rigid") || !strcmp(function, "cone")
+                                         ? turning_mesh
+                                         : swinging_mesh};
     const sdm_named_text given[] = {{"factor", factor}, {"function", function}};
     sdm_instance *instance = NULL;
     sdm_shape_survey s;
@@ -174,10 +199,49 @@ static void degrees_that_go_to_tan(void **state)
     sdm_shape_survey_dispose(&s);
 }
 
+// Degrees that turn a part by 57.3 times as many degrees, or as few. Ranges below 13 degrees show
+// no two turns. Half and twice the angle are a matter of where it is measured; other factors, other
+// units and a part that changes its form are no mistakes.
+static void degrees_that_turn_a_part(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *function, *factor, *unit;
+        double max, degrees;
+    } cases[] = {{"rigid", "1", "deg", 12, 57.29578},
+                 {"rigid", "1", "degrees", 0.5, 57.29578},
+                 {"rigid", "0.5", "deg", 4, 28.64789},
+                 {"rigid", "2", "deg", 4, 114.59156},
+                 {"rigid", "0.00030461741978670857", "deg", 90, 0.01745329},
+                 {"rigid", "0.00030461741978670857", "deg", 8, 0.01745329},
+                 {"rigid", "0.017453292519943295", "deg", 12, 0},
+                 {"rigid", "0.017453292519943295", "deg", 180, 0},
+                 {"rigid", "0.034906585039886590", "deg", 12, 0},
+                 {"rigid", "0.9", "deg", 6, 0},
+                 {"rigid", "0.001", "deg", 12, 0},
+                 {"rigid", "1", "rad", 5, 0},
+                 {"rigid", "1", "", 5, 0},
+                 {"cone", "1", "deg", 1, 0},
+                 {"cone", "0.00030461741978670857", "deg", 12, 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        sdm_shape_survey s = survey_swinging(
+            (sdm_param){"tilt", cases[i].unit, 0, cases[i].max, 0.1 * cases[i].max, "x"},
+            cases[i].function, cases[i].factor);
+        if (!(fabs(s.scale.turns - cases[i].degrees) <= 1e-5 * cases[i].degrees))
+            fail_msg("%s, %s times up to %g %s: %g degrees", cases[i].function, cases[i].factor,
+                     cases[i].max, cases[i].unit, s.scale.turns);
+        assert_int_equal(s.scale.swings > 0, cases[i].degrees > 0);
+        if (s.scale.turns > 0) assert_int_equal(sdm_shape_survey_verdict(&s), SDM_E_QUALITY);
+        if (s.scale.turns > 0) assert_true(s.scale.spin_vertex >= 8);
+        sdm_shape_survey_dispose(&s);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rad_that_are_converted), cmocka_unit_test(degrees_that_go_to_sin),
-        cmocka_unit_test(rad_that_become_degrees), cmocka_unit_test(degrees_that_go_to_tan)};
+        cmocka_unit_test(rad_that_become_degrees), cmocka_unit_test(degrees_that_go_to_tan),
+        cmocka_unit_test(degrees_that_turn_a_part)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

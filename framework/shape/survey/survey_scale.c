@@ -203,6 +203,10 @@ sdm_status sdm_survey_measure_scale(const shape_family *f, sdm_shape_survey *s, 
         if (!status && !c->swings)
             status = sdm_survey_spins(f, s->p, k, &c->spins, &c->spin_vertex, err);
         if (c->spins) c->swings = (size_t)ceil((f->max[k] - f->min[k]) / SDM_SURVEY_SPIN);
+        const sdm_param *p = &f->shape->params[k];
+        if (!status && !c->swings && is_degrees(p) && !sdm_survey_is_radian(p))
+            status = sdm_survey_turns(f, s->p, k, &c->turns, &c->spin_vertex, err);
+        if (c->turns > 0) c->swings = (size_t)ceil(c->turns * (f->max[k] - f->min[k]) / 360);
         c->angle = k;
     }
     if (status) return status;

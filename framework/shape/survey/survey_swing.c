@@ -1,12 +1,14 @@
-/* Counts how often vertices turn back along one parameter, and looks whether they come back to the
- * same place after each step of 2 pi / 57.3, as cos() and sin() do of an angle that mesh() converts
- * from rad to degrees. */
+/* Counts how often vertices turn back along one parameter, looks whether they come back to the same
+ * place after each step of 2 pi / 57.3, as cos() and sin() do of an angle that mesh() converts from
+ * rad to degrees, and measures by how much a degree turns the surface. */
 #include "survey_swing.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "sdm/internal/mesh_box.h"
+#include "sdm/internal/mesh_turn.h"
+#include "sdm/internal/shape_survey.h"
 #include "sdm/internal/vec3.h"
 #include "sdm/memory.h"
 
@@ -190,5 +192,44 @@ sdm_status sdm_survey_spins(const shape_family *f, const double *p, size_t k, bo
     if (same) choose_spinning(m, size, &spins);
     if (!s && spins.n) s = follow_spins(f, at, k, m[0].n_vert, size, &spins, found, vertex, err);
     for (int i = 0; i < 3; i++) sdm_mesh_dispose(&m[i]);
+    return s;
+}
+
+/* Does parameter k turn a quarter of the turning surface by so many degrees per unit, beside two
+ * values? m[2]: scratch. */
+static sdm_status turns_by(const shape_family *f, double *p, size_t k, double degrees,
+                           sdm_mesh m[2], bool *found, size_t *vertex, sdm_error *err)
+{
+    static const double AT[2] = {0.3, 0.7};
+    const double width = f->max[k] - f->min[k], step = fmin(0.01 * width, 1);
+    const double angle = degrees * step / SDM_SURVEY_DEGREES;
+    sdm_status s = SDM_OK;
+    *found = true;
+    for (int i = 0; i < 2 && *found && !s; i++) {
+        for (int side = 0; side < 2 && !s; side++) {
+            p[k] = f->min[k] + AT[i] * width + side * step;
+            s = sdm_instance_mesh(f->shape, p, &m[side], err);
+        }
+        *found = !s && sdm_mesh_turned(&m[0], &m[1], angle, vertex) >= SPINNING;
+    }
+    return s == SDM_E_NOMEM ? s : SDM_OK;
+}
+
+sdm_status sdm_survey_turns(const shape_family *f, const double *p, size_t k, double *degrees,
+                            size_t *vertex, sdm_error *err)
+{
+    static const double SHARES[] = {1, 0.5, 2};
+    double at[SHAPE_PARAMS_MAX];
+    sdm_mesh m[2] = {{0}};
+    sdm_status s = SDM_OK;
+    *degrees = 0;
+    memcpy(at, p, f->shape->n_params * sizeof *p);
+    for (size_t i = 0; i < 6 && !(*degrees > 0) && !s; i++) {
+        const double factor = i < 3 ? SDM_SURVEY_DEGREES : 1 / SDM_SURVEY_DEGREES;
+        bool found;
+        s = turns_by(f, at, k, factor * SHARES[i % 3], m, &found, vertex, err);
+        if (found && !s) *degrees = factor * SHARES[i % 3];
+    }
+    for (int i = 0; i < 2; i++) sdm_mesh_dispose(&m[i]);
     return s;
 }

@@ -22,3 +22,11 @@ sdm_status sdm_survey_swings(const shape_family *f, const double *p, size_t k, s
  * their vertices. SDM_E_NOMEM. [any thread] */
 sdm_status sdm_survey_spins(const shape_family *f, const double *p, size_t k, bool *found,
                             size_t *vertex, sdm_error *err);
+
+/* *degrees = by how many degrees parameter k, which is in degrees, turns a quarter of the turning
+ * surface per unit, *vertex among it, the others as in p[n_params], if mesh() is likely to give it
+ * to cos() or sin() as it is (57.3, half or twice as much), or to convert it twice (0.01745, half
+ * or twice as much). Else 0; also if meshes cannot be made or change their vertices. SDM_E_NOMEM.
+ * [any thread] */
+sdm_status sdm_survey_turns(const shape_family *f, const double *p, size_t k, double *degrees,
+                            size_t *vertex, sdm_error *err);

@@ -114,6 +114,11 @@ typedef struct sdm_survey_scale {
      * by 57.3, so that this vertex goes round `swings` times, a part of the last time included */
     bool spins;
     size_t spin_vertex;
+    /* nor does it spin: `angle` is in degrees, and each turns the surface about spin_vertex by so
+     * many degrees, which are 57.3 times too many (mesh() takes them for rad), or too few (it
+     * converts them twice), to a factor of two; 0: neither. `swings` then counts the turns, a part
+     * of the last included */
+    double turns;
     /* the unit that would explain both, and its length in mm; NULL: none would */
     const char *unit;
     double unit_mm;
@@ -144,6 +149,9 @@ typedef struct sdm_survey_unit {
 
 /* Does a parameter in rad reach beyond 30, almost five turns? It is likely to be in degrees. */
 bool sdm_survey_is_odd_angle(const sdm_param *p);
+
+/* Degrees of a rad. */
+#define SDM_SURVEY_DEGREES 57.29577951308232
 
 /* True for a parameter with the unit deg or degrees whose range looks like one in rad: within a
  * turn, and ending at a multiple of 15 degrees in rad, such as 1.57, that is no number of halves.

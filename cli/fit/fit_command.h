@@ -306,7 +306,12 @@ bool cli_fit_shows_other(const cli_fit *f);
  * network doubtful. */
 void cli_fit_doubt_changed_shape(cli_fit *f);
 
-/* Do the data show a part of the shape, and does this alone decide which values can be used? */
+/* Is there a fitted parameter that the data do not determine? Modes of a statistical model, whose
+ * distribution says enough of them, do not count. */
+bool cli_fit_has_open(const cli_fit *f);
+
+/* Do the data show a part of the shape, or not determine a parameter, and does this alone decide
+ * which values can be used? */
 bool cli_fit_knows_usable(const cli_fit *f);
 
 /* Prints the line `use`: the parameters that can be used, and those that cannot. Those that are

@@ -84,16 +84,26 @@ static bool is_known(const cli_fit *f, size_t k)
 }
 
 /* Is it known, and no part of a sum or a difference with one that is not? The standard deviation of
- * such a sum holds only as far as the other one is right. */
+ * such a sum holds only as far as the other one is right. A parameter at an end of its range is
+ * such a partner, too. */
 static bool is_usable(const cli_fit *f, size_t k)
 {
     const sdm_fit_result *r = &f->result;
     const size_t size = f->n_params + 6;
     bool usable = is_known(f, k);
     for (size_t j = 0; j < f->n_params && usable; j++)
-        usable = j == k || !is_fitted(r, j) || is_known(f, j) ||
+        usable = j == k || !(r->sd[j] > 0) || is_known(f, j) ||
                  !(fabs(r->correlation[k * size + j]) > CORRELATED);
     return usable;
+}
+
+bool cli_fit_has_open(const cli_fit *f)
+{
+    const bool *kept = f->opts.kept;
+    for (size_t k = 0; k < f->n_params && f->result.by_prior && !f->opts.keep_params; k++)
+        if (f->result.by_prior[k] && !(kept && kept[k]) && strcmp(f->params[k].unit, "sd"))
+            return true;
+    return false;
 }
 
 bool cli_fit_knows_usable(const cli_fit *f)
@@ -101,7 +111,8 @@ bool cli_fit_knows_usable(const cli_fit *f)
     const sdm_fit_finding *x = sdm_fit_finding_of(&f->result.verdict, SDM_FIT_CHECK_DATA);
     size_t length = 0;
     if (f->opts.keep_params || !f->result.by_prior ||
-        !cli_fit_found(f, SDM_FIT_CHECK_COVERED, SDM_FIT_DOUBTFUL, -INFINITY))
+        (!cli_fit_found(f, SDM_FIT_CHECK_COVERED, SDM_FIT_DOUBTFUL, -INFINITY) &&
+         !cli_fit_has_open(f)))
         return false;
     // a list of names that its text had no room for
     if (covered_names(f, &length) && length >= SDM_FIT_NAMES_MAX - 1) return false;

@@ -129,35 +129,30 @@ static bool untested(const sdm_fit_verdict *v)
     return x && x->grade == SDM_FIT_DOUBTFUL && isnan(x->limit);
 }
 
-/* Are all parameters at an end of their range there because the data do not determine them? */
-static bool bounds_are_open(const cli_fit *f)
+/* Is a check doubtful because the data want a parameter beyond its range? Its value and all others
+ * may be wrong then. */
+static bool wants_beyond(const sdm_fit_verdict *v)
 {
-    const sdm_fit_result *r = &f->result;
-    for (size_t k = 0; k < f->n_params; k++)
-        if (r->at_bound && r->at_bound[k] && !(r->by_prior && r->by_prior[k])) return false;
-    return true;
+    const sdm_fit_finding *x = sdm_fit_finding_of(v, SDM_FIT_CHECK_BOUNDS);
+    return x && x->grade > SDM_FIT_PASSED && strstr(x->text, "the data want ");
 }
 
-/* Is the fit doubtful, and only because the data show a part of the shape? */
+/* Do the data show a part of the shape only, as `covered` says? */
+static bool shows_a_part(const cli_fit *f)
+{
+    return cli_fit_found(f, SDM_FIT_CHECK_COVERED, SDM_FIT_DOUBTFUL, -INFINITY);
+}
+
+/* Is the fit doubtful, and only because the data show a part of the shape or do not determine every
+ * parameter? */
 static bool only_a_part(const cli_fit *f)
 {
     const sdm_fit_verdict *v = &f->result.verdict;
     static const sdm_fit_check_kind part[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA,
                                               SDM_FIT_CHECK_BOUNDS};
+    const bool open = shows_a_part(f) || cli_fit_has_open(f);
     return v->grade == SDM_FIT_DOUBTFUL &&
-           only(v, SDM_FIT_DOUBTFUL, part, bounds_are_open(f) ? 3 : 2);
-}
-
-/* Has the fit passed although the data do not determine a parameter of which nothing else is known?
- */
-static bool passed_with_open(const cli_fit *f)
-{
-    const sdm_fit_result *r = &f->result;
-    if (r->verdict.grade != SDM_FIT_PASSED || f->opts.keep_params || !r->by_prior) return false;
-    for (size_t k = 0; k < f->n_params; k++)
-        if (r->by_prior[k] && !(f->opts.kept && f->opts.kept[k]) && strcmp(f->params[k].unit, "sd"))
-            return true;
-    return false;
+           only(v, SDM_FIT_DOUBTFUL, part, open && !wants_beyond(v) ? 3 : 2);
 }
 
 /* Is the fit through a network doubtful, and only because the data show a part of the shape or the
@@ -167,8 +162,8 @@ static bool a_part_by_network(const cli_fit *f)
     const sdm_fit_verdict *v = &f->result.verdict;
     static const sdm_fit_check_kind part[] = {SDM_FIT_CHECK_NETWORK_ERROR, SDM_FIT_CHECK_COVERED,
                                               SDM_FIT_CHECK_DATA, SDM_FIT_CHECK_BOUNDS};
-    return v->grade == SDM_FIT_DOUBTFUL && cli_fit_knows_usable(f) &&
-           only(v, SDM_FIT_DOUBTFUL, part, bounds_are_open(f) ? 4 : 3);
+    return v->grade == SDM_FIT_DOUBTFUL && shows_a_part(f) && cli_fit_knows_usable(f) &&
+           only(v, SDM_FIT_DOUBTFUL, part, wants_beyond(v) ? 3 : 4);
 }
 
 /* Does the line `use` name the values that can be used? Through a network it does not: where the
@@ -176,7 +171,44 @@ static bool a_part_by_network(const cli_fit *f)
 static bool tells_usable(const cli_fit *f)
 {
     const bool network = f->source.model && !f->result.polished;
-    return passed_with_open(f) || (only_a_part(f) && cli_fit_knows_usable(f) && !network);
+    return (f->result.verdict.grade == SDM_FIT_PASSED && cli_fit_has_open(f)) ||
+           (only_a_part(f) && cli_fit_knows_usable(f) && !network);
+}
+
+/* Figures beyond their limits by less than this share of these are barely beyond. */
+#define BARELY 0.05
+
+/* Do residuals or values of tissues alone doubt a fit to an image or labels, each with a figure
+ * barely above its limit? */
+static bool is_barely_doubtful(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    static const sdm_fit_check_kind values[] = {SDM_FIT_CHECK_RESIDUALS, SDM_FIT_CHECK_BESIDE,
+                                                SDM_FIT_CHECK_INSIDE, SDM_FIT_CHECK_OUTSIDE};
+    for (size_t i = 0; i < v->n_findings; i++) {
+        const sdm_fit_finding *x = &v->findings[i];
+        if (x->grade > SDM_FIT_PASSED && !(x->figure <= (1 + BARELY) * x->limit)) return false;
+    }
+    return f->target.kind != SDM_FIT_POINTS && only(v, SDM_FIT_DOUBTFUL, values, 4);
+}
+
+/* What a verdict means that doubts the maps, and perhaps more. NULL: it does not doubt them. */
+static const char *short_of_maps(const cli_fit *f)
+{
+    const sdm_fit_verdict *v = &f->result.verdict;
+    static const sdm_fit_check_kind network[] = {SDM_FIT_CHECK_NETWORK_ERROR,
+                                                 SDM_FIT_CHECK_NETWORK},
+                                    voxels[] = {SDM_FIT_CHECK_VOXELS, SDM_FIT_CHECK_NETWORK_ERROR,
+                                                SDM_FIT_CHECK_NETWORK};
+    if (only(v, SDM_FIT_DOUBTFUL, network, 2))
+        return "the network limits the fit: exact maps change the values as the lines below say";
+    if (!cli_fit_found(f, SDM_FIT_CHECK_VOXELS, SDM_FIT_DOUBTFUL, -INFINITY)) return NULL;
+    return only(v, SDM_FIT_DOUBTFUL, voxels, 3)
+               ? "the maps are too coarse to judge the shape: fit with finer ones before you use "
+                 "the values"
+               : "the maps are too coarse, or this is another shape: fit with finer maps before "
+                 "you "
+                 "use the values";
 }
 
 /* What a verdict that is not `passed` means for the user of the values. */
@@ -185,20 +217,16 @@ static const char *in_short(const cli_fit *f)
     const sdm_fit_verdict *v = &f->result.verdict;
     static const sdm_fit_check_kind end[] = {SDM_FIT_CHECK_CONVERGED},
                                     few[] = {SDM_FIT_CHECK_COVERED, SDM_FIT_CHECK_DATA,
-                                             SDM_FIT_CHECK_RESIDUALS},
-                                    maps[] = {SDM_FIT_CHECK_VOXELS, SDM_FIT_CHECK_NETWORK_ERROR,
-                                              SDM_FIT_CHECK_NETWORK},
-                                    coarse[] = {SDM_FIT_CHECK_VOXELS,  SDM_FIT_CHECK_NETWORK_ERROR,
-                                                SDM_FIT_CHECK_NETWORK, SDM_FIT_CHECK_RESIDUALS,
-                                                SDM_FIT_CHECK_BESIDE,  SDM_FIT_CHECK_OFFSET,
-                                                SDM_FIT_CHECK_INSIDE,  SDM_FIT_CHECK_OUTSIDE};
+                                             SDM_FIT_CHECK_RESIDUALS};
     if (v->grade == SDM_FIT_FAILED)
         return only(v, SDM_FIT_FAILED, end, 1)
                    ? "do not use the values: the fit has not come to an end"
                    : "do not use the values: the data contradict them or do not decide";
     if (tells_usable(f))
-        return "the data show a part of the shape: the line `use` names the values that can be "
-               "used";
+        return shows_a_part(f) ? "the data show a part of the shape: the line `use` names the "
+                                 "values that can be used"
+                               : "the data do not determine every parameter: the line `use` names "
+                                 "the values that can be used";
     if (a_part_by_network(f))
         return "the data show a part of the shape; where they show nothing, errors of the network "
                "may pass for data: --polish tells the values that can be used";
@@ -210,14 +238,15 @@ static const char *in_short(const cli_fit *f)
                    ? "the data show a part of the shape, and too few points to test the fit: do "
                      "not use what the lines below name, nor what is `not determined`"
                    : "the points are too few to test the fit: its values may be right or wrong";
-    if (only(v, SDM_FIT_DOUBTFUL, maps, sizeof maps / sizeof *maps))
-        return "the maps limit the fit: the values are near the right ones; for their +- see the "
-               "lines below";
-    if (cli_fit_found(f, SDM_FIT_CHECK_VOXELS, SDM_FIT_DOUBTFUL, -INFINITY) &&
-        only(v, SDM_FIT_DOUBTFUL, coarse, sizeof coarse / sizeof *coarse))
-        return "the maps are too coarse for these data: fit with finer ones before you judge the "
-               "values";
-    if (!isfinite(f->result.advised_voxel_mm) && isfinite(cli_fit_finer_voxel(f)))
+    const char *maps = short_of_maps(f);
+    if (maps) return maps;
+    const bool finer = !isfinite(f->result.advised_voxel_mm) && isfinite(cli_fit_finer_voxel(f));
+    if (is_barely_doubtful(f))
+        return finer ? "barely above a limit, so the contour decides (-o fit.png): if it lies on "
+                       "the object, use the values, or fit with finer maps"
+                     : "barely above a limit, so the contour decides (-o fit.png): if it lies on "
+                       "the object, use the values";
+    if (finer)
         return "the maps are nearly too coarse, or the data differ from the shape as the lines "
                "below say: fit with finer maps, and look at a picture (-o fit.png)";
     return "the data may differ from the shape as the lines below say: look at a picture "

@@ -94,7 +94,7 @@ expect 0 - $spread --blur 0.28
 has '^  map voxels   doubtful  0\.6, need at most 0\.42: .* coarse beside the point spread of the image: .* with voxels of 0\.34 mm '
 expect 0 - $spread
 has '^  map voxels   doubtful  0\.6, need at most 0\.3: .* contain an estimate of this error, which may be too small; exact maps with voxels of 0\.24 mm '
-has '^  in short     the maps limit the fit: the values are near the right ones; for their \+- see the lines below$'
+has '^  in short     the maps are too coarse to judge the shape: fit with finer ones before you use the values$'
 
 # An interrupt says what it has stopped, and where.
 expect 130 'spread.nii: the fit was stopped on request (before its first iteration|in the search, at start [0-9]+ of 60); no file was written$' \

@@ -140,7 +140,7 @@ expect 0 - sdmgen phantom --shape torus -O edge=0.5 --spacing 0.3 -o ring.nii --
 expect 0 - sdmgen fit --shape torus -O edge=0.5 ring.nii --rotation 0,0,0 --quiet --spacing 0.6
 has '^  inside       doubtful '
 has '^  map voxels   doubtful '
-has '^  in short     the maps are too coarse for these data: '
+has '^  in short     the maps are too coarse, or this is another shape: fit with finer maps before you use the values$'
 
 # The side of an ear is found; the wrong one is refused.
 expect 0 - sdmgen phantom --shape cochlea -O edge=0.8 -O ear=left --spacing 0.5 --seed 5 -o left.nii --quiet

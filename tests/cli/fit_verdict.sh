@@ -97,7 +97,7 @@ for square in 0.7 1; do
     if [ $square = 1 ]; then
         has '^  residuals    passed '
     else
-        has '^  residuals    doubtful  2\.[0-9]+, need at most 1\.[0-9]+: neighbourhoods of points lie 1\.[0-9] times as far off the surface as the scatter'
+        has '^  residuals    doubtful  3\.[0-9]+, need at most 2\.[12][0-9]*: neighbouring points scatter by 0\.08[0-9]* mm, all points by 0\.1[0-9]* mm about the'
     fi
 done
 
@@ -199,6 +199,26 @@ has '^  in short +the data show a part of the shape: the line `use` names '
 has '^  use +all values, each with its \+-$'
 tr -d '\n ' <half.json | grep -q '"in_short":"thedatashowapartoftheshape:.*"usable":\["rx","ry","rz"\]' || bad "half.json: $(head -c 2000 half.json)"
 
+# The same half of an object that differs smoothly from the shape: no line says that its values can be used.
+expect 0 - sdmgen phantom --shape ellipsoid -p rx=4 -p ry=3.2 -p rz=2.5 -O e1=0.9 --spacing 0.5 --seed 3 -o e.nii --surface e.csv --surface-noise 0.02 \
+    --surface-points 3000 -q
+awk -F, 'NR == 1 || $1 > 0' e.csv >half.csv
+expect 0 - sdmgen fit --shape ellipsoid half.csv --rotation 0,0,0 --start-centre 0,0,0 -o half.json -q
+has '^  residuals    doubtful  [23]\.[0-9]+, need at most 2\.2[0-9]: neighbouring points scatter by 0\.02[0-9]* mm, all points by 0\.03[0-9]* mm about'
+has '^  covered      doubtful '
+grep -Eq '^  use |line .use. names' out && bad "values of another shape: $(cat out)"
+grep -q '"usable"' half.json && bad "half.json: $(head -c 2000 half.json)"
+
+# A standard deviation that the points of this object contradict: their scatter is three times as large. Outliers contradict none.
+given='--rotation 0,0,0 -q --keep appearance --point-sd'
+expect 4 'e.csv: the points scatter by 0\.03[0-9]* mm about the surface, but 0\.012 mm are given as their standard deviation: another shape' \
+    sdmgen fit --shape ellipsoid e.csv $given 0.012
+expect 0 - sdmgen phantom --shape ellipsoid -p rx=4 -p ry=3.2 -p rz=2.5 --spacing 0.5 --seed 3 -o e.nii --surface e.csv --surface-noise 0.02 \
+    --surface-points 1500 -q
+awk -F, -v OFS=, 'NR % 33 == 2 { $1 += 0.4 } { print }' e.csv >outliers.csv
+expect 0 - sdmgen fit --shape ellipsoid outliers.csv $given 0.02
+has '^  residuals    doubtful  [0-9.]+, need at most 1\.[0-9]+: the points scatter by 0\.0[34][0-9]* mm about the surface, but 0\.02 mm are given '
+
 # Forty points have no neighbours: nothing tests them but a standard deviation that is known.
 expect 0 - sdmgen phantom --shape capsule -p radius=1.2 -p length=5 --spacing 0.5 -o few.nii --surface few.csv --surface-points 40 --surface-noise 0.05 -q
 few='sdmgen fit --shape capsule few.csv --rotation 0,0,0 -q'
@@ -208,5 +228,5 @@ has '^  residuals +doubtful +the points lie too far apart .* \(--point-sd\), kee
 expect 0 - $few --point-sd 0.05 --keep appearance
 has '^verdict: passed$'
 expect 0 - $few --point-sd 0.02 --keep appearance
-has '^  residuals +doubtful .*: the points lie 0\.0[0-9]+ mm off the surface, .* as given: another shape, or their standard deviation is larger$'
+has '^  residuals +doubtful .*: the points scatter by 0\.0[0-9]+ mm about the surface, but 0\.02 mm are given as their standard deviation: another shape, or their standard deviation is larger$'
 finish

@@ -65,7 +65,7 @@ check() {
         rooms("framework/geom/", "memory simd exactly mesh solid features map sign layers points methods .")
         rooms("framework/nn/", "kernels onnx fine model pod template template/onnx point sdmnn open")
         rooms("framework/io/", ". mesh image picture")
-        rooms("runtime/", "maps field phantom fit/open fit/data fit/solver fit/start fit/trust fit/kept fit/judge fit vdb")
+        rooms("runtime/", "maps field phantom fit/open fit/data fit/solver fit/start fit/trust fit/points fit/kept fit/judge fit vdb")
         rooms("trainer/", "comm numerics ssm data shards state pod fine template direct .")
         rooms("cli/", "args slicer report survey inputs measure shapes phantom fit cohort ssm study page train .")
         rooms("framework/core/", "."); rooms("framework/config/", "."); rooms("framework/shape/", ". survey"); rooms("shapes/", ".")

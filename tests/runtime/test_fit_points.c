@@ -303,7 +303,7 @@ static void test_given_deviation_tests_the_fit(void **state)
         if (!f || (f->grade == SDM_FIT_PASSED) == bumpy)
             fail_msg("bumpy %d: %g, limit %g: %s", bumpy, f ? f->figure : 0, f ? f->limit : 0,
                      f ? f->text : "");
-        assert_true(!bumpy || strstr(f->text, "their standard deviation as given"));
+        assert_true(!bumpy || strstr(f->text, "are given as their standard deviation"));
         sdm_fit_dispose(&r);
         free(x);
     }

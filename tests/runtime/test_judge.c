@@ -491,7 +491,7 @@ static void test_sparse_points_with_a_known_deviation(void **state)
         if ((f->grade == SDM_FIT_PASSED) != (k == 1) ||
             !strstr(f->text, k == 0   ? "keep it (sdm_fit_opts.keep_app"
                              : k == 1 ? ""
-                                      : "as given"))
+                                      : "0.02 mm are given as their standard deviation"))
             fail_msg("%d: %.3g, at most %.3g: %s", k, f->figure, f->limit, f->text);
         sdm_fit_dispose(&r);
     }

@@ -111,10 +111,33 @@ static void a_start_that_lost_is_not_advised(void **state)
     }
 }
 
+/* Points that scatter farther about another shape excuse it: its neighbourhoods deviate by less of
+ * their own noise. It is no better explanation unless it is likelier. */
+static void a_rival_of_points_needs_the_likelihood(void **state)
+{
+    (void)state;
+    const fit_standing fit = {
+        .log_likelihood = 300, .factor = 1, .n_units = 64, .chi_square = 0.6, .n_points = 250};
+    fit_standing rival = fit;
+    rival.log_likelihood = 178, rival.chi_square = 0.3;
+    assert_true(fabs(sdm_fit_gain(&fit, &rival) - (300 - 178)) < 1e-9);
+    // a little less likely after few iterations: as good
+    rival.log_likelihood = 290;
+    assert_true(fabs(sdm_fit_gain(&fit, &rival)) < 1e-9);
+    // better by both: half of 64 neighbourhoods times log 2
+    rival.log_likelihood = 400;
+    assert_true(fabs(sdm_fit_gain(&fit, &rival) - (-32 * log(2))) < 1e-9);
+    // labels have no likelihood
+    fit_standing labels = fit, others = rival;
+    labels.factor = others.factor = 0;
+    assert_true(fabs(sdm_fit_gain(&labels, &others) - (-32 * log(2))) < 1e-9);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(turns_about_an_open_axis_are_no_rivals),
                                        cmocka_unit_test(a_fit_is_not_sent_where_it_began),
+                                       cmocka_unit_test(a_rival_of_points_needs_the_likelihood),
                                        cmocka_unit_test(a_start_that_lost_is_not_advised)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,6 +13,7 @@
 #include "finding.h"
 #include "fit/data/source_params.h"
 #include "fit/data/surface_places.h"
+#include "fit/points/pick.h"
 #include "fit/solver/prior.h"
 #include "noise.h"
 #include "outlying.h"

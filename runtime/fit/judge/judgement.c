@@ -12,6 +12,7 @@
 #include "coverage.h"
 #include "far_labels.h"
 #include "finding.h"
+#include "fit/points/shared_errors.h"
 #include "fit/solver/unknowns_cost.h"
 #include "offset.h"
 #include "outlying.h"
@@ -41,6 +42,8 @@
 #define FAR_BEYOND 3.0
 // the same where they contradict little of the volume
 #define VERY_FAR_BEYOND 6.0
+// a standard deviation with two digits is right to this factor
+#define PRINTED 1.05
 // largest share of points that may belong to another surface
 #define STRAY_MAX 0.35
 // the same where the data want a parameter beyond its bound: these points may show the rest
@@ -162,11 +165,34 @@ static void check_bounds(const fit_problem *p, const fit_misfit *m, const fit_at
                                 "accepts a difference)");
 }
 
+/* Whether the options state a standard deviation that covers all errors of the points, as printed:
+ * shared ones, too. */
+static bool is_stated(const fit_problem *p, const fit_shared_errors *e)
+{
+    return e->n && p->opts->keep_appearance && PRINTED * p->opts->point_sd >= e->all;
+}
+
+/* Doubts a fit to points that lie off the surface together with their neighbours, where this makes
+ * more than half of the mean square distance. Returns whether it did. */
+static bool doubt_shared_errors(const fit_problem *p, const fit_shared_errors *e,
+                                sdm_fit_verdict *v)
+{
+    if (is_stated(p, e) || !e->n || e->ratio <= e->limit) return false;
+    sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL, e->ratio, e->limit,
+                      "neighbouring points scatter by %.2g mm, all points by %.2g mm about the "
+                      "surface: the shape differs from the object, or the scanner errs alike over "
+                      "neighbouring points; if you know that it errs by so much, keep this "
+                      "standard deviation (sdm_fit_opts.point_sd, sdm_fit_opts.keep_appearance)",
+                      e->near, e->all);
+    return true;
+}
+
 // The residuals on both sides of the surface. The older observation model is biased in blurred
 // images, and labels and points show a surface with errors of their own: their residuals are not
 // noise alone, so that only a multiple of the limit refuses the fit.
 static void check_residuals(const fit_problem *p, const fit_misfit *own, const fit_misfit *feet,
-                            fit_coarseness coarse, const fit_at_bounds *bounds, sdm_fit_verdict *v)
+                            const fit_shared_errors *shared, fit_coarseness coarse,
+                            const fit_at_bounds *bounds, sdm_fit_verdict *v)
 {
     const fit_misfit *m = own;
     const double voxel = fit_longest_edge(&p->maps.grid), beyond = m->chi_square[1] / m->limit[1];
@@ -184,7 +210,9 @@ static void check_residuals(const fit_problem *p, const fit_misfit *own, const f
     if (points && !refused && sdm_fit_doubt_given_scatter(p, v)) return;
     // errors as large as a neighbourhood are judged by the places to which the points belong
     if (points && !refused && feet->chi_square[1] / feet->limit[1] < beyond) m = feet;
-    if (points && m->chi_square[1] <= m->limit[1] && feet->scatter_chi_square > feet->limit[1]) {
+    if (points && m->chi_square[1] <= m->limit[1] && doubt_shared_errors(p, shared, v)) return;
+    if (points && m->chi_square[1] <= m->limit[1] && !is_stated(p, shared) &&
+        feet->scatter_chi_square > feet->limit[1]) {
         sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, false, SDM_FIT_DOUBTFUL,
                           feet->scatter_chi_square, feet->limit[1],
                           "neighbourhoods of points lie %.2g times as far off the surface as the "
@@ -201,7 +229,8 @@ static void check_residuals(const fit_problem *p, const fit_misfit *own, const f
                                               .coarse = &coarse,
                                               .bounds = bounds},
                               why);
-    const bool passed = m->chi_square[1] <= m->limit[1], white = points && passed;
+    const bool passed = m->chi_square[1] <= m->limit[1],
+               white = points && passed && feet->scatter_chi_square <= feet->limit[1];
     sdm_fit_judge_add(
         v, SDM_FIT_CHECK_RESIDUALS, passed, inside,
         white ? feet->scatter_chi_square : m->chi_square[1], white ? feet->limit[1] : m->limit[1],
@@ -427,6 +456,7 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     sdm_fit_verdict *v = &r->verdict;
     fit_residuals residuals;
     fit_misfit misfit, feet = {0};
+    fit_shared_errors shared = {0};
     sdm_status s = sdm_fit_residuals_create(p, &residuals, err);
     const double robust = s ? 0 : sdm_fit_residual_correlation(&residuals);
     *factor = robust > 0 ? robust : fmax(r->noise_factor, 1);
@@ -442,8 +472,9 @@ sdm_status sdm_fit_judge(const fit_problem *p, sdm_fit_result *r, double *factor
     if (!s) s = sdm_fit_misfit(p, &residuals, &misfit, err);
     if (!s && points) sdm_fit_residuals_use_feet(p, &residuals);
     if (!s && points) s = sdm_fit_misfit(p, &residuals, &feet, err);
+    if (!s && points) s = sdm_fit_shared_errors(p, residuals.used, &shared, err);
     if (!s) {
-        check_residuals(p, &misfit, &feet, coarse, &bounds, v);
+        check_residuals(p, &misfit, &feet, &shared, coarse, &bounds, v);
         check_volumes(p, &misfit, r, v);
         if (labels) check_far_labels(p, &misfit, v);
         v->n_units = misfit.n_units[0] + misfit.n_units[1];

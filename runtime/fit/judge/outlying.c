@@ -9,11 +9,13 @@
    number, and one more, is the expected one of rare events (Poisson 1837). */
 #include "outlying.h"
 
+#include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "finding.h"
+#include "fit/points/pick.h"
 #include "fit/trust/posterior.h"
 #include "residuals.h"
 #include "sdm/internal/heap.h"

@@ -4,8 +4,6 @@
  * same side. */
 #pragma once
 
-#include <math.h>
-
 #include "fit/solver/problem.h"
 
 /* Points of a fit and their distances from its surface. */
@@ -34,12 +32,3 @@ sdm_status sdm_fit_groups_find(const fit_distances *t, fit_groups *g, sdm_error 
 /* Doubts the check "patch" of a fit to points, which has passed, if there are such groups.
  * SDM_E_NOMEM. */
 sdm_status sdm_fit_check_outlying(const fit_problem *p, sdm_fit_verdict *v, sdm_error *err);
-
-/* The k-th pick from a list: one of `step` entries that follow each other, not always the same one,
-   since points in the order of a scan or of triangles would leave stripes bare. The multiples of
-   the golden ratio fill 0 .. 1 evenly. */
-static inline size_t fit_pick(size_t step, size_t k)
-{
-    const double turn = 0.61803398874989485 * (double)k;
-    return k * step + (size_t)((turn - floor(turn)) * (double)step);
-}

@@ -3,11 +3,10 @@
 
 #include <math.h>
 
-#include "fit/data/interpolate.h"
+#include "fit/points/shared_errors.h"
 #include "fit/trust/posterior.h"
 #include "noise.h"
 #include "sdm/internal/heap.h"
-#include "sdm/internal/vec3.h"
 
 // a voxel whose share differs from 0 or 1 by at most this much lies deep outside or deep inside
 #define DEEP 0.01
@@ -36,8 +35,6 @@
 #define MIXED_MIN 2000
 // largest place along an axis; points farther away, in units of the radius, share a place
 #define PLACE_MAX 1e5
-// smallest square of the gradient of a distance that leads to the surface
-#define GRADIENT_MIN 0.25
 // correlations below this count as none
 #define CORRELATION_MIN 0.05
 // where pairs become too few to measure it, a larger one says that noise reaches farther
@@ -361,16 +358,10 @@ static void points_fill(const fit_problem *p, fit_residuals *r, double radius)
 
 void sdm_fit_residuals_use_feet(const fit_problem *p, fit_residuals *r)
 {
-    const fit_field map = sdm_fit_maps_distances(&p->maps);
     const double radius = sdm_fit_inradius(&p->maps);
     for (size_t i = 0; i < r->n; i++) {
-        double y[3], gradient[3], foot[3];
-        sdm_fit_to_shape(&p->state, p->samples.world + 3 * i, y);
-        const double distance = sdm_fit_interpolate_all(&map, y, gradient, NULL),
-                     square = v3_dot(gradient, gradient);
-        for (int a = 0; a < 3 && square > GRADIENT_MIN; a++)
-            y[a] -= distance * gradient[a] / square;
-        sdm_fit_to_world(&p->state, y, foot);
+        double foot[3];
+        sdm_fit_foot(p, i, foot);
         set_place(r, i, foot, radius);
     }
     r->at_feet = true;

@@ -54,9 +54,9 @@ typedef struct fit_residuals {
  * after an error. */
 sdm_status sdm_fit_residuals_create(const fit_problem *p, fit_residuals *out, sdm_error *err);
 
-/* Points: place[] becomes the place of the foot of each point: the nearest place on the surface, to
-   first order (the point less its distance along the gradient). Errors as large as the edge of a
-   cube would otherwise sort the points inside and outside of the surface into different cubes. */
+/* Points: place[] becomes the place of the foot of each point (sdm_fit_foot()). Errors as large as
+   the edge of a cube would otherwise sort the points inside and outside of the surface into
+   different cubes. */
 void sdm_fit_residuals_use_feet(const fit_problem *p, fit_residuals *r);
 
 /* Number of correlated voxels that carry as much information as one independent one: the product

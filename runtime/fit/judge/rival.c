@@ -14,6 +14,9 @@
 
 // a chi-square is at least this: residuals without any noise
 #define CHI_SQUARE_MIN 1e-3
+// points: a gain in log-likelihood that counts whatever their neighbourhoods tell: a smaller one
+// may come from few iterations, and from errors of coarse maps at sharp edges
+#define CLEARLY_LIKELIER 30.0
 // of points that only one of two shapes takes for strays
 #define CHI_SQUARE_STRAY 9.0
 // loss of log-likelihood, below the worse one of the two, that is no valley
@@ -68,11 +71,17 @@ bool sdm_fit_has_units(const fit_standing *fit, const fit_standing *rival)
 
 double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival)
 {
-    if (fit->factor > 0 && !sdm_fit_has_units(fit, rival))
-        return (fit->log_likelihood - rival->log_likelihood) / fit->factor;
-    if (!sdm_fit_has_units(fit, rival)) return NAN;
-    return sdm_fit_units_gain(0.5 * (double)(fit->n_units + rival->n_units),
-                              sdm_fit_chi_square(fit, rival), sdm_fit_chi_square(rival, fit));
+    const bool units = sdm_fit_has_units(fit, rival), likelihoods = fit->factor > 0;
+    const double by_likelihood =
+        likelihoods ? (fit->log_likelihood - rival->log_likelihood) / fit->factor : NAN;
+    if (!units) return by_likelihood;
+    const double by_units =
+        sdm_fit_units_gain(0.5 * (double)(fit->n_units + rival->n_units),
+                           sdm_fit_chi_square(fit, rival), sdm_fit_chi_square(rival, fit));
+    // each chi-square has the scatter of its own residuals as its unit: points that scatter far
+    // about another shape excuse it
+    if (!likelihoods || !(by_likelihood > 0)) return by_units;
+    return fmax(by_units, by_likelihood > CLEARLY_LIKELIER ? by_likelihood : 0);
 }
 
 bool sdm_fit_same_maximum(const fit_problem *p, const fit_standing *fit, const double *field,

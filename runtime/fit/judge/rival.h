@@ -28,8 +28,9 @@ double sdm_fit_chi_square(const fit_standing *s, const fit_standing *against);
 bool sdm_fit_has_units(const fit_standing *fit, const fit_standing *rival);
 
 /* Gain of the fit over a rival that was measured on the same samples: of labels and points from
- * sdm_fit_chi_square() of both, of images and of points with few neighbourhoods from the
- * likelihood. NaN: labels have no neighbourhoods. */
+   sdm_fit_chi_square() of both, of images and of points with few neighbourhoods from the
+   likelihood. A rival of points that is less likely has no gain over the fit; where it is less
+   likely by 30 or more, the larger gain of the fit counts. NaN: labels have no neighbourhoods. */
 double sdm_fit_gain(const fit_standing *fit, const fit_standing *rival);
 
 /* Log-likelihood ratio of mean residuals of n neighbourhoods whose common variance is estimated. */

@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "finding.h"
@@ -143,9 +144,6 @@ static given_scatter scatter_of(const fit_problem *p, double together)
                            .limit = 1 + BY_CHANCE * sqrt(2 * together / free)};
 }
 
-// the robust standard deviation of the points over the given one, and over the root of the limit
-#define SCATTER_FAILED 3.0
-
 sdm_status sdm_fit_points_sd(const fit_problem *p, double *sd, sdm_error *err)
 {
     double *list = NULL;
@@ -157,22 +155,53 @@ sdm_status sdm_fit_points_sd(const fit_problem *p, double *sd, sdm_error *err)
     return SDM_OK;
 }
 
-/* Are most distances so long that neither outliers nor the precision of the given standard
- * deviation explain them? */
-static bool is_far_scattered(const fit_problem *p, given_scatter g)
+// the standard deviation of the points over the given one, and over the root of the limit, from
+// which on the two contradict each other
+#define SCATTER_FAILED 2.0
+// share of the points that tell it, the nearest ones; mean square of so many normal errors over
+// their variance
+#define NEAREST_SHARE 0.9
+#define NEAREST_SQUARE 0.6230
+
+static int by_size(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* *sd = standard deviation of normal errors with the mean square of the NEAREST_SHARE nearest
+ * points: outliers hardly change it, another shape in a part of the points does. */
+static sdm_status trimmed_sd(const fit_problem *p, double *sd, sdm_error *err)
+{
+    const size_t n = (size_t)ceil(NEAREST_SHARE * (double)p->samples.n);
+    double *list = NULL, sum = 0;
+    const sdm_status s = SDM_ALLOC(&list, p->samples.n, "distances of the points", err);
+    if (s) return s;
+    for (size_t i = 0; i < p->samples.n; i++) list[i] = fabs(p->samples.field[i]);
+    qsort(list, p->samples.n, sizeof *list, by_size);
+    for (size_t i = 0; i < n; i++) sum += list[i] * list[i];
+    *sd = sqrt(sum / ((double)n * NEAREST_SQUARE));
+    sdm_free(list);
+    return SDM_OK;
+}
+
+/* Does the scatter contradict the given standard deviation, far beyond its precision and without
+ * the outliers? */
+static bool is_contradicted(const fit_problem *p, given_scatter g)
 {
     double sd;
-    return g.over > g.limit && !(p->opts->tolerance > 0) && !sdm_fit_points_sd(p, &sd, NULL) &&
+    return g.over > g.limit && !(p->opts->tolerance > 0) && !trimmed_sd(p, &sd, NULL) &&
            sd > SCATTER_FAILED * sqrt(g.limit) * hypot(p->state.point_sd, sdm_fit_network_error(p));
 }
 
 static void add_scatter(const fit_problem *p, given_scatter g, sdm_fit_verdict *v)
 {
     sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, g.over <= g.limit,
-                      is_far_scattered(p, g) ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, g.over, g.limit,
-                      "the points lie %.2g mm off the surface, %.2g times their standard deviation "
-                      "as given: another shape, or their standard deviation is larger",
-                      g.rms, sqrt(g.over));
+                      is_contradicted(p, g) ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, g.over, g.limit,
+                      "the points scatter by %.2g mm about the surface, but %.2g mm are given as "
+                      "their standard deviation: another shape, or their standard deviation is "
+                      "larger",
+                      g.rms, p->state.point_sd);
 }
 
 void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v)

@@ -12,6 +12,10 @@
 /* Ways shorter than this part of the longest one are rounding. */
 static const double ROUNDING = 1e-9;
 
+/* A length moves a part by 10 or 100 mm for each mm to within this share where it is multiplied by
+ * this number. */
+static const double FACTOR_CHANCE = 0.002;
+
 /* mm[n_parts] = the longest way of a vertex of each part from mesh a to mesh b. part_of: as in the
  * audit of a mesh with the same triangles. */
 static void measure_ways(const sdm_mesh *a, const sdm_mesh *b, const uint32_t *part_of,
@@ -48,9 +52,12 @@ sdm_status cli_part_moves_make(const sdm_instance *shape, const double (*range)[
     const sdm_status s = sdm_part_audit_make(&middle, 0, NULL, &audit, err);
     if (!s && audit.n > 1 && audit.n <= CLI_MOVES_PARTS) out->n_parts = audit.n;
     for (size_t k = 0; k < out->n_params && out->n_parts; k++) {
-        p[k] = range ? range[k][0] : params[k].min;
+        const double ends[2] = {range ? range[k][0] : params[k].min,
+                                range ? range[k][1] : params[k].max};
+        out->range[k] = ends[1] - ends[0];
+        p[k] = ends[0];
         bool made = !sdm_instance_mesh(shape, p, &low, NULL);
-        p[k] = range ? range[k][1] : params[k].max;
+        p[k] = ends[1];
         made = made && !sdm_instance_mesh(shape, p, &high, NULL);
         p[k] = params[k].def;
         if (made && sdm_mesh_same_triangles(&low, &middle) &&
@@ -64,6 +71,27 @@ sdm_status cli_part_moves_make(const sdm_instance *shape, const double (*range)[
     sdm_mesh_dispose(&low);
     sdm_mesh_dispose(&high);
     return s;
+}
+
+/* Asks about the parts that a length moves ten or a hundred times as far as it changes. */
+static void ask_about_factors(const cli_part_moves *m, const sdm_param *params)
+{
+    for (size_t k = 0; k < m->n_params; k++)
+        for (int factor = 10; factor <= 100 && !strcmp(params[k].unit, "mm"); factor *= 10) {
+            bool asks = false;
+            for (size_t i = 0; i < m->n_parts; i++) {
+                const double way = factor * m->range[k];
+                if (!(fabs(m->mm[k][i] - way) < FACTOR_CHANCE * way)) continue;
+                if (asks)
+                    printf(", %zu", i + 1);
+                else
+                    printf("note     1 mm of '%s' moves vertices by %d mm, as if it were in another "
+                           "unit: does mesh() multiply it by %d? See part %zu",
+                           params[k].name, factor, factor, i + 1);
+                asks = true;
+            }
+            if (asks) printf("\n");
+        }
 }
 
 void cli_part_moves_print(const cli_part_moves *m, const sdm_param *params)
@@ -86,6 +114,7 @@ void cli_part_moves_print(const cli_part_moves *m, const sdm_param *params)
                 printf(" %7s", "-");
     }
     printf("\n");
+    ask_about_factors(m, params);
 }
 
 void cli_part_moves_json(const cli_part_moves *m, const sdm_param *params, sdm_json *j)

@@ -14,11 +14,16 @@ has '^moves    the longest way of a vertex of each part over the range of a para
 has '^         part        1       2$'
 has '^         size     3\.46       2$'
 has '^         reach       0       1$'
+if grep -q 'does mesh() multiply it by 10' out; then bad "a good shape is asked about a factor: $(cat out)"; fi
 present nine.png
 expect 0 - sdmgen shapes check --plugin "$plugin" --samples 16 --json
 has '"shape": "faulty", "verdict": "fine", "shapes": 21, "corners": 4, "samples": 16'
 has '"jumps": \[\]'
 has '"moves": \[\{"parameter": "size", "parts_mm": \[3\.46410[0-9]*, 2\]\}, \{"parameter": "reach", "parts_mm": \[0, 1\]\}\]'
+# A length in cm in one part: the table shows 10 mm over a range of 1 mm, and the line below it asks.
+expect 0 - sdmgen shapes check faulty -O fault=tenfold --plugin "$plugin" --samples 16
+has '^         reach       0      10$'
+has "^note     1 mm of 'reach' moves vertices by 10 mm, as if it were in another unit: does mesh\(\) multiply it by 10\? See part 2\$"
 for shape in duct ellipsoid torus capsule linkage; do
     expect 0 - sdmgen shapes check $shape --samples 8
     has '^fine'

@@ -22,7 +22,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
      "meets|groups|crumb|spare|offset|around|unlisted|sticky|diagonal|negative|window|swapped|"
      "cache|caches|lapse|pair|hidden|grows|posts|"
-     "inverted|averted|converted|mixed|lever",
+     "inverted|averted|converted|mixed|lever|tenfold",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -224,6 +224,8 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "negative")) handle[0][1] = -1, handle[1][1] = 1 - p[0];
     if (!strcmp(fault, "pair")) handle[0][1] = -1, handle[1][1] = p[0] - p[1] - 0.75;
     if (!strcmp(fault, "swapped") && is_large) handle[0][1] = half, handle[1][1] = -half;
+    // `tenfold`: a length in cm among others in mm
+    if (!strcmp(fault, "tenfold")) handle[1][0] = p[0] + 10 * reach;
     // `converted`: a length in m among others in mm; `mixed`: the size is in m in the handle alone;
     // `lever`: it moves the handle as little, but not everywhere alike
     if (!strcmp(fault, "converted")) handle[1][0] = p[0] + 0.001 * reach;
@@ -302,6 +304,8 @@ static int faulty_velocity(const void *self, const sdm_host *host, const sdm_opt
         velocity[3 * v] = 0, velocity[3 * v + 1] = v >> 1 & 1 ? by_size : -by_size;
     for (size_t v = 8; v < 16 && !strcmp(options[0].text, "converted"); v++)
         velocity[3 * (n_vert + v)] *= 0.001;
+    for (size_t v = 8; v < 16 && !strcmp(options[0].text, "tenfold"); v++)
+        velocity[3 * (n_vert + v)] *= 10;
     for (size_t d = 0; d < 2 && !strcmp(options[0].text, "diagonal"); d++)
         velocity[18 + d] = d ? -0.02 : 0.02;
     return 0;

@@ -85,9 +85,10 @@ static void ask_about_factors(const cli_part_moves *m, const sdm_param *params)
                 if (asks)
                     printf(", %zu", i + 1);
                 else
-                    printf("note     1 mm of '%s' moves vertices by %d mm, as if it were in another "
-                           "unit: does mesh() multiply it by %d? See part %zu",
-                           params[k].name, factor, factor, i + 1);
+                    printf(
+                        "note     1 mm of '%s' moves vertices by %d mm, as if it were in another "
+                        "unit: does mesh() multiply it by %d? See part %zu",
+                        params[k].name, factor, factor, i + 1);
                 asks = true;
             }
             if (asks) printf("\n");

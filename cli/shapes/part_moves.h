@@ -23,8 +23,8 @@ typedef struct cli_part_moves {
 sdm_status cli_part_moves_make(const sdm_instance *shape, const double (*range)[2],
                                cli_part_moves *out, sdm_error *err);
 
-/* Prints a heading and a line for each parameter, and a question about each length that moves a part
- * ten or a hundred times as far as it changes; nothing without a table. */
+/* Prints a heading and a line for each parameter, and a question about each length that moves a
+ * part ten or a hundred times as far as it changes; nothing without a table. */
 void cli_part_moves_print(const cli_part_moves *m, const sdm_param *params);
 
 /* The member `moves`: for each parameter its name and `parts_mm`; empty without a table. */

@@ -21,7 +21,6 @@ while IFS='|' read -r _ options yes_no; do
         rows=$((rows + 1))
         [ -n "${value[$option]+there}" ] || bad "no value for $option"
         for i in "${!targets[@]}"; do
-            if is_brief && [ $i != $((rows % ${#targets[@]})) ]; then continue; fi # one target for each option
             given="$option ${value[$option]}"
             [[ ${targets[i]} != *"$option"* ]] || given='' # the target has the option already
             if [ "${cells[i]} $option" = 'yes --find' ]; then

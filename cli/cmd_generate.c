@@ -657,7 +657,7 @@ static void notice_between(const job *j, const char *measure)
                    rmse, 0.866 * own_voxel(j), measure);
     else
         cli_notice("the stated error, RMSE %.2g mm, is that at the voxels of the model's own grid; "
-                   "between them the map errs more, at the surface by up to about %.2g mm RMS; %s",
+                   "interpolation between them adds up to about %.2g mm RMS at the surface; %s",
                    rmse, between, measure);
 }
 

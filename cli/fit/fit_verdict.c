@@ -207,8 +207,7 @@ static const char *short_of_maps(const cli_fit *f)
                ? "the maps are too coarse to judge the shape: fit with finer ones before you use "
                  "the values"
                : "the maps are too coarse, or this is another shape: fit with finer maps before "
-                 "you "
-                 "use the values";
+                 "you use the values";
 }
 
 /* What a verdict that is not `passed` means for the user of the values. */

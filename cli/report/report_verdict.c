@@ -51,6 +51,9 @@ void cli_print_unfit(const char *lines, const char *label, int width)
         cli_print("%-*s %.*s\n", width, at == lines ? label : "", (int)strcspn(at, "\n"), at);
 }
 
+/* Two figures of an error that differ by less than this factor are printed as one. */
+#define SAME_ERROR 0.95
+
 /* Errors of volumes and derivatives. */
 static void print_derivatives(const sdm_verdict *v)
 {
@@ -70,9 +73,14 @@ static void print_derivatives(const sdm_verdict *v)
         (int)v->derivative_shapes, cli_percent(v->derivative_error, text), v->derivative_by);
     if (v->volume_derivatives_bad[0] || v->volume_derivatives_small[0])
         printf("; of volumes: see `not for`");
-    else if (isfinite(v->volume_own_error))
+    else if (isfinite(v->volume_own_error)) {
         printf(", of volumes by %s %% (by %s)", cli_percent(v->volume_own_error, text),
                v->volume_own_by);
+        if (v->volume_derivative_error < SAME_ERROR * v->volume_own_error)
+            printf("; `info` states %s %%, because it counts a derivative as at least 5 %% of the "
+                   "volume over the range",
+                   cli_percent(v->volume_derivative_error, text));
+    }
     printf("\n");
 }
 

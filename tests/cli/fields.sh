@@ -93,7 +93,7 @@ expect 5 'the grid leaves the box.*bound or exact' sdmgen generate $model --size
 expect 0 - sdmgen generate $model --size 30,30,30 --outside bound -o bound.npy --quiet
 expect 0 - sdmgen generate $model --size 30,30,30 --outside exact -o exact.npy --quiet
 cmp -s bound.npy exact.npy && bad 'bound and exact are the same'
-expect 0 "the stated error, RMSE .* is that at the voxels of the model's own grid; between them the map errs more, at the surface by up to about [0-9.e-]+ mm RMS" \
+expect 0 "the stated error, RMSE .* is that at the voxels of the model's own grid; interpolation between them adds up to about [0-9.e-]+ mm RMS at the surface" \
     sdmgen generate $model -p a=4.2 --spacing 0.45 -o stated.npy
 expect 0 'clamped to it' sdmgen generate $model -p a=7 --policy clamp --spacing 0.45 --json -o c.npy
 expect 5 "parameter 'a' = 7" sdmgen generate $model -p a=7 --spacing 0.45 -o x.npy

@@ -20,11 +20,15 @@ typedef struct fit_shared_errors {
    less its distance along the gradient). */
 void sdm_fit_foot(const fit_problem *p, size_t i, double foot[3]);
 
-/* Compares n points by the places of their feet on the surface, which no error across the surface
-   changes. foot[n], distance[n]: mm. facets: standard deviation of errors of the surface itself,
-   mm. */
-void sdm_fit_shared_errors_of(const double (*foot)[3], const double *distance, size_t n,
-                              double facets, fit_shared_errors *out);
+/* Compares n points. place[n], foot[n], distance[n]: mm. facets: standard deviation of errors of
+   the surface itself, mm. Neighbours are found by the feet, which no error across the surface
+   changes: points that scatter farther than they are apart have neighbours of the same error as
+   they lie. Where they lie farther apart, neighbours are also found by their places, and the
+   smaller scatter of both counts: at an edge the feet of points that are far off the surface lie
+   together. */
+void sdm_fit_shared_errors_of(const double (*place)[3], const double (*foot)[3],
+                              const double *distance, size_t n, double facets,
+                              fit_shared_errors *out);
 
 /* The same of the points of a fit that belong to the surface: used[samples]. SDM_E_NOMEM. */
 sdm_status sdm_fit_shared_errors(const fit_problem *p, const bool *used, fit_shared_errors *out,

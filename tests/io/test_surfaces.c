@@ -96,6 +96,40 @@ static void test_flat_face(void **state)
     sdm_mesh_dispose(&m);
 }
 
+/* Number of red pixels of a gallery of one mesh. */
+static double red_pixels(const sdm_mesh *m)
+{
+    sdm_error err;
+    const sdm_picture_surface s = {"x", m, NULL};
+    if (sdm_picture_gallery("test_backs.png", &s, 1, "", &err)) fail_msg("%s", err.text);
+    const picture p = read_png("test_backs.png");
+    double n = 0;
+    for (size_t i = 0; i < (size_t)p.w * (size_t)p.h; i++)
+        n += p.rgb[3 * i] > p.rgb[3 * i + 1] + 40 && p.rgb[3 * i] > p.rgb[3 * i + 2] + 40;
+    free(p.rgb);
+    return n;
+}
+
+/* A square seen from its inner side is red, seen from its outer side it is not. The red one above
+ * the other hides it only where it lies in front. */
+static void test_inner_sides_are_red(void **state)
+{
+    (void)state;
+    sdm_mesh m = {0};
+    double values[8];
+    square_append(&m, values, 5, 0, 0);
+    assert_true(red_pixels(&m) == 0);
+    square_append(&m, values, 2, 1, 0);
+    for (size_t t = 2; t < 4; t++) { // turn the small one over
+        const uint32_t corner = m.tri[3 * t + 1];
+        m.tri[3 * t + 1] = m.tri[3 * t + 2];
+        m.tri[3 * t + 2] = corner;
+    }
+    const double pixels = 400 / (10 * (0.5 * sqrt(3) + 0.5));
+    assert_true(fabs(red_pixels(&m) / (8 * pixels * pixels) - 1) < 0.05); // half as high as wide
+    sdm_mesh_dispose(&m);
+}
+
 /* Five surfaces stand in two rows of three columns: the coloured fifth is below the middle of the
  * first row. It is a square of 10 mm, whose oblique view is half as high as wide. */
 static void test_gallery(void **state)
@@ -110,7 +144,7 @@ static void test_gallery(void **state)
     if (sdm_picture_gallery("test_gallery.png", s, 5, "distance", &err)) fail_msg("%s", err.text);
     const picture p = read_png("test_gallery.png");
     double n = 0, sum_x = 0, sum_y = 0;
-    for (int y = 0; y < p.h - 70; y++) // without the colour bars
+    for (int y = 0; y < p.h - 92; y++) // without the colour bars
         for (int x = 0; x < p.w; x++) {
             const unsigned char *c = p.rgb + 3 * ((size_t)y * (size_t)p.w + (size_t)x);
             if (!(c[0] > c[1] + 20 && c[2] > c[1] + 10)) continue;
@@ -203,6 +237,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_hidden_parts_colours_and_scale),
         cmocka_unit_test(test_flat_face),
+        cmocka_unit_test(test_inner_sides_are_red),
         cmocka_unit_test(test_gallery),
         cmocka_unit_test(test_long_titles_are_broken),
         cmocka_unit_test(test_wrong_arguments_are_refused),

@@ -71,8 +71,9 @@ typedef struct sdm_picture_surface {
 SDM_API sdm_status sdm_picture_surfaces(const char *path, const sdm_picture_surface *surfaces,
                                         size_t n, const char *caption, sdm_error *err);
 
-/* Draws surfaces[n], 1 to 16, seen obliquely, in rows of equal length. Scale, values, caption and
-   errors are those of sdm_picture_surfaces(). */
+/* Draws surfaces[n], 1 to 16, seen obliquely, in rows of equal length. The inner sides of surfaces
+   are red: those of parts that are inside out, and those seen through a hole. Scale, values,
+   caption and errors are those of sdm_picture_surfaces(). */
 SDM_API sdm_status sdm_picture_gallery(const char *path, const sdm_picture_surface *surfaces,
                                        size_t n, const char *caption, sdm_error *err);
 

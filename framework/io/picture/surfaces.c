@@ -24,8 +24,12 @@ enum {
     TOP = 46,
     GAP = 20,
     BAR = 14,
-    FOOT = 64 /* colour bars with numbers and caption */
+    FOOT = 64, /* colour bars with numbers and caption */
+    NOTE = 22  /* the line about back sides */
 };
+
+/* The colour of back sides in a gallery. */
+static const sdm_colour BACK = {220, 50, 32};
 
 /* A direction of view: axis[0] points to the right, axis[1] upwards, axis[2] to the viewer. */
 typedef struct view {
@@ -47,6 +51,7 @@ typedef struct scene {
     const sdm_picture_surface *surfaces;
     size_t n, columns;
     int first_view; /* the surfaces are drawn in this view and those after it */
+    bool backs;     /* back sides have the colour BACK */
     /* bounding boxes of all surfaces in the planes of the views, mm */
     double low[N_VIEWS][2], high[N_VIEWS][2];
     double pixels; /* per mm */
@@ -172,8 +177,9 @@ typedef struct corner {
     double x, y, z, value, normal[3];
 } corner;
 
-/* Renders a triangle; plain: in one colour, whatever the values. */
-static void draw_triangle(const scene *sc, raster *r, const view *v, const corner c[3], bool plain)
+/* Renders a triangle; flat: in this colour, or NULL: in the colours of its values. */
+static void draw_triangle(const scene *sc, raster *r, const view *v, const corner c[3],
+                          const sdm_colour *flat)
 {
     const double area =
         (c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[2].x - c[0].x) * (c[1].y - c[0].y);
@@ -201,7 +207,7 @@ static void draw_triangle(const scene *sc, raster *r, const view *v, const corne
             for (int d = 0; d < 3; d++)
                 n[d] = b[0] * c[0].normal[d] + b[1] * c[1].normal[d] + b[2] * c[2].normal[d];
             for (int k = 0; k < 3; k++) value += b[k] * c[k].value;
-            const sdm_colour base = plain ? (sdm_colour){214, 208, 196} : colour_of(sc, value);
+            const sdm_colour base = flat ? *flat : colour_of(sc, value);
             const double light = brightness(n, v);
             r->depth[at] = z;
             r->rgb[3 * at] = (uint8_t)(base.r * light + 0.5);
@@ -233,6 +239,7 @@ static void corner_normal(const fans *f, size_t t, size_t v, double n[3])
 static void draw_surface(const scene *sc, raster *r, int view_index, const sdm_picture_surface *p,
                          const fans *f)
 {
+    static const sdm_colour PLAIN = {214, 208, 196};
     const view *v = &VIEWS[view_index];
     const double scale = sc->pixels * FINE,
                  middle[2] = {0.5 * (sc->low[view_index][0] + sc->high[view_index][0]),
@@ -248,7 +255,8 @@ static void draw_surface(const scene *sc, raster *r, int view_index, const sdm_p
             c[k].value = p->values ? p->values[i] : 0;
             corner_normal(f, t, i, c[k].normal);
         }
-        draw_triangle(sc, r, v, c, !p->values);
+        const bool back = dot(f->cross + 3 * t, v->axis[2]) < 0;
+        draw_triangle(sc, r, v, c, back && sc->backs ? &BACK : p->values ? NULL : &PLAIN);
     }
 }
 
@@ -356,15 +364,24 @@ static sdm_status draw_surfaces(const char *path, const sdm_picture_surface *sur
         const sdm_status s = sdm_mesh_audit(surfaces[k].mesh, &audit, err);
         if (s) return sdm_fail_in(err, s, "surface %zu of the picture", k);
     }
-    scene sc = {.surfaces = surfaces, .n = n, .columns = columns, .first_view = first_view};
+    scene sc = {.surfaces = surfaces,
+                .n = n,
+                .columns = columns,
+                .first_view = first_view,
+                .backs = first_view == OBLIQUE};
     sdm_canvas *c = NULL;
     scene_measure(&sc);
     scene_place(&sc);
-    const int rows = (int)((n + columns - 1) / columns), foot = has_values(&sc) ? FOOT : 0,
+    const int rows = (int)((n + columns - 1) / columns),
+              foot = (has_values(&sc) ? FOOT : 0) + (sc.backs ? NOTE : 0),
               h = rows * row_height(&sc) + GAP + foot;
     sdm_status s =
         sdm_canvas_create(path, 2 * SIDE + (int)columns * (sc.width + GAP) - GAP, h, &c, err);
     if (s || !c) return s;
+    if (sc.backs)
+        sdm_canvas_text(c, SIDE, h - 10, (sdm_type){.size = 9, .colour = SDM_INK_LIGHT},
+                        "red, if any: the inner side of a surface. A part is inside out, or the "
+                        "mesh has a hole.");
     s = draw_scene(&sc, c, h - foot, caption, err);
     if (!s) return sdm_canvas_finish(c, err);
     sdm_canvas_discard(c);

@@ -35,8 +35,10 @@ bool cli_warn_thin_model(const char *path, const sdm_model_info *m, const sdm_gr
     const double thick = m->quality.thickness_mm,
                  voxel = fmax(sdm_grid_coarsest(&m->grid), sdm_grid_coarsest(g));
     const bool thin = sdm_too_thin(thick, voxel);
-    if (thin)
-        cli_warn("%s: a part of its shapes is " CLI_THIN_PART, path, thick, voxel, 0.5 * thick);
+    sdm_text text = {0};
+    if (thin) cli_add_thin(thick, voxel, &text);
+    if (thin) cli_warn("%s: a part of its shapes is %s", path, text.failed ? "thin" : text.data);
+    sdm_text_dispose(&text);
     return thin;
 }
 

@@ -351,13 +351,25 @@ bool cli_describe_folded(const sdm_part_audit *a, sdm_text *text)
     return true;
 }
 
+void cli_add_thin(double thick, double voxel, sdm_text *text)
+{
+    sdm_text_add(text,
+                 "%.2g mm thick, too thin for voxels of %.3g mm: it will be missing or broken in "
+                 "surfaces; ",
+                 thick, voxel);
+    if (sdm_hopelessly_thin(thick, voxel))
+        sdm_text_add(text, "no grid of the whole shape shows it: are its vertices, or a length of "
+                           "it, in another unit than mm?");
+    else
+        sdm_text_add(text, "a spacing of at most %.2g mm shows it", 0.5 * thick);
+}
+
 void cli_describe_thin(const sdm_part_audit *a, size_t index, double voxel, sdm_text *text)
 {
     const sdm_part *p = &a->part[index];
-    sdm_text_add(text,
-                 "part %zu of %zu (box %.4g..%.4g, %.4g..%.4g, %.4g..%.4g mm) is " CLI_THIN_PART,
-                 index + 1, a->n, p->min[0], p->max[0], p->min[1], p->max[1], p->min[2], p->max[2],
-                 p->thick, voxel, 0.5 * p->thick);
+    sdm_text_add(text, "part %zu of %zu (box %.4g..%.4g, %.4g..%.4g, %.4g..%.4g mm) is ", index + 1,
+                 a->n, p->min[0], p->max[0], p->min[1], p->max[1], p->min[2], p->max[2]);
+    cli_add_thin(p->thick, voxel, text);
 }
 
 static void warn_open(const sdm_part_audit *audit)

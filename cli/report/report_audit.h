@@ -73,11 +73,9 @@ bool cli_warn_mesh(const sdm_mesh *mesh, double voxel, const char *mend);
 /* Turns the parts of the mesh that are inside out (--turn-parts) and says how many. */
 sdm_status cli_turn_parts(sdm_mesh *mesh, sdm_error *err);
 
-/* What is said of a part that is too thin. printf(): its thickness, the voxel, the spacing that
- * shows it, mm */
-#define CLI_THIN_PART                                                                              \
-    "%.2g mm thick, too thin for voxels of %.3g mm: it will be missing or broken in surfaces; a "  \
-    "spacing of at most %.2g mm shows it"
+/* Adds what is said of a part that is too thin for voxels of this size: "0.2 mm thick, too thin for
+ * ...". */
+void cli_add_thin(double thick, double voxel, sdm_text *text);
 
 /* What to do about an inside-out part: of the mesh of a shape, and of a mesh file. */
 #define CLI_MEND_SHAPE "reverse the vertices of these triangles in mesh() of the shape"

@@ -88,9 +88,10 @@ static void print_derivatives(const sdm_verdict *v)
 static void print_still(const sdm_verdict *v)
 {
     if (v->still_params[0])
-        printf(
-            "  no effect   %s %s no part of the surface: at most vertices inside of other parts\n",
-            v->still_params, strchr(v->still_params, ',') ? "move" : "moves");
+        printf("  no effect   %s %s no part of the surface that the maps show: only vertices "
+               "inside of "
+               "other parts, or by far less than a voxel\n",
+               v->still_params, strchr(v->still_params, ',') ? "move" : "moves");
 }
 
 void cli_print_measurements(const sdm_verdict *v)

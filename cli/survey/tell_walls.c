@@ -26,6 +26,16 @@ static void tell_crossing(teller *t)
     teller_tell(t, SDM_E_QUALITY, &text);
 }
 
+/* The parameter of which mesh() seems to convert the length, and which moves this part; n_params:
+ * none. */
+static size_t converted_param(const sdm_shape_survey *f, size_t part)
+{
+    for (size_t k = 0; k < f->n_params && f->unit; k++)
+        for (size_t i = 0; i < f->unit[k].moved && i < SDM_SURVEY_NAMED; i++)
+            if (f->unit[k].name && !f->unit[k].whole && f->unit[k].part[i] == part) return k;
+    return f->n_params;
+}
+
 /* One line about parts a thousand times shorter than others. */
 static void tell_tiny(teller *t)
 {
@@ -45,9 +55,14 @@ static void tell_tiny(teller *t)
     teller_add_params(t->s, c->worst, SIZE_MAX, &text);
     sdm_text_add(&text, " (");
     teller_add_share(t->s, c, &text);
-    sdm_text_add(&text,
-                 "): are the vertices of one of them in another unit than mm? Multiply "
-                 "those in m by 1000, those in um by 0.001; if it is a leftover speck, remove it");
+    sdm_text_add(&text, ")");
+    const size_t k = converted_param(&t->s->found, part[0]);
+    if (k < t->s->found.n_params)
+        sdm_survey_ask_unit(&t->s->found, t->s->shape, k, &text);
+    else
+        sdm_text_add(&text, ": are the vertices of one of them in another unit than mm? Multiply "
+                            "those in m by 1000, those in um by 0.001; if it is a leftover speck, "
+                            "remove it");
     teller_tell(t, SDM_E_QUALITY, &text);
 }
 

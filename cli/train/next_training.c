@@ -252,9 +252,10 @@ static bool print_finer(const cli_args *args, const sdm_train_report *r, const c
     }
     if (!print_command("  better      ", args, r, &finer, kind)) return false;
     printf(
-        "              (%sthe finer grid is for %s, see `not for`; it has %.2g times the voxels; "
+        "              (%sthe finer grid is for %s, see `not for`%s; it has %.2g times the voxels; "
         "%s, because the error at the surface is only %.2g voxels)\n",
-        open, use, factor, wait, voxels);
+        open, use, strstr(use, "fits") ? ": sdmgen fit --shape needs no network" : "", factor, wait,
+        voxels);
     return true;
 }
 

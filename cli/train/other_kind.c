@@ -59,6 +59,7 @@ static bool print_far(const sdm_train_report *r)
 static bool print_slow(const sdm_train_report *r, const cli_timing *times)
 {
     const bool known = r->compared || r->tried;
+    if (sdm_verdict_broken(&r->verdict)) return false;
     const double other = known ? r->other_ms : NAN;
     const bool slow = times->ms_exact < SLOW * times->ms_network,
                faster = r->compared && r->other_grade != SDM_GRADE_POOR &&

@@ -144,6 +144,11 @@ faulty converted 4 "^warning +$told"
 [ "$(grep -cE '^(warning|broken)' out)" -eq 1 ] || bad "a converted length has consequences: $(cat out)"
 sdmgen shapes test faulty -O fault=converted --plugin "$plugin" --samples 4 >out 2>err
 has "^doubtful units +$told"
+# The length makes the part tiny: the line about the part asks for the factor, not to multiply its vertices.
+faulty ringlet 4 "^warning +part 2 of 2 \(.*\) is [0-9]+ times smaller than part 1 of 2 \(.*\) at .*\): does mesh\(\) multiply 'reach' by 0\.001\?$"
+if grep -q 'Multiply those in m' out; then bad "vertices of a converted length are to be multiplied: $(cat out)"; fi
+sdmgen exact --shape faulty -O fault=ringlet --plugin "$plugin" --spacing 0.2 -o ringlet.stl 2>err
+grep -q 'is 0\.00[0-9]* mm thick, .* no grid of the whole shape shows it: are its vertices, or a length of it, in another unit than mm?$' err || bad "thin part: $(cat err)"
 expect 0 - sdmgen shapes check faulty -O fault=mixed --plugin "$plugin" --samples 16
 has "^note +'size' moves part 2 by 0\.0005 mm per mm, part 1 by 1\.7: is it in m in one place\?$"
 expect 0 - sdmgen shapes check faulty -O fault=lever --plugin "$plugin" --samples 16

@@ -112,9 +112,11 @@ static void grid_or_key(void **state)
     next_lines(&r, 1, text, second);
     assert_string_equal(text, "  better      sdmgen train can.yaml grid=auto grid.spacing=1.2 "
                               "train.minutes=16 network.kind=template --out run-2 " COMPARE);
-    assert_string_equal(second, "              (the finer grid is for fits by the network alone, "
-                                "see `not for`; it has 16 times the voxels; network.rank can wait, "
-                                "because the error at the surface is only 0.008 voxels)\n");
+    assert_string_equal(second,
+                        "              (the finer grid is for fits by the network alone, "
+                        "see `not for`: sdmgen fit --shape needs no network; it has 16 times "
+                        "the voxels; network.rank can wait, because the error at the "
+                        "surface is only 0.008 voxels)\n");
     r.verdict.thickness_mm = 30;
     next_lines(&r, 1, text, second);
     assert_string_equal(text, "  better      network.rank can wait: the error at the surface is "
@@ -205,7 +207,8 @@ static void finer_grid_leaves_kind_open(void **state)
                         "              (network.kind stays auto: this run had no time to "
                         "try template; at its pace the train.minutes of this command are "
                         "enough for both kinds; with network.kind=pod 16 are enough; the finer "
-                        "grid is for fits by the network alone, see `not for`; it has 8 times the "
+                        "grid is for fits by the network alone, see `not for`: sdmgen fit --shape "
+                        "needs no network; it has 8 times the "
                         "voxels; nothing else needs to change, because the error at the surface is "
                         "only 0.01 voxels)\n");
 }

@@ -22,7 +22,7 @@ static const sdm_option FAULTY_OPTIONS[] = {
      "edge|centimetres|small|wall|step|apart|within|twins|changed|moved|wound|behind|unset|"
      "meets|groups|crumb|spare|offset|around|unlisted|sticky|diagonal|negative|window|swapped|"
      "cache|caches|lapse|pair|hidden|grows|posts|"
-     "inverted|averted|converted|mixed|lever|tenfold",
+     "inverted|averted|converted|mixed|lever|tenfold|ringlet",
      "x"}};
 
 /* Writes box number `box`: 8 vertices, 12 triangles. */
@@ -228,6 +228,9 @@ static int faulty_mesh(const void *self, const sdm_host *host, const sdm_option_
     if (!strcmp(fault, "tenfold")) handle[1][0] = p[0] + 10 * reach;
     // `converted`: a length in m among others in mm; `mixed`: the size is in m in the handle alone;
     // `lever`: it moves the handle as little, but not everywhere alike
+    // `ringlet`: all three edges of the handle are a length in m, its place is in mm
+    for (size_t i = 0; i < 6 && !strcmp(fault, "ringlet"); i++)
+        handle[i / 3][i % 3] = (i % 3 ? 0 : p[0]) + (i < 3 ? -0.001 : 0.001) * reach;
     if (!strcmp(fault, "converted")) handle[1][0] = p[0] + 0.001 * reach;
     if (!strcmp(fault, "mixed") || !strcmp(fault, "lever")) {
         const double more = !strcmp(fault, "mixed") ? 0.0005 * p[0] : 0.0001 * p[0] * p[0];

@@ -467,6 +467,24 @@ static void unfinished_names_one_change(void **state)
     assert_string_equal(v.key, "grid.spacing");
 }
 
+// A part that no grid shows: the shape is to be mended, no key to be changed.
+static void hopelessly_thin_part(void **state)
+{
+    (void)state;
+    const sdm_config c = config_of(NULL, 0);
+    const verdict_input in = {.config = &c, .maps = 200, .steps = 1500, .budget = 1000};
+    sdm_verdict v = figures();
+    v.coarse_mm = v.voxel_mm, v.thickness_mm = 0.004;
+    v.part_mm2[SDM_CAUSE_BASES] = 8e-5;
+    trainer_verdict_decide(&in, &v);
+    assert_string_equal(v.key, "");
+    assert_int_equal(v.grade, SDM_GRADE_POOR);
+    assert_non_null(strstr(v.sentence,
+                           "The thinnest part is 0.004 mm thick, 200 times thinner than "
+                           "a voxel: no grid of the whole shape shows it. Is one of its "
+                           "lengths in another unit than mm?"));
+}
+
 // The text of a grade leaves out what other figures exclude, says of a poor model that it is not
 // for use, and why; and the verdict advises one spacing.
 static void uses_and_spacing(void **state)
@@ -586,6 +604,13 @@ static void uses_and_spacing(void **state)
                         "not for use: whole voxels are on the wrong side");
     v.thickness_mm = 0.5;
     assert_string_equal(sdm_grade_text(&v, text), "not for use: its thinnest part is missing");
+    // no grid shows a part of a 200th of a voxel: there is none to advise
+    v.thickness_mm = 0.004;
+    sdm_verdict_unfit(&v, lines);
+    assert_non_null(strstr(lines, "its thinnest part: it is 0.004 mm thick in a few held-out "
+                                  "shapes, which no grid of the whole shape shows"));
+    v.key[0] = '\0';
+    assert_true(isnan(sdm_verdict_spacing(&v)));
     v.cut = 0.6;
     assert_non_null(strstr(sdm_grade_text(&v, text), "not for use: its grid cuts 60 % of"));
     v.inside_out = 1;
@@ -823,6 +848,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(grid_limits),
         cmocka_unit_test(grades),
         cmocka_unit_test(few_heldout_shapes),
+        cmocka_unit_test(hopelessly_thin_part),
         cmocka_unit_test(uses_and_spacing),
         cmocka_unit_test(unfinished_names_one_change),
         cmocka_unit_test(triangles_change),

@@ -339,6 +339,14 @@ static void tell_broken(sdm_verdict *v)
     v->limited = false;
     v->key[0] = 0;
     v->at_best_mm = NAN;
+    if (!(v->inside_out > 0) && !(v->open > 0)) {
+        snprintf(v->sentence, sizeof v->sentence,
+                 "The thinnest part is %.2g mm thick, %.0f times thinner than a voxel: no grid of "
+                 "the whole shape shows it. Is one of its lengths in another unit than mm? Mend "
+                 "mesh() of the shape first (sdmgen shapes check names the part).",
+                 v->thickness_mm, v->coarse_mm / v->thickness_mm);
+        return;
+    }
     snprintf(v->sentence, sizeof v->sentence, "%s",
              v->inside_out > 0
                  ? "Parts of the meshes are inside out and vanish where they overlap others: "

@@ -59,7 +59,10 @@ bool sdm_verdict_voxels_cut(const sdm_verdict *v)
            sdm_voxels_explain_volume(v->surface_volume_error, v->volume_error);
 }
 
-bool sdm_verdict_broken(const sdm_verdict *v) { return v->inside_out > 0 || v->open > 0; }
+bool sdm_verdict_broken(const sdm_verdict *v)
+{
+    return v->inside_out > 0 || v->open > 0 || sdm_hopelessly_thin(v->thickness_mm, v->coarse_mm);
+}
 
 bool sdm_verdict_errs_near(const sdm_verdict *v)
 {
@@ -151,6 +154,7 @@ double sdm_verdict_fit_spacing(const sdm_verdict *v)
 double sdm_verdict_spacing(const sdm_verdict *v)
 {
     if (!strcmp(v->key, "grid.spacing")) return v->to;
+    if (sdm_hopelessly_thin(v->thickness_mm, v->coarse_mm)) return NAN;
     if (sdm_verdict_lacks_part(v)) return rounded_down(0.5 * v->thickness_mm);
     return sdm_verdict_voxels_cut(v) ? sdm_spacing_for_volume(v->coarse_mm, v->surface_volume_error)
                                      : NAN;

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "sdm/internal/part_audit.h"
 #include "sdm/internal/shape_box.h"
 #include "sdm/internal/verdict.h"
 
@@ -53,7 +54,12 @@ static void add_parts(const sdm_verdict *v, unfit_lines *l)
         add(l, "distances far from the surface: wrong by up to %.2g mm", v->far_largest_mm);
     if (v->volume_error > SDM_VOLUME_BAD)
         add(l, "volumes of maps: off by %s %%", percent(v->volume_error, text));
-    if (sdm_verdict_lacks_part(v))
+    if (sdm_hopelessly_thin(v->thickness_mm, v->coarse_mm))
+        add(l,
+            "its thinnest part: it is %.2g mm thick in a few held-out shapes, which no grid of the "
+            "whole shape shows: is one of its lengths in another unit than mm?",
+            v->thickness_mm);
+    else if (sdm_verdict_lacks_part(v))
         add(l,
             "its thinnest part and volumes of surfaces (.stl): it is %.2g mm thick in a few "
             "held-out shapes, too thin for "

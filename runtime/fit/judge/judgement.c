@@ -207,7 +207,7 @@ static void check_residuals(const fit_problem *p, const fit_misfit *own, const f
         sdm_fit_check_sparse_points(p, v);
         return;
     }
-    if (points && !refused && sdm_fit_doubt_given_scatter(p, v)) return;
+    if (points && !refused && sdm_fit_doubt_given_scatter(p, shared, v)) return;
     // errors as large as a neighbourhood are judged by the places to which the points belong
     if (points && !refused && feet->chi_square[1] / feet->limit[1] < beyond) m = feet;
     if (points && m->chi_square[1] <= m->limit[1] && doubt_shared_errors(p, shared, v)) return;

@@ -185,19 +185,26 @@ static sdm_status trimmed_sd(const fit_problem *p, double *sd, sdm_error *err)
     return SDM_OK;
 }
 
-/* Does the scatter contradict the given standard deviation, far beyond its precision and without
- * the outliers? */
-static bool is_contradicted(const fit_problem *p, given_scatter g)
+/* Do the points contradict the given standard deviation, without the outliers? The scatter of the
+ * nearest points does far beyond its precision; so does the error that neighbours share, which is a
+ * part of the given one. */
+static bool is_contradicted(const fit_problem *p, given_scatter g, const fit_shared_errors *shared)
 {
+    const double most = SCATTER_FAILED * hypot(p->state.point_sd, sdm_fit_network_error(p));
     double sd;
-    return g.over > g.limit && !(p->opts->tolerance > 0) && !trimmed_sd(p, &sd, NULL) &&
-           sd > SCATTER_FAILED * sqrt(g.limit) * hypot(p->state.point_sd, sdm_fit_network_error(p));
+    if (!(g.over > g.limit) || p->opts->tolerance > 0) return false;
+    if (shared && shared->n &&
+        shared->all * shared->all - shared->near * shared->near > most * most)
+        return true;
+    return !trimmed_sd(p, &sd, NULL) && sd > most * sqrt(g.limit);
 }
 
-static void add_scatter(const fit_problem *p, given_scatter g, sdm_fit_verdict *v)
+static void add_scatter(const fit_problem *p, given_scatter g, const fit_shared_errors *shared,
+                        sdm_fit_verdict *v)
 {
     sdm_fit_judge_add(v, SDM_FIT_CHECK_RESIDUALS, g.over <= g.limit,
-                      is_contradicted(p, g) ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, g.over, g.limit,
+                      is_contradicted(p, g, shared) ? SDM_FIT_FAILED : SDM_FIT_DOUBTFUL, g.over,
+                      g.limit,
                       "the points scatter by %.2g mm about the surface, but %.2g mm are given as "
                       "their standard deviation: another shape, or their standard deviation is "
                       "larger",
@@ -214,15 +221,16 @@ void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v)
                           "(sdm_fit_opts.keep_appearance)");
         return;
     }
-    add_scatter(p, scatter_of(p, 1), v);
+    add_scatter(p, scatter_of(p, 1), NULL, v);
 }
 
-bool sdm_fit_doubt_given_scatter(const fit_problem *p, sdm_fit_verdict *v)
+bool sdm_fit_doubt_given_scatter(const fit_problem *p, const fit_shared_errors *shared,
+                                 sdm_fit_verdict *v)
 {
     if (!p->opts->keep_appearance) return false;
     const given_scatter g = scatter_of(p, fmax(p->noise_factor, 1));
     if (g.over <= g.limit) return false;
-    add_scatter(p, g, v);
+    add_scatter(p, g, shared, v);
     return true;
 }
 

@@ -2,6 +2,7 @@
    voxels of the maps. */
 #pragma once
 
+#include "fit/points/shared_errors.h"
 #include "residuals.h"
 
 /* Adds the findings "data" and "size" of a fit to points. noise_factor: see sdm_fit_result.
@@ -19,9 +20,10 @@ void sdm_fit_check_sparse_points(const fit_problem *p, sdm_fit_verdict *v);
 sdm_status sdm_fit_points_sd(const fit_problem *p, double *sd, sdm_error *err);
 
 /* Of any fit to points whose options keep the standard deviation of the points: adds the finding
- * "residuals", doubtful or failed, if the points lie farther off the surface than that. Returns
- * whether it did. */
-bool sdm_fit_doubt_given_scatter(const fit_problem *p, sdm_fit_verdict *v);
+ * "residuals", doubtful or failed, if the points lie farther off the surface than that. shared: the
+ * errors that neighbours have in common. Returns whether it did. */
+bool sdm_fit_doubt_given_scatter(const fit_problem *p, const fit_shared_errors *shared,
+                                 sdm_fit_verdict *v);
 
 /* What the voxels of the maps show. */
 typedef struct fit_coarseness {

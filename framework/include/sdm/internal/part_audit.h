@@ -164,6 +164,10 @@ double sdm_part_audit_thickness(const sdm_part_audit *a);
  * sqrt(2) voxels. false if the thickness is NaN. */
 static inline bool sdm_too_thin(double thick, double voxel) { return thick < 1.4142 * voxel; }
 
+/* Is it so thin that no grid of the whole shape shows it? Such a grid would have over 2^18 times
+ * the voxels. Mostly a length of the shape is in another unit than mm. */
+static inline bool sdm_hopelessly_thin(double thick, double voxel) { return 32 * thick < voxel; }
+
 /* Orients the parts of the mesh: reverses those that the engine would turn and those of the state
  * SDM_PART_INSIDE_OUT, so that every closed part is solid or a cavity. *n = number of parts
  * reversed. Errors as sdm_mesh_audit(); the mesh is then unchanged. */

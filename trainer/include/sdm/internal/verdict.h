@@ -167,8 +167,8 @@ bool sdm_verdict_surfaces_off(const sdm_verdict *v);
    better. [any thread] */
 bool sdm_verdict_voxels_cut(const sdm_verdict *v);
 
-/* Are parts of the meshes inside out, or edges open? Then neither network nor maps are the cause.
- */
+/* Are parts of the meshes inside out, or edges open, or is a part so thin that no grid shows it
+   (sdm_hopelessly_thin())? Then neither network nor maps are the cause. */
 bool sdm_verdict_broken(const sdm_verdict *v);
 
 /* At the surface the model is not good, by its error within a voxel, its Dice overlap or volumes

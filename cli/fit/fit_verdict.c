@@ -1,4 +1,4 @@
-/* Shows the verdict of a fit: what was checked, with its figure and the bound that it needs. */
+/* Shows the verdict of a fit: what was checked, with its figure and the limit of the figure. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -16,51 +16,8 @@ const char *cli_fit_grade_name(sdm_fit_grade grade)
     return words[grade];
 }
 
-/* What the figure of a check is. */
-static const char *const MEANINGS[SDM_FIT_N_CHECKS] = {
-    [SDM_FIT_CHECK_NO_SHAPE] = "gain over an image without the shape",
-    [SDM_FIT_CHECK_CONTRAST] = "mean value inside minus mean value outside",
-    [SDM_FIT_CHECK_CAVITY] = "radius of the largest ball in the shape, mm",
-    [SDM_FIT_CHECK_IN_IMAGE] = "share of the shape that lies in the image",
-    [SDM_FIT_CHECK_CONVERGED] = "iterations",
-    [SDM_FIT_CHECK_RESIDUALS] = "residuals inside the surface over noise",
-    [SDM_FIT_CHECK_BESIDE] = "residuals outside of the surface over noise",
-    [SDM_FIT_CHECK_EMPTY] = "share of the shape that is of another material",
-    [SDM_FIT_CHECK_MISSING] = "the shape's material beside it, over its volume",
-    [SDM_FIT_CHECK_INSIDE] = "spread of the values inside, fitted over measured",
-    [SDM_FIT_CHECK_OUTSIDE] = "spread of the values outside, fitted over measured",
-    [SDM_FIT_CHECK_GIVEN] = "mean values found, from those given, in sd",
-    [SDM_FIT_CHECK_BOUNDS] = "parameters at an end of their range",
-    [SDM_FIT_CHECK_BLOB] = "gain over an ellipsoid in its place",
-    [SDM_FIT_CHECK_KEPT_POSE] = "gain of a free pose",
-    [SDM_FIT_CHECK_MIRROR] = "gain over the mirror image",
-    [SDM_FIT_CHECK_GRID] = "depth of the border of the maps in the shape, mm",
-    [SDM_FIT_CHECK_NETWORK] = "share of the shapes that the model's grid cuts",
-    [SDM_FIT_CHECK_SIZE] = "spread of the points, mm",
-    [SDM_FIT_CHECK_VOXELS] = "voxel of the maps, mm",
-    [SDM_FIT_CHECK_NEXT_POSE] = "gain over the next best pose or parameter",
-    [SDM_FIT_CHECK_PATCH] = "share of the points that form another surface",
-    [SDM_FIT_CHECK_COVERED] = "share of the surface without points",
-    [SDM_FIT_CHECK_NETWORK_ERROR] = "move of a parameter by exact maps, in sd",
-    [SDM_FIT_CHECK_KEPT_PARAMS] = "gain of free parameters",
-    [SDM_FIT_CHECK_OFFSET] = "mean distance of the surface of the data, mm",
-};
-
-/* What the figure of this check is in this fit; points have no material. */
-static const char *meaning_of(const cli_fit *f, sdm_fit_check_kind kind)
-{
-    const bool points = f->target.kind == SDM_FIT_POINTS;
-    if (kind == SDM_FIT_CHECK_DATA)
-        return points ? "points on the surface" : "longest edge of a voxel of the labels, mm";
-    if (points && kind == SDM_FIT_CHECK_EMPTY)
-        return "space between the surface and points inside of it, over the volume";
-    if (points && kind == SDM_FIT_CHECK_MISSING)
-        return "space between the surface and points outside of it, over the volume";
-    return MEANINGS[kind];
-}
-
-/* The side of the limit on which the figure of a finding must lie. */
-static const char *bound_name(const sdm_fit_finding *x)
+/* Must the figure of a finding be at least the limit, not at most? */
+static bool needs_at_least(const sdm_fit_finding *x)
 {
     const bool above = x->figure >= x->limit;
     switch (x->kind) {
@@ -70,29 +27,48 @@ static const char *bound_name(const sdm_fit_finding *x)
     case SDM_FIT_CHECK_MIRROR:
     case SDM_FIT_CHECK_SIZE:
     case SDM_FIT_CHECK_NEXT_POSE:
-        return "at least";
+        return true;
     case SDM_FIT_CHECK_CONTRAST: // inside brighter or darker, as at the start
     case SDM_FIT_CHECK_DATA:     // a number of points, or the edge of a voxel
-        return above == (x->grade == SDM_FIT_PASSED) ? "at least" : "at most";
+        return above == (x->grade == SDM_FIT_PASSED);
     default:
-        return "at most";
+        return false;
     }
 }
 
-/* Prints one check: its name, grade and figure, and why it did not pass or what the figure is. */
-static void print_finding(const cli_fit *f, const sdm_fit_finding *x)
+/* Prints one check: its name, grade and figure, and why it did not pass. */
+static void print_finding(const sdm_fit_finding *x)
 {
     char figure[64] = "";
     int n = 0;
     // + 0: no negative zero
     if (!isnan(x->figure)) n = snprintf(figure, sizeof figure, "%.3g", x->figure + 0);
     if (!isnan(x->limit))
-        snprintf(figure + n, sizeof figure - (size_t)n, ", need %s %.3g", bound_name(x), x->limit);
-    printf("  %-12s %-9s", sdm_fit_check_name(x->kind), GRADES[x->grade]);
-    if (*x->text)
-        printf(" %s%s%s\n", figure, *figure ? ": " : "", x->text);
-    else
-        printf(" %-28s %s\n", figure, meaning_of(f, x->kind));
+        snprintf(figure + n, sizeof figure - (size_t)n, ", need at %s %.3g",
+                 needs_at_least(x) ? "least" : "most", x->limit);
+    printf("  %-12s %-9s %s%s%s\n", sdm_fit_check_name(x->kind), GRADES[x->grade], figure,
+           *figure && *x->text ? ": " : "", x->text);
+}
+
+/* Has a check passed without a remark? */
+static bool is_plain(const sdm_fit_finding *x) { return x->grade == SDM_FIT_PASSED && !*x->text; }
+
+/* Prints the names, figures and limits of the checks that passed without a remark. */
+static void print_passed(const sdm_fit_verdict *v)
+{
+    enum { A_LINE = 4 };
+    size_t n = 0, all = 0;
+    for (size_t i = 0; i < v->n_findings; i++) all += is_plain(&v->findings[i]);
+    for (size_t i = 0; i < v->n_findings; i++) {
+        const sdm_fit_finding *x = &v->findings[i];
+        if (!is_plain(x)) continue;
+        if (n % A_LINE == 0) printf("  %-12s ", n ? "" : "passed");
+        printf("%s", sdm_fit_check_name(x->kind));
+        if (!isnan(x->figure)) printf(" %.3g", x->figure + 0);
+        if (!isnan(x->limit)) printf(" %s %.3g", needs_at_least(x) ? ">=" : "<=", x->limit);
+        n++;
+        printf("%s", n == all ? "\n" : n % A_LINE ? ", " : ",\n");
+    }
 }
 
 void cli_fit_verdict_words(const cli_fit *f, char text[FIT_WORDS_MAX])
@@ -248,6 +224,10 @@ static const char *in_short(const cli_fit *f)
     if (finer)
         return "the maps are nearly too coarse, or the data differ from the shape as the lines "
                "below say: fit with finer maps, and look at a picture (-o fit.png)";
+    if (f->target.kind == SDM_FIT_POINTS &&
+        cli_fit_found(f, SDM_FIT_CHECK_OFFSET, SDM_FIT_DOUBTFUL, -INFINITY))
+        return "the object may differ from the shape by the length in the line `offset`: use the "
+               "values only if you can accept this";
     return "the data may differ from the shape as the lines below say: look at a picture "
            "(-o fit.png) before you use the values";
 }
@@ -281,7 +261,9 @@ void cli_fit_print_verdict(const cli_fit *f)
     // the worst first
     for (int grade = SDM_FIT_FAILED; grade >= SDM_FIT_PASSED; grade--)
         for (size_t i = 0; i < v->n_findings; i++)
-            if ((int)v->findings[i].grade == grade) print_finding(f, &v->findings[i]);
+            if ((int)v->findings[i].grade == grade && !is_plain(&v->findings[i]))
+                print_finding(&v->findings[i]);
+    print_passed(v);
     if (cli_fit_start_is_suspect(f) && f->opts.turns == SDM_FIT_TURNS_NONE &&
         !isnan(f->args->pose.rotation[0]))
         printf("  --rotation gives one start: without it the fit tries 60 rotations\n");

@@ -3,7 +3,8 @@
  * the verdict. The fit begins at the middle of the points with the shape's default parameters and
  * tries 60 rotations.
  * Usage: fit_points MODEL POINTS.csv [PLUGIN.so]
- * PLUGIN.so: the plug-in of the shape, which a model of a shape that is not built in needs here.
+ * PLUGIN.so: the plug-in of the shape. If the shape is known, built in or from the plug-in, the fit
+ * measures exact distances to it: for points this takes less time than maps of the network.
  * POINTS.csv: a header, then x,y,z in each line (mm). Exit code 4: the fit is not to be trusted. */
 #include <stdio.h>
 
@@ -56,7 +57,8 @@ static sdm_status fit_points(const sdm_model *model, const sdm_instance *shape, 
                              sdm_error *err)
 {
     const sdm_model_info *info = sdm_model_get_info(model);
-    const sdm_fit_source source = {.model = model, .shape = shape};
+    const sdm_fit_source source = {
+        .model = shape ? NULL : model, .shape = shape, .grid = info->grid};
     sdm_fit_opts opts = sdm_fit_defaults_for(info->grid.spacing[0]);
     opts.turns = SDM_FIT_TURNS_SPHERE;
     opts.n_turns = 60;
@@ -98,7 +100,6 @@ int main(int argc, char **argv)
     if (!s) s = sdm_registry_create(&registry, &err);
     if (!s) s = sdm_builtin_shapes_add(registry, &err);
     if (!s && argc == 4) s = sdm_registry_load(registry, argv[3], &err);
-    // with the shape itself, built in or of the plug-in, the fit measures the error of the network
     if (!s) s = sdm_runtime_instance(model, registry, &shape, &err);
     if (!s) s = fit_points(model, shape, argv[2], &err);
     if (s) fprintf(stderr, "fit_points: %s\n", err.text);

@@ -156,7 +156,10 @@ sdm_status sdm_fit_check(const sdm_fit_target *target, const sdm_fit_opts *o, sd
         return sdm_fail(err, SDM_E_ARG, "kind of turns %d is unknown", (int)o->turns);
     if (o->turns != SDM_FIT_TURNS_NONE && (o->n_turns < 1 || o->n_turns > 4096))
         return sdm_fail(err, SDM_E_ARG, "%zu turns, need 1 to 4096", o->n_turns);
-    if (o->max_iterations < 1) return sdm_fail(err, SDM_E_ARG, "0 iterations, need 1 or more");
+    if (o->max_iterations < 1)
+        return sdm_fail(
+            err, SDM_E_ARG,
+            "0 iterations, need 1 or more; sdm_fit_defaults_for() gives options to begin with");
     if (o->n_threads < 0)
         return sdm_fail(err, SDM_E_ARG, "%d threads, need 0 (all) or more", o->n_threads);
     if (o->keep_params && o->keep_pose)

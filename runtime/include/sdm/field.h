@@ -93,7 +93,12 @@ SDM_API sdm_status sdm_field_band(const sdm_field *f, const sdm_grid *grid, doub
    gradient and slopes, too. Errors as above.
 
    sdm_generate_grid() follows the options `check` and `max_error_mm`, as sdm_generate() does, on
-   the given grid. `error_mm` of the result is that of the network on its own grid. [any thread] */
+   the given grid. `error_mm` of the result is that of the network on its own grid.
+
+   Between two walls and beside edges the distance has ridges. There the network and the
+   interpolation between voxels err most, by up to a part of a voxel, and the gradient is shorter
+   than 1: below 0.7 take neither for exact. sdm_model_check_use(SDM_USE_DISTANCE) judges distances
+   far from the surface. [any thread] */
 SDM_API sdm_status sdm_generate_grid(const sdm_model *m, const double *params,
                                      const sdm_generate_opts *opts, const sdm_grid *grid,
                                      float *values, float *slopes, sdm_result *result,

@@ -48,6 +48,17 @@ static void show_search(progress_state *w, const sdm_fit_progress *p)
     cli_progress_show(&w->bar, "search", fraction, text);
 }
 
+/* The verdict: its checks, then the rivals of the fit. */
+static void show_verdict(progress_state *w, const sdm_fit_progress *p)
+{
+    char text[80] = "checks";
+    if (p->n_starts)
+        snprintf(text, sizeof text, "other poses and values: %zu of at most %zu", p->start,
+                 p->n_starts);
+    cli_progress_show(&w->bar, "verdict",
+                      p->n_starts ? (double)(p->start - 1) / (double)p->n_starts : 0, text);
+}
+
 /* Tells why a search or iterations follow a verdict: the maps are finer now, or the fit is refused
  * and goes on from another start. */
 static void tell_why_again(progress_state *w, const sdm_fit_progress *p)
@@ -85,7 +96,7 @@ static void show_progress(void *user, const sdm_fit_progress *p)
         return;
     }
     if (p->phase == SDM_FIT_JUDGE) {
-        cli_progress_show(&w->bar, "verdict", 0, "checks, and the shape in other poses");
+        show_verdict(w, p);
         return;
     }
     char text[140] = "";

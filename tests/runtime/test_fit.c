@@ -263,13 +263,17 @@ static void test_fit_to_points(void **state)
 /* What progress() was told of a search: highest numbers of starts by round, and whether start,
  * round and best start were always as documented. */
 typedef struct search_log {
-    size_t start[3], n_starts[3], calls_after;
+    size_t start[3], n_starts[3], calls_after, rivals;
     bool fits;
 } search_log;
 
 static void log_search(void *user, const sdm_fit_progress *p)
 {
     search_log *log = user;
+    if (p->phase == SDM_FIT_JUDGE && p->n_starts) { // rivals come in order
+        log->fits = log->fits && p->start == ++log->rivals && p->start <= p->n_starts;
+        return;
+    }
     if (p->round == 0 || p->round > 2) {
         log->calls_after += p->phase != SDM_FIT_SEARCH && log->start[2] > 0;
         log->fits = log->fits && p->start == 0 && p->n_starts == 0;
@@ -299,7 +303,7 @@ static void test_turned_starts_find_the_truth(void **state)
     o.progress = log_search;
     o.user = &log;
     sdm_fit_result r = fit(&t, &o);
-    assert_true(log.fits && log.calls_after > 0);
+    assert_true(log.fits && log.calls_after > 0 && log.rivals >= 3);
     assert_true(log.start[1] == 8 && log.n_starts[1] == 8);
     assert_true(log.start[2] == log.n_starts[2] && log.start[2] >= 1 && log.start[2] <= 4);
     o.progress = NULL;

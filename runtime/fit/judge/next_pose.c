@@ -97,7 +97,21 @@ typedef struct own_fit {
      * there; NULL: not known yet */
     fit_standing standing;
     double *field;
+    /* whose progress() hears of the rivals: how many were begun, of at most `all` */
+    const sdm_fit_opts *told;
+    size_t begun, all;
 } own_fit;
+
+// reports that the next rival begins
+static void tell_rival(fit_problem *p, own_fit *own)
+{
+    const sdm_fit_opts *quiet = p->opts;
+    p->opts = own->told;
+    p->search_start = ++own->begun, p->search_starts = own->all;
+    sdm_fit_tell_progress(p, SDM_FIT_JUDGE, 0);
+    p->search_start = p->search_starts = 0;
+    p->opts = quiet;
+}
 
 static void place_of(const sdm_grid *g, size_t v, double x[3])
 {
@@ -274,7 +288,7 @@ static sdm_status value_find(fit_problem *p, const own_fit *own, size_t k, fit_s
 
 // list[PARAMS_TRIED] = the parameters whose best other values explain the samples best; *n: how
 // many. The state of *p is that of the fit
-static sdm_status values_rank(fit_problem *p, const own_fit *own, fit_start *list, size_t *n,
+static sdm_status values_rank(fit_problem *p, own_fit *own, fit_start *list, size_t *n,
                               sdm_error *err)
 {
     sdm_status s = SDM_OK;
@@ -282,6 +296,7 @@ static sdm_status values_rank(fit_problem *p, const own_fit *own, fit_start *lis
     for (size_t k = 0; k < p->n_params && !s; k++) {
         if (fit_param_is_kept(p, k)) continue;
         fit_start one;
+        tell_rival(p, own);
         s = value_find(p, own, k, &one, err);
         if (!s && one.param) sdm_fit_start_insert(list, n, PARAMS_TRIED, &one);
     }
@@ -393,6 +408,7 @@ static sdm_status compare_climbs(fit_problem *p, own_fit *own, const turns *t, n
     const fit_start here = {.state = own->state};
     s = challenge(p, own, &here, SAME_SURFACE, &other, &fit, err);
     for (size_t i = 0; i < n && !s; i++) {
+        tell_rival(p, own);
         s = challenge(p, own, &list[i], SAME_SURFACE, &other, &rival, err);
         if (s || !other) continue;
         const bool worse = points && sdm_fit_gain(&fit, &rival) > -SDM_FIT_PREFERRED;
@@ -437,15 +453,18 @@ static sdm_status least_gain(fit_problem *p, own_fit *own, nearest *least, sdm_e
     if (!s) tell_symmetry(t, least);
     if (!s && p->has_runner_up) {
         const fit_start from = {.state = p->runner_up};
+        tell_rival(p, own);
         s = challenge(p, own, &from, alike, &other, &rival, err);
         if (!s && other) nearest_take(least, p, own, fit, &rival, false);
     }
     other = false;
     for (size_t i = 0; !s && i < t->n_other && i < TRIES_MAX && !other; i++) {
+        tell_rival(p, own);
         s = challenge(p, own, &t->other[i], alike, &other, &rival, err);
         if (!s && other) nearest_take(least, p, own, fit, &rival, false);
     }
     for (size_t i = 0; i < n_values && !s; i++) {
+        tell_rival(p, own);
         s = challenge(p, own, &value[i], alike, &other, &rival, err);
         if (!s && other) nearest_take(least, p, own, fit, &rival, true);
     }
@@ -485,6 +504,8 @@ sdm_status sdm_fit_judge_next_pose(fit_problem *p, double factor, sdm_fit_result
     if (!s) s = sdm_fit_maps_voxels(&p->maps, err);
     if (!s) s = own_create(p, &own, err);
     own.result = result;
+    own.told = given;
+    own.all = p->n_params + p->has_runner_up + TRIES_MAX + PARAMS_TRIED + CLIMBS_MAX;
     // of every `stride`-th voxel fewer count as one; where the shape does not explain the image,
     // the likelihood is less certain (Wedderburn 1974)
     own.factor = fmax(factor / pow((double)p->stride, 3), 1) * fmax(v->chi_square, 1);

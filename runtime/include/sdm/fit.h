@@ -131,7 +131,8 @@ typedef enum sdm_fit_phase {
     SDM_FIT_MAIN = 1,
     /* steps with exact maps after the fit with a network */
     SDM_FIT_POLISH = 2,
-    /* checks, and comparisons with rivals, after the last step: one call at the beginning */
+    /* after the last step: one call before the checks, and one before each rival, with the fields
+       `start` and `n_starts` of sdm_fit_progress */
     SDM_FIT_JUDGE = 3
 } sdm_fit_phase;
 
@@ -149,7 +150,8 @@ typedef struct sdm_fit_progress {
     sdm_pose pose;
     /* in a search with several starts: the round (1: every start, with a wide point spread; 2: the
        best of them), the number of the present start in this round, from 1, and the number of
-       starts in this round; else 0 */
+       starts in this round. SDM_FIT_JUDGE: the number of the present rival, from 1, and the largest
+       number of rivals. Else 0 */
     size_t round, start, n_starts;
     /* search: the best start that has ended in this round; NULL: none. [n_params] its parameters */
     const double *best_params;

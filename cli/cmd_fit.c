@@ -65,18 +65,18 @@ static void tell_why_again(progress_state *w, const sdm_fit_progress *p)
 {
     const cli_fit *f = w->f;
     const bool judged = w->phase == SDM_FIT_JUDGE && p->phase != SDM_FIT_JUDGE;
-    char text[80];
+    char text[140];
     if (f->coarse_mm > 0 && !(w->coarse_mm > 0)) {
         snprintf(text, sizeof text, "going on with finer maps (voxels of %.2g mm)",
                  cli_fit_map_voxel(f));
         cli_progress_tell(&w->bar, "fit", text);
-    } else if (judged && f->n_fits == w->n_fits && p->phase == SDM_FIT_SEARCH) {
-        cli_progress_tell(&w->bar, "search",
-                          "the fit is refused: looking for a better pose or value of a parameter");
     } else if (judged && f->n_fits == w->n_fits) {
-        cli_progress_tell(
-            &w->bar, "fit",
-            "the fit is refused: going on from a better pose or value of a parameter");
+        const bool search = p->phase == SDM_FIT_SEARCH;
+        char why[60] = "the points leave doubt";
+        if (p->refused_by) snprintf(why, sizeof why, "refused by '%s'", p->refused_by);
+        snprintf(text, sizeof text, "%s: %s a better pose or value of a parameter", why,
+                 search ? "looking for" : "going on from");
+        cli_progress_tell(&w->bar, search ? "search" : "fit", text);
     }
     w->coarse_mm = f->coarse_mm;
     w->n_fits = f->n_fits;

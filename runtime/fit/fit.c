@@ -694,6 +694,14 @@ static sdm_status attempt_better(fit_problem *p, bool exact, sdm_fit_result *out
     return SDM_OK;
 }
 
+/* The name of the first check that failed; NULL: none did. */
+static const char *failed_check(const sdm_fit_verdict *v)
+{
+    for (size_t i = 0; i < v->n_findings; i++)
+        if (v->findings[i].grade == SDM_FIT_FAILED) return sdm_fit_check_name(v->findings[i].kind);
+    return NULL;
+}
+
 /* Fits and judges, and begins again from another pose or value of a parameter as long as the fit is
  * refused, or points leave doubt, and this explains the data better. */
 static sdm_status attempts(fit_problem *p, sdm_fit_result *out, sdm_error *err)
@@ -706,6 +714,7 @@ static sdm_status attempts(fit_problem *p, sdm_fit_result *out, sdm_error *err)
     for (size_t i = 0; i < o->max_restarts && again; i++) {
         sdm_error trouble = {0};
         sdm_status tried;
+        p->refused_by = failed_check(&out->verdict);
         if (s == SDM_E_QUALITY)
             tried = attempt_again(p, exact, out, &fitted, &again, &trouble);
         else if (!s && p->has_better)

@@ -425,7 +425,8 @@ void sdm_fit_tell_progress(const fit_problem *p, sdm_fit_phase phase, double ste
                           .round = p->search_round,
                           .start = p->search_start,
                           .n_starts = p->search_starts,
-                          .best_params = p->search_best};
+                          .best_params = p->search_best,
+                          .refused_by = p->refused_by};
     sdm_rotation_vector(p->state.rotation, g.pose.rotation);
     memcpy(g.pose.translation, p->state.translation, sizeof g.pose.translation);
     p->opts->progress(p->opts->user, &g);

@@ -125,6 +125,8 @@ typedef struct fit_problem {
     /* where the search for the start is, for progress(); see sdm_fit_progress */
     size_t search_round, search_start, search_starts;
     const double *search_best;
+    /* name of the check that has refused the fit before this attempt; NULL: none has */
+    const char *refused_by;
 } fit_problem;
 
 /* Whether the target is an image: its voxels have tissues. */

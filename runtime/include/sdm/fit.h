@@ -155,6 +155,9 @@ typedef struct sdm_fit_progress {
     size_t round, start, n_starts;
     /* search: the best start that has ended in this round; NULL: none. [n_params] its parameters */
     const double *best_params;
+    /* name of the check that has refused the fit, which now goes on from another start; NULL: none
+       has. A static string */
+    const char *refused_by;
 } sdm_fit_progress;
 
 /* sdm_fit_defaults() fills it; change what differs. */

@@ -32,8 +32,8 @@ params = torch.tensor([[1.5, 2.0]], dtype=torch.float64, requires_grad=True)
 sdmgen.torch.Sdm(trained.model)(params)[0].mean().backward()
 print("derivative of the mean distance by width and height:", params.grad[0].numpy())
 
-map = trained.model(width=1.5, height=2)
-map.surface().write("box.stl")
+sdm = trained.model(width=1.5, height=2)
+sdm.surface().write("box.stl")
 
 try:
     import matplotlib
@@ -42,7 +42,7 @@ except ImportError:
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-plt.imshow(map.values[:, map.shape[1] // 2], origin="lower", cmap="RdBu")
+plt.imshow(sdm.values[:, sdm.shape[1] // 2], origin="lower", cmap="RdBu")
 plt.colorbar(label="signed distance, mm")
-plt.contour(map.values[:, map.shape[1] // 2], [0], colors="k")
+plt.contour(sdm.values[:, sdm.shape[1] // 2], [0], colors="k")
 plt.savefig("first_network.png")

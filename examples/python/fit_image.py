@@ -22,9 +22,9 @@ except ImportError:
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-map, k = result.map(made.image.grid), made.image.shape[0] // 2
+sdm, k = result.map(made.image.grid), made.image.shape[0] // 2
 plt.imshow(made.image.values[k], origin="lower", cmap="gray")
-plt.contour(map.values[k], [0], colors="r")
+plt.contour(sdm.values[k], [0], colors="r")
 plt.contour(made.label.values[k], [0.5], colors="y", linestyles=":")
 plt.title("fit (red) and truth (yellow)")
 plt.savefig(sys.argv[1] if len(sys.argv) > 1 else "fit_image.png")

@@ -6,8 +6,8 @@ program sdmgen, for any number of threads. docs/python.md is the guide.
 
     import sdmgen
     model = sdmgen.Model("runs/cochlea/model.sdm")
-    map = model(a=4.2)                      # map.values: float32 [z, y, x]
-    sdmgen.write("cochlea.nii.gz", map)
+    sdm = model(a=4.2)                      # sdm.values: float32 [z, y, x]
+    sdmgen.write("cochlea.nii.gz", sdm)
 """
 
 from __future__ import annotations

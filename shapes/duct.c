@@ -14,7 +14,8 @@
  *     x = W cos(v) (1 - waist cos(v)^2) (1 + egg sin(v))      y = H sin(v)
  *
  * where 2 W, 2 H and the tilt are parabolas of f through their values at the base, in the middle
- * and at the apex; flare exp(-theta / 0.35) is added to W and H; over the last half turn both
+ * and at the apex; flare exp(-theta / 0.35) is added to W and H. Where such a sum g is below g0 =
+ * 0.1 mm, the half axis is g0 exp(g / g0 - 1), which is positive. Over the last half turn both
  * shrink to the share `tip`. The area is pi W H (1 - 3/4 waist); above a waist of 1/3 the outline
  * has two lobes. The basal end is slanted: a point of a section at (x, y) lies u (slant_out x +
  * slant_up y) further along the centreline. Half-ellipsoids over the end sections close the tube;

@@ -12,6 +12,9 @@
 // The apical taper begins so far before the end, rad: half a turn.
 #define TIP_LENGTH LATHE_PI
 
+// Half axes below this length, mm, shrink towards 0 instead of becoming negative.
+#define LEAST 0.1
+
 // Points of an outline among which the farthest is sought.
 #define POINTS 128
 
@@ -108,6 +111,9 @@ static void growth_at(size_t n_values, const double *values, double fraction, do
     growth[DUCT_GROWTH_OBLIQUE] = -growth[DUCT_GROWTH_OBLIQUE];
 }
 
+/* A half axis, mm: x from LEAST on, else less but positive; the first derivative is continuous. */
+static double half_axis(double x) { return x > LEAST ? x : LEAST * exp(x / LEAST - 1); }
+
 void sdm_duct_section_at(duct_form form, size_t n_values, const double *x, double fraction,
                          duct_section *out)
 {
@@ -116,7 +122,7 @@ void sdm_duct_section_at(duct_form form, size_t n_values, const double *x, doubl
     const double flare = x[DUCT_FLARE] * exp(-theta / DUCT_FLARE_ANGLE),
                  u = fmax(0, 1 - (x[DUCT_THETA] - theta) / TIP_LENGTH),
                  taper = 1 - (1 - x[DUCT_TIP]) * u * u;
-    out->wide = taper * (0.5 * parabola(x + DUCT_WIDTH_BASE, fraction) + flare);
+    out->wide = taper * half_axis(0.5 * parabola(x + DUCT_WIDTH_BASE, fraction) + flare);
     out->high = out->wide;
     out->tilt[0] = 1, out->tilt[1] = 0;
     out->waist = out->egg = 0;
@@ -125,7 +131,7 @@ void sdm_duct_section_at(duct_form form, size_t n_values, const double *x, doubl
     const double early = fmax(0, 1 - theta / HOOK_END),
                  tilt = parabola(x + DUCT_TILT_BASE, fraction) + x[DUCT_TWIST] * early * early,
                  flare_high = flare + x[DUCT_FLARE_HIGH] * exp(-theta / DUCT_FLARE_ANGLE);
-    out->high = taper * (0.5 * parabola(x + DUCT_HEIGHT_BASE, fraction) + flare_high);
+    out->high = taper * half_axis(0.5 * parabola(x + DUCT_HEIGHT_BASE, fraction) + flare_high);
     out->tilt[0] = cos(tilt), out->tilt[1] = -sin(tilt); // e2 points down
     if (form == DUCT_LOBES) out->waist = x[DUCT_WAIST], out->egg = -x[DUCT_EGG];
 }

@@ -264,6 +264,9 @@ void cli_fit_print_verdict(const cli_fit *f)
             if ((int)v->findings[i].grade == grade && !is_plain(&v->findings[i]))
                 print_finding(&v->findings[i]);
     print_passed(v);
+    if (f->target.kind == SDM_FIT_POINTS && !f->opts.keep_appearance && v->grade != SDM_FIT_FAILED)
+        printf("  scatter      compare the standard deviation about the surface with the error of "
+               "your scanner: if it is larger, the object has another shape\n");
     if (cli_fit_start_is_suspect(f) && f->opts.turns == SDM_FIT_TURNS_NONE &&
         !isnan(f->args->pose.rotation[0]))
         printf("  --rotation gives one start: without it the fit tries 60 rotations\n");

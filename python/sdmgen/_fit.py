@@ -37,9 +37,10 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class FitProgress:
-    """State after an iteration. `phase`: "search", "fit", "polish" or, once after the last step,
-    "judge". In a search with several starts: start number `start` of `starts`, in `round` 1 (all of
-    them) or 2 (the best ones); else these three are 0."""
+    """State after an iteration. `phase`: "search", "fit", "polish" or, after the last step,
+    "judge" (before the checks, and before each rival of the fit). In a search with several starts:
+    start number `start` of `starts`, in `round` 1 (all of them) or 2 (the best ones). "judge": rival
+    number `start` of at most `starts`. Else these three are 0."""
 
     phase: str
     iteration: int

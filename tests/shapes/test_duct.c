@@ -352,13 +352,41 @@ static void test_details(void **state)
     sdm_instance_free(s);
 }
 
+/* A height whose flare is longer than itself, negative: the section stays thin, and the mesh
+ * closed. */
+static void test_flare_beyond_the_height(void **state)
+{
+    (void)state;
+    sdm_error err = {0};
+    sdm_instance *s = shape_make("duct", "section=lobes detail=2");
+    double p[DUCT_ALL];
+    defaults_of(s, p);
+    p[index_of(s, "height_base")] = 1.2;
+    p[index_of(s, "flare")] = -0.3, p[index_of(s, "flare_high")] = -0.4;
+    duct_section base;
+    sdm_duct_section_at(DUCT_LOBES, 2, p, 0, &base);
+    near_to("the half axis", base.high, 0.1 * exp(-0.1 / 0.1 - 1), 1e-12);
+    sdm_mesh m = {0};
+    sdm_audit audit;
+    if (sdm_instance_mesh(s, p, &m, &err)) fail_msg("%s", err.text);
+    assert_int_equal(sdm_mesh_audit(&m, &audit, &err), SDM_OK);
+    assert_true(audit.closed);
+    sdm_mesh_dispose(&m);
+    sdm_instance_free(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_is_the_cochlea), cmocka_unit_test(test_sections),
-        cmocka_unit_test(test_volume),         cmocka_unit_test(test_parameters),
-        cmocka_unit_test(test_slant),          cmocka_unit_test(test_height),
-        cmocka_unit_test(test_growth),         cmocka_unit_test(test_details),
+        cmocka_unit_test(test_is_the_cochlea),
+        cmocka_unit_test(test_sections),
+        cmocka_unit_test(test_volume),
+        cmocka_unit_test(test_parameters),
+        cmocka_unit_test(test_slant),
+        cmocka_unit_test(test_height),
+        cmocka_unit_test(test_growth),
+        cmocka_unit_test(test_details),
+        cmocka_unit_test(test_flare_beyond_the_height),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

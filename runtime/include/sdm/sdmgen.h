@@ -46,6 +46,8 @@
  *   float *values = malloc(sdm_grid_count(&info->grid) * sizeof *values); // mm, negative inside
  *   sdm_status s = sdm_generate(model, p, NULL, values, NULL, &err);
  *   if (!s) printf("%g mm at voxel (4, 5, 6)\n", values[sdm_grid_voxel(&info->grid, 4, 5, 6)]);
+ *   // far from the surface some models err by more than a voxel
+ *   if (sdm_model_check_use(model, SDM_USE_DISTANCE, &err)) fputs(err.text, stderr);
  *   const double x[3] = {1, 2, 0.5};                                      // LPS, mm
  *   float value, gradient[3];
  *   if (!s) s = sdm_generate_points(model, p, NULL, x, 1, &value, gradient, NULL, NULL, &err);

@@ -43,11 +43,27 @@ expect 4 '^fit_labels: .* of the volume of the shape is empty' by-cmake/fit_labe
 has '^verdict: FAILED$'
 expect 1 '^fit_labels: no voxel has the label 7$' by-cmake/fit_labels torus label.nii.gz 7
 
+# a training, with a key of the command line in place of that of the file
+expect 0 'evaluate +100 %' by-cmake/train "$source_folder/tests/cli/tiny.yaml" trained train.steps=20
+has '^trained/model\.sdm: (good|usable|poor), RMSE [0-9.]+ mm, [0-9]+ s$'
+grep -q '^{"phase": "evaluate", "step": 20,' trained/metrics.jsonl || bad 'the training does not end after the steps of its command'
+expect 0 - prefix/bin/sdmgen info trained/model.sdm
+expect 1 'train: .*stepz' by-cmake/train "$source_folder/tests/cli/tiny.yaml" trained train.stepz=20
+
 pc=$(dirname "$(find prefix -name sdmgen.pc)")
 # shellcheck disable=SC2046 # flags are words
 PKG_CONFIG_PATH=$pc cc -std=c11 -Wall -Wextra -Werror -o by-pkg-config "$source_folder/examples/consume/consume.c" \
     $(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs sdmgen) "-Wl,-rpath,$(PKG_CONFIG_PATH=$pc pkg-config --variable=libdir sdmgen)" 2>log || bad "pkg-config: $(cat log)"
 expect 0 - ./by-pkg-config $model
+
+# The C program of README.md.
+sed -n '/^```c$/,/^```$/{/^```/!p}' "$source_folder/README.md" >readme.c
+# shellcheck disable=SC2046 # flags are words
+PKG_CONFIG_PATH=$pc cc -std=c11 -Wall -Wextra -Werror -o readme readme.c \
+    $(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs sdmgen) "-Wl,-rpath,$(PKG_CONFIG_PATH=$pc pkg-config --variable=libdir sdmgen)" 2>log || bad "the program of README.md: $(cat log)"
+mkdir -p runs/cochlea && cp "$model" runs/cochlea/model.sdm
+expect 0 - ./readme
+has '^-?[0-9.]+ mm$'
 
 # The command that examples/statistical/README.md shows.
 cp "$source_folder/examples/statistical/make_labyrinth.c" .
